@@ -57,15 +57,15 @@ class WindConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         Meta(
             ge=0,
             le=360,
-            description="Where it comes from, clockwise from north.",
+            description="Direction from which the wind blows, degrees clockwise from north.",
             extra=expected("degrees from 0 to 360"),
         ),
     ] = 0.0
     gusts: Annotated[
         Annotated[float, Meta(ge=0, le=1)] | None,
         Meta(
-            description="Standard deviation of the gusts as a share of the speed. Left out: that of open country in "
-            "daytime, 0.15.",
+            description="Standard deviation of the gusts as a share of the speed. Default: 0.15, the value of open "
+            "country in daytime.",
             extra=expected("a share from 0 to 1"),
         ),
     ] = None
@@ -74,12 +74,12 @@ class WindConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 class SimConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A simulated drone.
 
-    `anafi-mav run` starts it: all of them together in one process of their own.
+    `anafi-mav run` starts all simulated drones in one separate process.
     """
 
     model: Annotated[
         str,
-        Meta(description="Which ANAFI is simulated.", extra=expected(alternatives(models.simulated()))),
+        Meta(description="Model of the simulated drone.", extra=expected(alternatives(models.simulated()))),
     ] = "4k"
     home: Annotated[
         tuple[
@@ -88,7 +88,7 @@ class SimConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
             Annotated[float, Meta(ge=-500, le=9000, extra=expected("a height of -500 to 9000 m above sea level"))],
         ],
         Meta(
-            description="Where it stands at the start: latitude and longitude (WGS 84, degrees), height of the ground "
+            description="Place at the start: latitude and longitude (WGS 84, degrees) and height of the ground "
             "(metres above mean sea level).",
             extra=expected("[latitude, longitude, height]"),
         ),
@@ -96,7 +96,8 @@ class SimConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     address: Annotated[
         Annotated[str, Meta(max_length=MAX_TEXT)] | None,
         Meta(
-            description="The address it binds. Left out: the first of 127.0.42.1, 127.0.42.2, … with free ports.",
+            description="Address that the simulated drone binds. Default: the first of 127.0.42.1, 127.0.42.2, … with "
+            "free ports.",
             extra=expected("an IPv4 address of this machine, like 127.0.42.1"),
         ),
     ] = None
@@ -105,7 +106,7 @@ class SimConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
         Meta(
             ge=0.1,
             le=20,
-            description="Simulated seconds per second. The same for every simulated drone: they share one clock.",
+            description="Simulated seconds per second. All simulated drones share one clock: it must be equal for all.",
             extra=expected("a number from 0.1 to 20"),
         ),
     ] = 1.0
@@ -114,88 +115,88 @@ class SimConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
         Meta(
             ge=1,
             le=200,
-            description="How often attitude, speed and altitude are sent, per second. The aircraft does 5.",
+            description="Rate of attitude, speed and altitude, Hz. The aircraft sends them at 5 Hz.",
             extra=expected("a number of events per second from 1 to 200"),
         ),
     ] = 5.0
     seed: Annotated[
         Annotated[int, Meta(ge=0, le=2**32 - 1)] | None,
         Meta(
-            description="Start of the random numbers, for a flight that can be repeated. The same for every simulated "
-            "drone that names one. Left out: different each time.",
+            description="Seed of the random numbers, for a flight that can be repeated. Must be equal for all "
+            "simulated drones that set it. Default: a new seed at each start.",
             extra=expected("a whole number from 0 to 4294967295"),
         ),
     ] = None
     protocol: Annotated[
         Literal[1, 2, 3],
         Meta(
-            description="The newest version of Parrot's transport that it offers.",
+            description="Newest version of Parrot's transport that the simulated drone offers.",
             extra=expected("1, 2 or 3"),
         ),
     ] = 3
     skycontroller: Annotated[
         Literal[3, 4] | None,
         Meta(
-            description="Put a simulated Skycontroller of this generation in front of it, whose address it then is. "
-            "Left out: the drone is reached directly.",
+            description="Generation of a simulated Skycontroller between gateway and drone; `address` is then the "
+            "Skycontroller's. Default: no Skycontroller.",
             extra=expected("3 or 4"),
         ),
     ] = None
     storage: Annotated[
         Annotated[int, Meta(ge=0, le=2**63 - 1)] | Annotated[str, Meta(pattern=r"\A[0-9]{1,9}[kMG]?\Z")] | None,
         Meta(
-            description="Bytes of its memory card; a small one fills soon. Left out: as large as the model's.",
+            description="Size of the memory card, bytes. Default: the size of the model's card.",
             extra=expected("a number of bytes like 500k or 16G"),
         ),
     ] = None
     wind: Annotated[
         WindConfig | None,
         Meta(
-            description="The wind that blows from the start. Left out: none.",
+            description="Wind from the start. Default: no wind.",
             extra=expected("a mapping like {speed: 8, direction: 270}"),
         ),
     ] = None
     firmware_quirks: Annotated[
         tuple[Annotated[str, Meta(max_length=MAX_TEXT, extra=expected("the name of a quirk"))], ...],
         Meta(
-            description="Ways in which its firmware differs from the simulated one, as docs/simulator.md lists them.",
+            description="Firmware quirks to simulate; docs/simulator.md lists them.",
             extra=expected("a list of names like [no-flight-id]"),
         ),
     ] = ()
     scenario: Annotated[
         Annotated[str, Meta(min_length=1, max_length=MAX_PATH)] | None,
         Meta(
-            description="What goes wrong, and when: a file as docs/simulator.md describes, looked for from the folder "
-            "of this one. Of its steps those for this drone count, and those for all.",
+            description="Scenario file with timed faults (docs/simulator.md), relative to the folder of the "
+            "configuration. Its steps for this drone and those for all drones are executed.",
             extra=expected("the path of a scenario file"),
         ),
     ] = None
     http_port: Annotated[
         Port | None,
         Meta(
-            description="Port of its web server. Left out: 80 as on the aircraft, or 8080 where this user may not "
-            "open port 80.",
+            description="TCP port of the simulated web server. Default: 80 as on the aircraft, or 8080 if this user "
+            "may not open port 80.",
             extra=expected("a port from 1 to 65535"),
         ),
     ] = None
     rtsp_port: Annotated[
         Port | None,
         Meta(
-            description="Port of its video. Left out: 554 as on the aircraft, or 8554 where this user may not open "
-            "port 554.",
+            description="TCP port of the simulated RTSP server. Default: 554 as on the aircraft, or 8554 if this user "
+            "may not open port 554.",
             extra=expected("a port from 1 to 65535"),
         ),
     ] = None
 
 
 class DroneConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A drone: one MAVLink system. It has either an `address` or a `sim`."""
+    """A drone is one MAVLink system. It has either an `address` or a `sim`."""
 
     name: Annotated[
         str,
         Meta(
             pattern=r"\A[A-Za-z0-9][A-Za-z0-9_.-]{0,31}\Z",
-            description="What messages and logs call it.",
+            description="Name of the drone in messages and logs.",
             extra=expected("1 to 32 letters, digits, '-', '_' or '.', beginning with a letter or digit"),
         ),
     ]
@@ -204,59 +205,58 @@ class DroneConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         Meta(
             ge=1,
             le=250,
-            description="Its MAVLink system id; each drone has its own. 245 is legal but draws a warning: MAVSDK "
-            "calls itself 245 unless told otherwise.",
+            description="MAVLink system id, different for each drone. 245 is allowed with a warning: it is the default "
+            "system id of MAVSDK.",
             extra=expected("a whole number from 1 to 250"),
         ),
     ]
     address: Annotated[
         Annotated[str, Meta(max_length=MAX_TEXT)] | None,
         Meta(
-            description="Where the drone is. An ANAFI that you joined by Wi-Fi is 192.168.42.1.",
+            description="Network address of the drone. In its own Wi-Fi an ANAFI is 192.168.42.1.",
             extra=expected("an IPv4 address or a host name, like 192.168.42.1"),
         ),
     ] = None
     interface: Annotated[
         Annotated[str, Meta(pattern=r"\A[^\s/\0]{1,15}\Z")] | None,
         Meta(
-            description="The network interface through which this drone is reached, and no other: every socket for it "
-            "is bound there. So several drones, each in its own Wi-Fi, may have the same address. Linux only. Left "
-            "out: as the routes of the machine say.",
+            description="Network interface to which every socket for this drone is bound. Several drones, each in its "
+            "own Wi-Fi, may then have the same address. Linux only. Default: the interface of the system's routes.",
             extra=expected("the name of a network interface, like wlan1"),
         ),
     ] = None
     sim: Annotated[
         SimConfig | None,
         Meta(
-            description="Simulate this drone; `{}` takes every default.",
+            description="Settings of a simulated drone; `{}` for all defaults.",
             extra=expected("a mapping with the keys of a simulated drone, or {}"),
         ),
     ] = None
     discovery_port: Annotated[
         Port,
         Meta(
-            description="TCP port where the drone introduces itself and names the port of its handshake.",
+            description="TCP port of ARSDK discovery, where the drone sends its identity and its handshake port.",
             extra=expected("a port from 1 to 65535"),
         ),
     ] = 44445
     http_port: Annotated[
         Port | None,
         Meta(
-            description="TCP port of its web server, where it is not the aircraft's. Left out: 80.",
+            description="TCP port of the drone's web server. Default: 80.",
             extra=expected("a port from 1 to 65535"),
         ),
     ] = None
     rtsp_port: Annotated[
         Port | None,
         Meta(
-            description="TCP port of its video, where it is not the aircraft's. Left out: 554.",
+            description="TCP port of the drone's RTSP server. Default: 554.",
             extra=expected("a port from 1 to 65535"),
         ),
     ] = None
     allow_kill: Annotated[
         bool | None,
         Meta(
-            description="The same for this drone alone. Left out: as the file says for all.",
+            description="The same for this drone only. Default: the value for all drones.",
             extra=expected("true or false"),
         ),
     ] = None
@@ -288,10 +288,44 @@ class HttpConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     ] = None
 
 
+class VideoConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The gateway's video server (RTSP), which passes on the live video of every drone.
+
+    It has no password.
+    """
+
+    host: Annotated[
+        str,
+        Meta(
+            min_length=1,
+            max_length=MAX_TEXT,
+            description="The address that it listens on: 127.0.0.1 for this computer alone, 0.0.0.0 for every network "
+            "that this computer is in.",
+            extra=expected("an IPv4 address or a host name of this computer, like 0.0.0.0"),
+        ),
+    ] = "127.0.0.1"
+    rtsp_port: Annotated[
+        Annotated[int, Meta(ge=0, le=65535)] | None,
+        Meta(
+            description="Its TCP port; 0 is a free one. Left out: 8555, or a free one where that is in use. The "
+            "gateway prints it.",
+            extra=expected("a port from 0 to 65535"),
+        ),
+    ] = None
+    public_host: Annotated[
+        Annotated[str, Meta(min_length=1, max_length=64)] | None,
+        Meta(
+            description="The host in the URIs that stations receive, where it is not the address that their link "
+            "shows: behind NAT, in a container, or for stations on serial lines.",
+            extra=expected("an IPv4 address or a host name, like 10.0.0.7"),
+        ),
+    ] = None
+
+
 class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The whole file.
 
-    Every key may be left out: an empty file is what `anafi-mav` flies without one.
+    Every key is optional: an empty file equals `anafi-mav` without a configuration.
     """
 
     endpoints: Annotated[
@@ -304,8 +338,8 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         Meta(
             min_length=1,
             max_length=MAX_ENDPOINTS,
-            description="Where MAVLink is spoken. Every drone speaks on every endpoint. The forms of a URL are listed "
-            "below.",
+            description="MAVLink endpoints. Every drone sends and receives on every endpoint. The forms of a URL are "
+            "listed below.",
             extra=expected(f"a list of 1 to {MAX_ENDPOINTS} URLs"),
         ),
     ] = ("udpout://127.0.0.1:14550", "udpout://127.0.0.1:14540", "tcpin://127.0.0.1:5760?flavour=ardupilot")
@@ -314,24 +348,32 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         Meta(
             min_length=1,
             max_length=MAX_DRONES,
-            description="The drones, each one MAVLink system.",
+            description="The drones; each is one MAVLink system.",
             extra=expected(f"a list of 1 to {MAX_DRONES} drones"),
         ),
     ] = (DroneConfig(name="anafi", sysid=1, sim=SimConfig()),)
     allow_kill: Annotated[
         bool,
         Meta(
-            description="Whether a client may have the motors cut in the air. A drone whose motors are cut falls.",
+            description="Allow clients to cut the motors in flight. A drone whose motors are cut falls.",
             extra=expected("true or false"),
         ),
     ] = False
+    pose: Annotated[
+        Literal["video", "events"],
+        Meta(
+            description="Source of attitude, position and speed for a client that requests them more than ten times a "
+            "second: the metadata of the live video, up to 30 times a second, or the drone's events, 5 times a second. "
+            "The video costs the radio some Mbit/s while such a client has its streams.",
+            extra=expected("video or events"),
+        ),
+    ] = "video"
     state: Annotated[
         Annotated[str, Meta(min_length=1, max_length=MAX_PATH)] | None,
         Meta(
-            description="The folder of what outlives the gateway: of each drone a file with its mission, its "
-            "fence, its rally points, the take-off point of its last flight and the gateway's own settings for it. "
-            "`~` is the user's home. Left out: "
-            "`$XDG_STATE_HOME/anafi-mav`, which without that variable is `~/.local/state/anafi-mav`.",
+            description="Folder of the gateway's stored state. Each drone has a file with its mission, fence, rally "
+            "points, the take-off point of its last flight and the gateway's settings for it. `~` is the user's home. "
+            "Default: `$XDG_STATE_HOME/anafi-mav`, or `~/.local/state/anafi-mav` without that variable.",
             extra=expected("the path of a folder"),
         ),
     ] = None
@@ -342,6 +384,13 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             extra=expected("a mapping like {host: 127.0.0.1, port: 8088}, or off"),
         ),
     ] = HttpConfig()
+    video: Annotated[
+        VideoConfig,
+        Meta(
+            description="The gateway's video server.",
+            extra=expected("a mapping like {host: 0.0.0.0, rtsp_port: 8555}"),
+        ),
+    ] = VideoConfig()
 
     @property
     def http_server(self) -> HttpConfig | None:
@@ -357,5 +406,6 @@ SECTIONS: dict[str, type[msgspec.Struct]] = {
     "drones[…].sim": SimConfig,
     "drones[…].sim.wind": WindConfig,
     "http": HttpConfig,
+    "video": VideoConfig,
 }
 """Place in the file of each group of keys, in the order of the manual."""

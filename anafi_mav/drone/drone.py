@@ -57,6 +57,7 @@ from anafi_mav.drone.status.link import Link
 from anafi_mav.drone.status.product import MODELS, Identity, Product
 from anafi_mav.drone.status.sound import Sound
 from anafi_mav.drone.video.route import Direct, Mux, VideoRoute
+from anafi_mav.drone.video.stream_choice import StreamChoice
 from anafi_mav.drone.video.video import Video
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError
 
@@ -143,6 +144,7 @@ class Drone:
         self.storage = Storage(self._commander)
         self.thermal = Thermal(self._commander)
         self.video = Video()
+        self.streams = StreamChoice(lambda: self._model, self.thermal, self.camera, self.video)
         self.piloting = Piloting(self._commander, self.home, self.takeoff_blockers)
         self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over, self._stand_by)
         self.piloting.pilot_has_source = lambda: self.controller.pilot_has_source
@@ -178,6 +180,7 @@ class Drone:
         self._reactions: dict[type[Message], Callable[[Any, float], None]] = {
             **self.piloting.reactions(),
             **self.controller.reactions(),
+            **self.streams.reactions(),
             common.MavlinkFilePlayingStateChanged: self._plan_says,
             common.Disconnection: self._on_dismissal,
             drone_manager.ConnectionState: self._controller_says,
@@ -244,6 +247,7 @@ class Drone:
                 await self.close()
                 raise
             self._complete = True
+            self.streams.link_up()
             self.video.link_up(self._video_route(session))
             self._hover_after_silence()
         finally:
@@ -549,6 +553,7 @@ class Drone:
             self.controller.link_silent()
         else:
             self.controller.link_lost()
+        self.streams.link_lost()
         self.video.link_lost()
         if not self._lost.done():
             self._lost.set_result(why)
@@ -568,7 +573,9 @@ class Drone:
                 await asyncio.sleep(0)  # a session sends at the end of a turn of the loop
                 await session.close()
                 self._on_lost(session, session.lost)
+        self.streams.link_lost()
         await self.video.close()
+        await self.media.close()
         await self._rest.close()
 
     @property

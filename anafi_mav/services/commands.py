@@ -28,7 +28,10 @@ Short: the reason may have ended.
 """
 
 MAX_CLIENTS = 64
-"""Clients whose newest action is remembered; there are a handful, and an address is easily made up."""
+"""Newest actions that are remembered, one for each client and group.
+
+There are a handful, and an address is easily made up.
+"""
 
 PROGRESS_AFTER, PROGRESS_EVERY = 0.3, 0.8
 """s until the first IN_PROGRESS and between them: MAVSDK resends at 0.5 s, every client gives up after 1-3 s (R9)."""
@@ -41,6 +44,23 @@ gives up 2 s after it has sent it, the others later."""
 
 _UNSET_INT = (2**31 - 1, -(2**31))
 """x and y of a COMMAND_INT that stand for "not set": the specified INT32_MAX, and what a cast NaN becomes (R8)."""
+
+
+class ActionGroup(enum.Enum):
+    """Actions that may replace each other, by the part of the system that they control.
+
+    Actions of different groups run side by side: none replaces or ends the other, and each group has its own newest
+    action of a client for retransmissions. An action ends older ones of its group only where its handler does so.
+    """
+
+    FLIGHT = "the movement of the aircraft, and everything that must not happen beside it"
+    GIMBAL = "the direction of the gimbal"
+    PHOTO = "photos and series of them"
+    RECORDING = "the recording of a video"
+    ZOOM = "the zoom"
+    CAMERA = "mode, source and settings of the camera"
+    STORAGE = "the storage of photos and videos"
+    STREAM = "the live video"
 
 
 class Effect(enum.Enum):
@@ -123,6 +143,7 @@ class Definition:
     mode: Callable[[Command], FlightMode | None] | None = None
     """The mode that it names, None for one that we do not have. Only for commands that name modes."""
     progress: ProgressPolicy = ProgressPolicy.PROMPT
+    group: ActionGroup = ActionGroup.FLIGHT
 
     def check(self, id: int) -> None:
         """Raise `ValueError` when this contradicts MAVLink's definition of the MAV_CMD, or itself."""
@@ -262,12 +283,12 @@ class Execution:
 class CommandHistory:
     """Distinguishes a new action from the retransmission of one.
 
-    For each client only the newest action counts: arm, disarm, arm within two seconds are three actions, although the
-    third equals the first.
+    For each client and group only the newest action counts: arm, disarm, arm within two seconds are three actions,
+    although the third equals the first.
     """
 
     def __init__(self) -> None:
-        self._newest: dict[Hashable, Execution] = {}
+        self._newest: dict[tuple[Hashable, ActionGroup], Execution] = {}
 
     def retransmission(
         self,
@@ -284,7 +305,7 @@ class CommandHistory:
         and modes that have ended by themselves (`mode` is the vehicle's). A command that another client has replaced
         is neither executed against that client nor confirmed: it is answered with CANCELLED.
         """
-        newest = self._newest.get(client)
+        newest = self._newest.get((client, command.definition.group))
         if newest is None or not newest.command.same_as(command):
             return None
         if newest.result == dialect.MAV_RESULT_IN_PROGRESS:
@@ -302,25 +323,26 @@ class CommandHistory:
         return None if effect is Effect.RETURN or ended else newest.result
 
     def begin(self, client: Hashable, command: Command) -> Execution:
-        """Note that an action begins; this client's next one is compared with it."""
-        self._newest.pop(client, None)  # so that the dictionary is in the order of use
-        execution = self._newest[client] = Execution(client, command)
+        """Note that an action begins; this client's next one of its group is compared with it."""
+        key = (client, command.definition.group)
+        self._newest.pop(key, None)  # so that the dictionary is in the order of use
+        execution = self._newest[key] = Execution(client, command)
         if len(self._newest) > MAX_CLIENTS:
             del self._newest[next(iter(self._newest))]
         return execution
 
-    def supersede(self, client: Hashable) -> None:
-        """Note that an action of this client has replaced those of all others."""
-        for other, execution in self._newest.items():
-            if other != client:
+    def supersede(self, client: Hashable, group: ActionGroup = ActionGroup.FLIGHT) -> None:
+        """Note that an action of this client has replaced those of all others in a group."""
+        for (other, used), execution in self._newest.items():
+            if other != client and used is group:
                 execution.superseded = True
 
-    def forget(self, client: Hashable | None = None) -> None:
-        """Forget the newest action of one client, or of all clients (None).
+    def forget(self, client: Hashable | None = None, group: ActionGroup = ActionGroup.FLIGHT) -> None:
+        """Forget the newest action of one client in a group, or all actions (client None).
 
-        For one client: it moved the vehicle by other means.
+        For one client: it moved the vehicle, for example, by other means.
         """
         if client is None:
             self._newest.clear()
         else:
-            self._newest.pop(client, None)
+            self._newest.pop((client, group), None)

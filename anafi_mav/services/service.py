@@ -1,6 +1,6 @@
-"""Interface between a MAVLink service and its host, the system.
+"""Interface between a MAVLink service and its host, a component of a system.
 
-A system is the sum of its services. Each lists in tables which messages, commands and requests are its own; the host
+A component is the sum of its services. Each lists in tables which messages, commands and requests are its own; the host
 sorts what arrives into them, and nothing else connects the two.
 """
 
@@ -15,10 +15,12 @@ from anafi_mav.drone import Drone
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.commands import Action, Command
-from anafi_mav.services.files import ServedFile
+from anafi_mav.services.commands import Action, ActionGroup, Command
+from anafi_mav.services.definition_link import DefinitionLink
+from anafi_mav.services.files import Folder, ServedFile
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.memory import Memory
+from anafi_mav.services.pose import VehiclePose
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
@@ -37,28 +39,33 @@ Request = Callable[[Inbound, Command], Answer]
 
 
 class Host(Protocol):
-    """Interface of a system for its services."""
+    """Interface of a component for its services."""
 
     sysid: int
+    compid: int
     drone: Drone
     vehicle: Vehicle
     clock: Clock
     capabilities: int
-    """MAV_PROTOCOL_CAPABILITY bits of all services."""
+    """MAV_PROTOCOL_CAPABILITY bits of all services of the component."""
     memory: Memory
+    has_picture_pose: bool
+    """True when the configuration allows pose from the live video."""
+    definition: DefinitionLink
+    """Camera definition of the component."""
 
     @property
     def channels(self) -> Sequence[Channel]:
         """The open channels without the muted ones."""
 
     def send(self, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None = None) -> None:
-        """Send as the autopilot to one channel, to some, or to all.
+        """Send as this component to one channel, to some, or to all.
 
         Nothing is sent while the link is down.
         """
 
     def send_heartbeat(self) -> None:
-        """Send one more HEARTBEAT to all."""
+        """Send one more HEARTBEAT of the autopilot to all."""
 
     def send_by_flavour(
         self, build: Callable[[Flavour], dialect.MAVLink_message | None], to: Sequence[Channel] | None = None
@@ -69,7 +76,10 @@ class Host(Protocol):
         """
 
     def text(self, severity: Severity, text: OperatorText, to: Channel | None = None) -> None:
-        """A STATUSTEXT to everybody, and a line in the log; or to one channel alone."""
+        """A STATUSTEXT to everybody, and a line in the log; or to one channel alone.
+
+        It is the autopilot's, whatever the component: every station shows those.
+        """
 
     def warn_throttled(self, text: OperatorText) -> None:
         """Send a warning on a frequent event, at most once per five seconds.
@@ -81,13 +91,24 @@ class Host(Protocol):
         """Run in the background; cancelled when the drone's link goes down."""
 
     def run_action(
-        self, client: Hashable, work: Coroutine[Any, Any, None], *, is_order: bool = True
+        self,
+        client: Hashable,
+        work: Coroutine[Any, Any, None],
+        *,
+        is_order: bool = True,
+        group: ActionGroup = ActionGroup.FLIGHT,
     ) -> asyncio.Task[None]:
         """Run an action that a message without COMMAND_ACK requests, as one of the commands.
 
-        It replaces the active action, and newer ones replace it. A refusal becomes a text.
+        It replaces the active action of its group, and newer ones replace it. A refusal becomes a text.
 
         `is_order`: a client has commanded it; neither the gateway began it, nor a stream of setpoints."""
+
+    def end_others(self, group: ActionGroup) -> list[asyncio.Task[None]]:
+        """Cancel the component's running actions of a group.
+
+        Those that are older than the calling one. Their senders receive CANCELLED. Returns them, to be awaited.
+        """
 
     @property
     def replaced_by_order(self) -> bool:
@@ -96,8 +117,16 @@ class Host(Protocol):
     def times(self, at: float | None = None) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
 
-    def is_streamed(self, id: int) -> bool:
-        """Return True when this message is streamed on some channel."""
+    @property
+    def needs_pictures(self) -> bool:
+        """True while a client requests pose more often than events are reported."""
+
+    @property
+    def needs_video(self) -> bool:
+        """True while a client has a stream whose fields are in the live video only."""
+
+    def show_picture(self, pose: VehiclePose, shot: float, now: float) -> None:
+        """Send the pose that a picture reports; `shot`: when it was taken (s, monotonic)."""
 
     def mark_updated(self, id: int, at: float) -> None:
         """Send a streamed message for a value that no event reports.
@@ -115,7 +144,7 @@ def client_of(inbound: Inbound) -> Hashable:
 
 
 class Service:
-    """One MAVLink microservice of one system.
+    """One MAVLink microservice of one component.
 
     Tables are read when the system is made, `subscriptions` at link up.
     """
@@ -139,6 +168,14 @@ class Service:
         """Return the rows of the commands that change the vehicle's behaviour, by MAV_CMD."""
         return {}
 
+    def autopilot_actions(self) -> Mapping[int, Action]:
+        """Return rows that the autopilot answers for this component, by MAV_CMD.
+
+        For commands that clients address to component 1 by their definition or by habit. Of a component that has the
+        command itself, it answers those to component 0.
+        """
+        return {}
+
     def item_commands(self) -> Mapping[int, MessageHandler]:
         """Return handlers of mission items that belong to no plan, by the items' `current`."""
         return {}
@@ -153,6 +190,10 @@ class Service:
 
     def files(self) -> Mapping[str, ServedFile]:
         """Return the files that MAVLink FTP serves, by path."""
+        return {}
+
+    def folders(self) -> Mapping[str, Folder]:
+        """Return the folders that MAVLink FTP serves, by path."""
         return {}
 
     def link_up(self) -> None:

@@ -1,4 +1,4 @@
-"""One MAVLink system: the services of one drone on every channel, from link up to link down.
+"""One MAVLink system: the components of one drone on every channel while its link is up.
 
 Messages come in from the node by their addressing, answers go back to the asking channel alone, streams go to
 every channel at its own rate. While the drone's link is down the system does not exist: no heartbeat, no answer.
@@ -9,34 +9,36 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Callable, Coroutine, Hashable, Iterator, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import Message
-from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.mavlink.router import EVERY_COMPONENT
+from anafi_mav.services.camera_definition.param_ext_service import ParamExtService
 from anafi_mav.services.command.calibration_service import CalibrationService
-from anafi_mav.services.command.command_service import CommandService
+from anafi_mav.services.command.command_service import SETTLE
 from anafi_mav.services.command.compass_service import CompassService
+from anafi_mav.services.command.flight_service import FlightService
 from anafi_mav.services.command.guided_service import GuidedService
 from anafi_mav.services.command.modes_service import ModesService
 from anafi_mav.services.command.orbit_service import OrbitService
+from anafi_mav.services.component import BY_AUTOPILOT, COMMANDS, Component, joined
 from anafi_mav.services.event.event_service import EventService
-from anafi_mav.services.flavours import Flavour, flavour_of
-from anafi_mav.services.ftp.ftp_service import FtpService
 from anafi_mav.services.ftp.log_service import LogService
+from anafi_mav.services.gimbal.gimbal_service import GimbalService
 from anafi_mav.services.ground_station.banner_service import BannerService
 from anafi_mav.services.ground_station.identity_service import IdentityService
 from anafi_mav.services.ground_station.node_status_service import NodeStatusService
 from anafi_mav.services.ground_station.shell_service import ShellService
 from anafi_mav.services.ground_station.time_service import TimeService
 from anafi_mav.services.ground_station.tune_service import TuneService
+from anafi_mav.services.media.media_service import MediaService
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.monitor import takeoff_point_service
 from anafi_mav.services.monitor.aborted_return_service import AbortedReturnService
@@ -50,7 +52,7 @@ from anafi_mav.services.plan.fence_service import FenceService
 from anafi_mav.services.plan.mission_service import MissionService
 from anafi_mav.services.plan.plan_service import PlanService
 from anafi_mav.services.plan.rally_service import RallyService
-from anafi_mav.services.service import MessageHandler, Service
+from anafi_mav.services.service import Service
 from anafi_mav.services.setpoint.follow_service import FollowService
 from anafi_mav.services.setpoint.manual_control_service import ManualControlService
 from anafi_mav.services.setpoint.offboard_service import OffboardService
@@ -58,7 +60,6 @@ from anafi_mav.services.statustext import TextNumbers
 from anafi_mav.services.stream import Times
 from anafi_mav.services.telemetry.flight_record_service import FlightRecordService
 from anafi_mav.services.telemetry.high_latency_service import HighLatencyService
-from anafi_mav.services.telemetry.message_service import MessageService
 from anafi_mav.services.telemetry.telemetry_service import CHANGES, TelemetryService
 from anafi_mav.services.telemetry.video_service import VideoTelemetryService
 from anafi_mav.texts import OperatorText
@@ -70,13 +71,15 @@ from anafi_mav.vehicle.vehicle import Health, Landed, Vehicle
 
 logger = logging.getLogger(__name__)
 
-SERVICES: tuple[type[Service], ...] = (
+AUTOPILOT_SERVICES: tuple[type[Service], ...] = (
+    FlightService,
     IdentityService,
     ModesService,
     GuidedService,
     CalibrationService,
     CompassService,
     OrbitService,
+    GimbalService,
     TelemetryService,
     ParameterService,
     LinkLossService,
@@ -103,16 +106,18 @@ SERVICES: tuple[type[Service], ...] = (
     VideoTelemetryService,
     PilotService,
 )
-"""Services of a system, beside commands and messages themselves."""
+"""Services of component 1, beside commands, messages and files themselves."""
+
+CAMERA_SERVICES: tuple[type[Service], ...] = (ParamExtService, MediaService)
+"""Services of component 100."""
 
 AUTOPILOT = dialect.MAV_COMP_ID_AUTOPILOT1
+CAMERA = dialect.MAV_COMP_ID_CAMERA
 
 ABSENT = frozenset({dialect.MAV_COMP_ID_WINCH})
 """Components that no ANAFI has and whose commands are answered all the same: MAVSDK sends DO_WINCH to the winch, waits
 for an answer from there and repeats it for seconds. Not a camera or a gimbal: clients take an answer for its presence.
 """
-
-COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)
 
 HEARTBEAT_EVERY = 1.0
 """s (MAVLink heartbeat.md)."""
@@ -135,7 +140,7 @@ MAX_WARNINGS = 100
 
 
 class System:
-    """The MAVLink side of one drone; the `Host` of its services."""
+    """The MAVLink side of one drone."""
 
     def __init__(
         self,
@@ -147,8 +152,10 @@ class System:
         *,
         allow_kill: bool,
         state: Path | None = None,
+        has_picture_pose: bool = True,
     ) -> None:
         self.sysid = sysid
+        self.has_picture_pose = has_picture_pose
         self.drone = drone
         self.clock = clock
         self.memory = Memory(state)
@@ -173,32 +180,20 @@ class System:
             allow_kill=allow_kill,
             text=self.text,
             changed=self._changed,
-            end_others=lambda: self._commands.end_others(),
+            end_others=lambda: self._autopilot.commands.end_others(),
         )
-        self._commands: CommandService = CommandService(self)
-        self._messages = MessageService(self)
-        self._ftp = FtpService(self)
-        self.services: list[Service] = [self._commands, self._messages, self._ftp]
-        self.services += [kind(self) for kind in SERVICES]
-        self.capabilities: int = 0
-        for service in self.services:
-            self.capabilities |= service.capabilities()
-        self._commands.take_tables(
-            _joined(service.queries() for service in self.services),
-            _joined(service.actions() for service in self.services),
-        )
-        streams = _joined(service.streams() for service in self.services)
-        self._messages.take_tables(streams, _joined(service.requests() for service in self.services))
-        self.telemetry: frozenset[int] = frozenset({*streams, dialect.MAVLINK_MSG_ID_HEARTBEAT})
-        """Messages that the next one of their kind replaces: a full channel drops them rather than answers."""
-        node.add_telemetry(self.telemetry)
-        for service in self.services:
+        self._autopilot: Component = Component(self, AUTOPILOT, AUTOPILOT_SERVICES)
+        camera = Component(self, CAMERA, CAMERA_SERVICES)
+        self.components = (self._autopilot, camera)
+        """The autopilot is the first: the others' services build on what its services make of an event."""
+        self.services: list[Service] = [service for component in self.components for service in component.services]
+        camera.take_tables({})
+        self._autopilot.take_tables(joined(service.autopilot_actions() for service in camera.services))
+        for component in self.components:
+            node.add_telemetry(component.telemetry)
+        for service in self._autopilot.services:
             if isinstance(service, PlanService):
-                service.take_tables(_joined(service.item_commands() for service in self.services))
-        self._ftp.take_tables(_joined(service.files() for service in self.services))
-        self._handlers: dict[int, MessageHandler] = _joined(service.messages() for service in self.services)
-        self._handlers[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self._heard
-        self._receiving = [service for service in self.services if type(service).received is not Service.received]
+                service.take_tables(joined(service.item_commands() for service in self._autopilot.services))
         self._ticking = [service for service in self.services if type(service).tick is not Service.tick]
         self._subscribed: dict[type[Message], tuple[EventHandler, ...]] = {}
         """The handlers of each kind of event, in the order in which they are called."""
@@ -209,9 +204,10 @@ class System:
         """The drone is connected and has sent all its states: the system appears."""
         self.active = True
         self._undo = self.drone.subscribe(self._on_event)
-        self._node.add_host(self.sysid, AUTOPILOT, self._receive)
-        for component in ABSENT:
-            self._node.add_host(self.sysid, component, self._refuse)
+        for component in self.components:
+            self._node.add_host(self.sysid, component.compid, component.receive)
+        for compid in ABSENT:
+            self._node.add_host(self.sysid, compid, self._refuse)
         self._last_state = None
         if (problem := self.memory.load(self.drone.identity.serial)) is not None:
             self.text(Severity.WARNING, problem)
@@ -225,7 +221,7 @@ class System:
 
     async def settle(self) -> None:
         """End the commands that wait for the drone: the link is lost, but the system still exists."""
-        await self._commands.settle()
+        await self._settle()
 
     def link_down(self) -> None:
         """Notify waiting clients that the link is lost, then make the system silent."""
@@ -253,12 +249,15 @@ class System:
         if not self.active:
             return
         if self.vehicle.descends:
-            await self._commands.settle(DESCENT_WAIT)
+            await self._settle(DESCENT_WAIT)
         else:
-            await self._commands.end_all()
+            await asyncio.gather(*(component.commands.end_all() for component in self.components))
         await self.vehicle.let_go()
 
-    # Host.
+    async def _settle(self, limit: float = SETTLE) -> None:
+        await asyncio.gather(*(component.commands.settle(limit) for component in self.components))
+
+    # For its components.
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -271,17 +270,6 @@ class System:
             self._told = (self._node.channels, told)
         return told
 
-    def is_streamed(self, id: int) -> bool:
-        """Return True when this message is streamed on some channel."""
-        return self._messages.is_streamed(id)
-
-    def mark_updated(self, id: int, at: float) -> None:
-        """Send a streamed message for a value that no event reports.
-
-        `at`: when it was true (s, monotonic).
-        """
-        self._messages.mark_updated(id, at)
-
     def set_muted(self, channel: Channel, *, muted: bool) -> None:
         """Send only answers on this channel; with False everything again."""
         if muted:
@@ -290,31 +278,26 @@ class System:
             self._muted.discard(channel)
         self._told = ([], [])
 
-    def send(self, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None = None) -> None:
-        """Send as the autopilot to one channel, to some, or to all.
+    def owner(self, message: Any) -> Component:
+        """Return the component that answers this message to component 0.
+
+        It is a command, or a message that several components handle. The autopilot answers for commands that no
+        component has.
+        """
+        if message.get_msgId() in BY_AUTOPILOT:
+            return self._autopilot
+        return next((component for component in self.components if component.owns(message)), self._autopilot)
+
+    def send_as(
+        self, compid: int, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None, *, give_way: bool
+    ) -> None:
+        """Send as this component to one channel, to some, or to all (None).
 
         Nothing is sent while the link is down.
         """
         if self.active:
             channels = self.channels if to is None else to
-            give_way = message.get_msgId() in self.telemetry
-            self._node.send(message, sysid=self.sysid, compid=AUTOPILOT, to=channels, give_way=give_way)
-
-    def send_by_flavour(
-        self, build: Callable[[Flavour], dialect.MAVLink_message | None], to: Sequence[Channel] | None = None
-    ) -> None:
-        """Send to each of these channels (None: all) the message that `build` makes for its flavour.
-
-        If `build` returns None, nothing is sent.
-        """
-        groups: dict[str, tuple[Flavour, list[Channel]]] = {}
-        for channel in self.channels if to is None else to:
-            flavour = flavour_of(channel)
-            groups.setdefault(flavour.name, (flavour, []))[1].append(channel)
-        for flavour, channels in groups.values():
-            message = build(flavour)
-            if message is not None:
-                self.send(message, channels)
+            self._node.send(message, sysid=self.sysid, compid=compid, to=channels, give_way=give_way)
 
     def text(self, severity: Severity, text: OperatorText, to: Channel | None = None) -> None:
         """A STATUSTEXT to everybody, and a line in the log; or to one channel alone."""
@@ -324,7 +307,7 @@ class System:
             )
         if self.active:
             for message in self._texts.messages(severity, text):
-                self.send(message, to)
+                self._autopilot.send(message, to)
 
     def announce(self, severity: Severity, text: OperatorText) -> None:
         """Send a STATUSTEXT about the drone's link to every client, also while that link is down."""
@@ -351,36 +334,40 @@ class System:
         task.add_done_callback(self._tasks.discard)
         return task
 
-    def run_action(
-        self, client: Hashable, work: Coroutine[Any, Any, None], *, is_order: bool = True
-    ) -> asyncio.Task[None]:
-        """Run an action that a message without COMMAND_ACK asks for."""
-        return self._commands.run(client, work, is_order=is_order)
-
-    @property
-    def replaced_by_order(self) -> bool:
-        """True in an action that a newer order of a client has ended."""
-        return self._commands.replaced_by_order
-
     def times(self, at: float | None = None) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
-        return Times(round(((self.clock.monotonic() if at is None else at) - self._started) * 1e9))
+        ns = round(((self.clock.monotonic() if at is None else at) - self._started) * 1e9)
+        return Times(ns, ns // 1_000, ns // 1_000_000 & 0xFFFFFFFF)
 
     # The heart.
 
     def send_heartbeat(self) -> None:
-        """Send one more HEARTBEAT to all."""
+        """Send one more HEARTBEAT of the autopilot to all."""
         vehicle = self.vehicle
         base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         if vehicle.armed:
             base |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
-        mode = FlightMode.MISSION if self._mission_over.is_set else vehicle.mode
+        mode = FlightMode.MISSION if self._mission_over.at is not None else vehicle.mode
         health = vehicle.health.value
-        self.send_by_flavour(
+        self._autopilot.send_by_flavour(
             lambda flavour: dialect.MAVLink_heartbeat_message(
                 dialect.MAV_TYPE_QUADROTOR, flavour.autopilot, base, flavour.custom_mode(mode), health, 3
             )
         )
+
+    def _send_heartbeats(self) -> None:
+        """Send the heartbeats of all components, the autopilot's last.
+
+        pymavlink's `set_mode` takes the flavour from the latest heartbeat of a system, whatever component it is of.
+        """
+        for component in self.components:
+            if component is not self._autopilot:
+                component.send(
+                    dialect.MAVLink_heartbeat_message(
+                        dialect.MAV_TYPE_CAMERA, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3
+                    )
+                )
+        self.send_heartbeat()
 
     async def _tick(self) -> None:
         next_look = -math.inf
@@ -388,7 +375,7 @@ class System:
             now = self.clock.monotonic()
             if now >= self._next_heartbeat:
                 self._next_heartbeat = max(self._next_heartbeat + HEARTBEAT_EVERY, now + HEARTBEAT_EVERY / 2)
-                self.send_heartbeat()
+                self._send_heartbeats()
             if now >= next_look:
                 next_look = now + LOOK_EVERY
                 for service in self._ticking:
@@ -446,7 +433,7 @@ class System:
         """
         vehicle = self.vehicle
         hovers = vehicle.armed and vehicle.mode in (FlightMode.HOLD, FlightMode.GUIDED)
-        if self._mission_over.is_set:
+        if self._mission_over.at is not None:
             if not hovers:
                 self._mission_over.cancel()
         elif hovers and last is not None and last[0] is FlightMode.MISSION:
@@ -479,23 +466,7 @@ class System:
         if message.get_msgId() == dialect.MAVLINK_MSG_ID_SET_MODE:
             return bool(message.target_system == self.sysid)
         known = message.get_msgId() in COMMANDS and message.target_system == self.sysid
-        return known and self._commands.acts_on(message.command)
-
-    def _receive(self, inbound: Inbound) -> None:
-        """Handle a message to our autopilot, to its system, or to all."""
-        message = inbound.message
-        handler = self._handlers.get(message.get_msgId())
-        if handler is None:
-            return
-        try:
-            if getattr(message, "target_system", 0) == self.sysid:
-                for service in self._receiving:
-                    service.received(inbound)
-            handler(inbound)
-        except AnafiMavError as error:  # the drone's link may just have died
-            logger.debug("%s: %s not handled: %s", self.drone.name, message.get_type(), error)
-        except Exception:
-            logger.exception("%s: %s not handled", self.drone.name, message.get_type())
+        return known and any(component.commands.acts_on(message.command) for component in self.components)
 
     def _refuse(self, inbound: Inbound) -> None:
         """Answer a command to one of the components in `ABSENT` alone: it is unsupported."""
@@ -503,10 +474,6 @@ class System:
         if message.get_msgId() in COMMANDS and message.target_system == self.sysid and message.target_component:
             answer = _unsupported(inbound)
             self._node.send(answer, sysid=self.sysid, compid=message.target_component, to=inbound.channel)
-
-    def _heard(self, inbound: Inbound) -> None:
-        for service in self.services:
-            service.heartbeat(inbound)
 
     def channel_closed(self, channel: Channel) -> None:
         """A client's channel is gone."""
@@ -522,13 +489,3 @@ def _unsupported(inbound: Inbound) -> dialect.MAVLink_command_ack_message:
         target_system=inbound.sysid,
         target_component=inbound.compid,
     )
-
-
-def _joined(tables: Any) -> dict[Any, Any]:
-    """One table of all services'. Raises `ValueError` when two services claim the same."""
-    result: dict[Any, Any] = {}
-    for table in tables:
-        if twice := result.keys() & table.keys():
-            raise ValueError(f"two services claim {sorted(twice)}")
-        result.update(table)
-    return result

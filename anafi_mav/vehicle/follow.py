@@ -80,18 +80,18 @@ class FollowSettings:
 class State(enum.Enum):
     """State of following."""
 
-    OFF = "another mode flies"
+    OFF = "another mode is active"
     WAITING = "hovers until a target appears"
-    FOLLOWING = "a target leads"
+    FOLLOWING = "a target is followed"
 
 
 class Event(enum.Enum):
     """Event that changes the state."""
 
-    ENGAGE = "mode Follow asked for"
-    TARGET = "the target told where it is"
-    SILENCE = "the target has said nothing for too long"
-    END = "something else flies"
+    ENGAGE = "mode Follow is requested"
+    TARGET = "the target reports its position"
+    SILENCE = "no position of the target for too long"
+    END = "another flight task is active"
 
 
 TRANSITIONS: dict[State, dict[Event, State]] = {

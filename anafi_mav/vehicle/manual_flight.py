@@ -41,17 +41,17 @@ GESTURE = 0.95
 class State(enum.Enum):
     """State of the sticks."""
 
-    IDLE = "centred, or nobody holds them"
-    HELD = "somebody holds them away from the middle"
+    IDLE = "sticks centred or not received"
+    HELD = "a client holds deflected sticks"
 
 
 class Event(enum.Enum):
     """Event that changes the state of the sticks."""
 
-    CENTRED = "who holds them has let go, or somebody else's are centred"
-    DEFLECTED = "somebody moves them"
-    SILENCE = "who holds them has said nothing for too long"
-    END = "something else flies"
+    CENTRED = "the holding client's sticks are centred, or another client's are"
+    DEFLECTED = "a client deflects its sticks"
+    SILENCE = "no stick input of the holding client for too long"
+    END = "another flight task is active"
 
 
 TRANSITIONS: dict[State, dict[Event, State]] = {
@@ -129,7 +129,7 @@ class ManualFlight:
             return
         self.state, self._pilot = TRANSITIONS[self.state][Event.DEFLECTED], sender
         self._said = self._clock.monotonic()
-        if not self._silence.is_set:
+        if self._silence.at is None:
             self._watch()
         vehicle.drone.piloting.pilot(
             PilotingCommand(
@@ -201,8 +201,8 @@ class ManualFlight:
         """Centre the sticks if a client held them."""
         held = self.state is State.HELD
         self.state, self._pilot = TRANSITIONS[self.state][event], None
-        self._silence.cancel()
         if held:
+            self._silence.cancel()
             with contextlib.suppress(LinkLost):
                 self._vehicle.drone.piloting.pilot(None)
 
@@ -215,5 +215,4 @@ class ManualFlight:
 
     def _watch(self) -> None:
         """Come back when they have been silent for too long."""
-        delay = max(self._said + SILENCE - self._clock.monotonic(), 0.0)
-        self._silence.set_in(delay)
+        self._silence.set(self._said + SILENCE)

@@ -18,8 +18,6 @@ from typing import Any
 
 from pymavlink import mavutil
 
-from anafi_mav import mav_enums
-
 ROOT = Path(__file__).resolve().parents[2]
 
 TICKS = os.sysconf("SC_CLK_TCK")
@@ -115,7 +113,9 @@ class Client:
 
     def take_off(self, height: float) -> None:
         """Arm, climb to `height` m, and wait until the vehicle holds there."""
-        self.command(mav_enums.MAV_CMD_COMPONENT_ARM_DISARM, 1)
-        self.command(mav_enums.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, float("nan"), float("nan"), float("nan"), float("nan"))
+        self.command(mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+        self.command(
+            mavutil.mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, float("nan"), float("nan"), float("nan"), float("nan")
+        )
         self.expect("HEARTBEAT", 30.0, lambda beat: beat.custom_mode == 0x02040000)
         self.expect("HEARTBEAT", 30.0, lambda beat: beat.custom_mode == 0x03040000)

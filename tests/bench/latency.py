@@ -19,8 +19,7 @@ from pathlib import Path
 
 import msgspec
 from common import Client, frames_option, loopback, machine, product, quantile
-
-from anafi_mav import mav_enums
+from pymavlink import mavutil
 
 WARM_UP = 40
 """Setpoints that are not counted: a vehicle takes Offboard only while setpoints arrive."""
@@ -64,7 +63,7 @@ def _setpoints(client: Client, count: int) -> list[tuple[float, int]]:
         client.link.mav.set_attitude_target_send(0, 1, 1, 0b00000111, lean, 0, 0, 0, 0.5)
         client.drain()
         time.sleep(0.03)
-    client.command(mav_enums.MAV_CMD_DO_SET_MODE, 1, 4, 3)  # PX4's Hold
+    client.command(mavutil.mavlink.MAV_CMD_DO_SET_MODE, 1, 4, 3)  # PX4's Hold
     return sent[WARM_UP:]
 
 

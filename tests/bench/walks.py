@@ -9,9 +9,9 @@ telemetry walk is a datagram of the drone, so its figures hold all messages of t
 A call is a function of the package that is entered, once however often it is resumed. A change is a call in another
 file, or another room, than the call before. An observer is what the drone's and the system's delivery of an event
 calls; for telemetry the service that sends messages is one of them. A room is a folder of the package; in `services`
-each folder is one, below `system.py` and above the modules beside it. `--against` prints an earlier result of `--json`
-beside this one, its files in the rooms in which git finds them today: in one folder of a hundred files no walk would
-change its room.
+each folder is one, below `system.py` and `component.py`, and above the modules beside it. `--against` prints an
+earlier result of `--json` beside this one, its files in the rooms in which git finds them today: in one folder of a
+hundred files no walk would change its room.
 """
 
 from __future__ import annotations
@@ -42,6 +42,9 @@ FLOOR, ROOM, SYSTEM, GATEWAY, CLI = 4, 5, 6, 7, 8
 SIMULATOR = "sim/"
 
 DISPATCHERS = ("drone/drone.py", "services/system.py")
+COMPOSERS = ("system", "component")
+"""Modules above the rooms of `services`."""
+
 """They deliver the drone's events."""
 
 ANONYMOUS = ("<genexpr>", "<listcomp>", "<dictcomp>", "<setcomp>")
@@ -59,7 +62,7 @@ def room(path: str) -> str:
         return name if name in ("gateway", "__main__") else "kit"
     if folders[0] != "services":
         return folders[0]
-    return "/".join(folders[:2]) if len(folders) > 1 else "services/system" if name == "system" else "services"
+    return "/".join(folders[:2]) if len(folders) > 1 else "services/system" if name in COMPOSERS else "services"
 
 
 def rank(name: str) -> int:

@@ -66,7 +66,7 @@ async def test_fly_example_flies_there_and_back_and_lands(tmp_path: Path) -> Non
         assert poses[-1]["lat"] == pytest.approx(HOME[0], abs=1e-5)
 
 
-async def test_fly_example_that_is_interrupted_leaves_the_drone_hovering(tmp_path: Path) -> None:
+async def test_interrupted_fly_example_leaves_the_drone_hovering(tmp_path: Path) -> None:
     """Ctrl-C in the middle of a moveTo."""
     address = loopback()
     async with simulated(tmp_path / "log", address) as simulator:
@@ -80,7 +80,7 @@ async def test_fly_example_that_is_interrupted_leaves_the_drone_hovering(tmp_pat
         assert flown_states(simulator)[-1] in ("hovering", "flying")
 
 
-async def test_photo_example_downloads_what_the_drone_stored(tmp_path: Path) -> None:
+async def test_photo_example_downloads_the_stored_photos(tmp_path: Path) -> None:
     address, folder = loopback(), tmp_path / "photos"
     async with (
         simulated(tmp_path / "log", address) as simulator,
@@ -132,7 +132,7 @@ async def test_metadata_example_reads_every_picture(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("model", ["4k", "ai"])
-async def test_flight_plan_example_flies_the_file_to_its_end(tmp_path: Path, model: str) -> None:
+async def test_flight_plan_example_flies_the_whole_file(tmp_path: Path, model: str) -> None:
     address = loopback()
     async with simulated(tmp_path / "log", address, "--model", model, speed=16.0) as simulator:
         async with example("flight_plan.py", address, "--http-port", str(HTTP_PORT)) as plan:

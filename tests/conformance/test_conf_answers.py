@@ -78,7 +78,7 @@ async def test_winch_and_gripper_commands_are_unsupported(flavour: str) -> None:
 async def test_commands_to_another_system_or_component_are_not_answered() -> None:
     async with world() as w:
         mark = w.client.mark()
-        for target in ((2, 1), (2, 169), (0, 169), (1, 100), (1, 154)):
+        for target in ((2, 1), (2, 169), (0, 169), (1, 101), (1, 154)):
             w.client.send_command(WINCH, 1, 0, target=target)
         assert (await w.client.command(GRIPPER, 1, 0)).result == UNSUPPORTED  # all before it were read
         assert [m.command for _, m in w.client.since(mark, "COMMAND_ACK")] == [GRIPPER]

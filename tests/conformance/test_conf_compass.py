@@ -20,7 +20,7 @@ def asked(w: World) -> list[int]:
 
 
 @both
-async def test_compass_calibration_is_accepted_at_its_start_and_reported_to_its_end(flavour: str) -> None:
+async def test_compass_calibration_is_accepted_and_its_progress_reported(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         mark = w.client.mark()
         assert (await w.client.command(ACCEPT)).result == REJECTED
@@ -42,7 +42,7 @@ async def test_compass_calibration_is_accepted_at_its_start_and_reported_to_its_
         assert answers == [ACCEPTED]
 
 
-async def test_compass_calibration_is_cancelled_by_its_command() -> None:
+async def test_compass_calibration_is_cancelled_by_its_cancel_command() -> None:
     async with world(flavour="ardupilot") as w:
         assert (await w.client.command(CANCEL)).result == ACCEPTED  # nothing to cancel, as in ArduPilot
         mark = w.client.mark()
@@ -56,7 +56,7 @@ async def test_compass_calibration_is_cancelled_by_its_command() -> None:
         assert (await w.client.command(ACCEPT)).result == REJECTED
 
 
-async def test_compass_calibration_forbids_arming_until_another_command_ends_it() -> None:
+async def test_compass_calibration_forbids_arming_until_it_is_ended() -> None:
     async with world(flavour="ardupilot", speed=1.0) as w:
         mark = w.client.mark()
         assert (await w.client.command(START)).result == ACCEPTED

@@ -192,7 +192,7 @@ async def test_conf_076_a_breach_is_acted_upon_once(flavour: str, action: str, c
 
 @both
 @pytest.mark.parametrize("action", ["return", "land"])
-async def test_conf_076_a_client_that_ends_the_action_may_fly_on(flavour: str, action: str) -> None:
+async def test_conf_076_fence_action_ended_by_a_client_allows_flight(flavour: str, action: str) -> None:
     """A Hold that arrives before the drone has answered the return or landing of a breach ends it for good."""
     async with world(flavour=flavour, also="px4", speed=1.0) as w:
         assert (await upload(w.client, square(PLACE, 12.0), FENCE)).type == TAKEN
@@ -415,7 +415,7 @@ async def until(condition: Callable[[], bool], timeout: float = 5.0) -> None:
     [circle(PLACE, 60.0), Item(mav_enums.MAV_CMD_NAV_FENCE_HOME_CIRCLE_INCLUSION, 0.0, 0.0, p1=60.0)],
     ids=["circle", "home"],
 )
-async def test_a_circle_around_the_start_is_the_drones_own_too(flavour: str, item: Item) -> None:
+async def test_fence_circle_around_the_start_becomes_the_drones_geofence(flavour: str, item: Item) -> None:
     async with world(flavour=flavour) as w:
         before = own_fence(w)
         assert before == (100.0, 0)
@@ -435,7 +435,7 @@ async def test_a_circle_around_the_start_is_the_drones_own_too(flavour: str, ite
         await until(lambda: own_fence(w) == before)
 
 
-async def test_fence_beyond_the_drones_geofence_leaves_its_settings_alone() -> None:
+async def test_fence_wider_than_the_geofence_keeps_drone_settings() -> None:
     async with world() as w:
         elsewhere = around(PLACE, (40.0, 0.0))[0]
         for items in (
@@ -503,7 +503,7 @@ async def pilot_goes_to(w: World, north: float) -> None:
 
 
 @both
-async def test_goto_beyond_the_distance_limit_around_the_pilot_is_refused(flavour: str) -> None:
+async def test_goto_beyond_the_distance_limit_is_refused(flavour: str) -> None:
     async with world(flavour=flavour, skycontroller=3) as w:
         w.drone.firmware.receive(ardrone3.MaxDistance(60.0), 0.0)
         w.drone.firmware.receive(ardrone3.NoFlyOverMaxDistance(1), 0.0)
@@ -518,7 +518,7 @@ async def test_goto_beyond_the_distance_limit_around_the_pilot_is_refused(flavou
         assert len(w.commands("ardrone3.Piloting.moveTo")) == 1
 
 
-async def test_fence_circle_becomes_the_drones_geofence_only_near_its_centre() -> None:
+async def test_fence_circle_becomes_geofence_only_near_its_centre() -> None:
     async with world(skycontroller=3) as w:
         assert (await upload(w.client, [circle(PLACE, 60.0)], FENCE)).type == TAKEN
         await until(lambda: own_fence(w) == (60.0, 1))
@@ -555,7 +555,7 @@ def preferred(w: World) -> list[int]:
     return [entry.args["type"] for entry in w.commands("rth.set_preferred_home_type")]
 
 
-async def test_conf_077_rally_points_used_where_rtl_type_says_so() -> None:
+async def test_conf_077_rally_points_are_used_according_to_rtl_type() -> None:
     """A return ends at the closest one; after the landing the drone's home is what it was."""
     async with world() as w:
         near, far = around(PLACE, (40.0, 30.0), (-90.0, 0.0))
@@ -640,7 +640,7 @@ async def looked(w: World) -> None:
         await w.client.wait("HEARTBEAT")
 
 
-async def test_conf_077_a_home_that_is_set_while_a_rally_point_counts_stays() -> None:
+async def test_conf_077_home_set_while_a_rally_point_counts_stays() -> None:
     """No other rally point takes its place in flight, nor the take-off point after the landing."""
     async with world() as w:
         await put(w, "RTL_TYPE", 1)
@@ -657,7 +657,7 @@ async def test_conf_077_a_home_that_is_set_while_a_rally_point_counts_stays() ->
         assert preferred(w) == [3, 3]
 
 
-async def test_conf_077_a_home_that_is_set_just_before_the_landing_stays() -> None:
+async def test_conf_077_home_set_just_before_landing_stays() -> None:
     """Nobody has looked at it before the drone stands."""
     async with world() as w:
         await put(w, "RTL_TYPE", 1)
@@ -672,7 +672,7 @@ async def test_conf_077_a_home_that_is_set_just_before_the_landing_stays() -> No
         assert (homes(w), preferred(w)) == ([(30, 0), (10, 0)], [3, 3])
 
 
-async def test_conf_077_a_home_that_is_set_while_a_rally_point_is_refused_stays() -> None:
+async def test_conf_077_home_set_while_a_rally_point_is_refused_stays() -> None:
     """The drone does not take the rally point, which is too far away, and says so by silence: it is asked meanwhile."""
     async with world() as w:
         await put(w, "RTL_TYPE", 1)

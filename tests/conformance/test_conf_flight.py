@@ -42,7 +42,7 @@ async def test_conf_019_takeoff_before_arming(flavour: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-async def test_disarming_takes_back_a_takeoff_that_waits(flavour: str) -> None:
+async def test_disarm_withdraws_a_waiting_takeoff(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         assert (await w.client.command(TAKE_OFF, -1, NAN, NAN, NAN)).result == ACCEPTED
         assert (await w.client.command(ARM, 0)).result == ACCEPTED
@@ -70,7 +70,7 @@ async def test_takeoff_without_arming_expires(flavour: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-async def test_an_armed_state_that_no_takeoff_follows_lapses(flavour: str) -> None:
+async def test_armed_state_without_takeoff_expires(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         mark, began = w.client.mark(), time.monotonic()
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
@@ -172,7 +172,7 @@ async def test_conf_025_return(how: str, flavour: str) -> None:
 
 @pytest.mark.parametrize("end", [newer.ANAFI_RETURN_END_LANDING, newer.ANAFI_RETURN_END_HOVERING])
 @pytest.mark.parametrize("flavour", FLAVOURS)
-async def test_conf_025_return_to_its_end(flavour: str, end: int) -> None:
+async def test_conf_025_return_lands_or_hovers_by_its_setting(flavour: str, end: int) -> None:
     """From the middle of a goto: it brakes, climbs to ANF_RTH_ALT, flies home, descends to ANF_RTH_END_ALT, and there
     it lands or stays. Till then all of it is one mode, and ANAFI_HOME says how far it is."""
     async with world(flavour=flavour) as w:

@@ -75,7 +75,7 @@ async def test_conf_021_take_off_heights_of_arducopter(parameters: dict[str, Any
 
 
 @both
-async def test_conf_082_the_speed_of_a_move_that_is_under_way(flavour: str) -> None:
+async def test_conf_082_speed_command_changes_the_running_move(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         await w.take_off(10.0)
         await go_north(w)
@@ -108,7 +108,7 @@ async def test_conf_082_a_speed_counts_for_later_moves_too(flavour: str) -> None
     "parameters", [(1, 0.0, -1), (1, -3.0, -1), (1, math.inf, -1), (7, 3.0, -1), (1, 3.0, 50.0), (math.inf, 3.0, -1)]
 )
 @both
-async def test_conf_082_speeds_that_make_no_sense(flavour: str, parameters: tuple[float, ...]) -> None:
+async def test_conf_082_invalid_speeds_are_refused(flavour: str, parameters: tuple[float, ...]) -> None:
     async with world(flavour=flavour) as w:
         assert (await w.client.command(SPEED, *parameters)).result == DENIED
 
@@ -143,7 +143,7 @@ async def test_conf_143_condition_yaw(parameters: tuple[float, ...], ends: float
         await heading(w, ends)
 
 
-async def test_conf_143_condition_yaw_turns_the_way_that_is_asked_for() -> None:
+async def test_conf_143_condition_yaw_turns_in_the_requested_direction() -> None:
     async with world() as w:
         await w.take_off(5.0)
         assert (await w.client.command(YAW, 90, 60, -1, 0, timeout=20.0)).result == ACCEPTED
@@ -185,7 +185,7 @@ async def test_conf_143_pause_and_continue() -> None:
         assert (await w.client.command(PAUSE, 1)).result == REJECTED
 
 
-async def test_conf_081_a_heading_of_zero_means_north_to_px4_and_nothing_to_arducopter() -> None:
+async def test_conf_081_zero_heading_is_north_for_px4_ignored_for_arducopter() -> None:
     for flavour, headings in (("px4", [("HEADING_DURING", 0.0)]), ("ardupilot", [("NONE", 0.0)])):
         async with world(flavour=flavour) as w:
             assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == ACCEPTED

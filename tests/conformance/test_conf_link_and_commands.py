@@ -8,7 +8,7 @@ import time
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.mav import NAN
+from support.mav import CAMERA, NAN, kind_of
 from support.world import ARMED, world
 
 from anafi_mav.mavlink import dialect as newer
@@ -54,6 +54,42 @@ async def test_conf_002_heartbeat_on_change(flavour: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_conf_003_camera_heartbeat_is_of_no_autopilot(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
+        for _ in range(2):
+            beat = await w.client.wait("CAMERA_HEARTBEAT")
+            assert (beat.type, beat.autopilot) == (dialect.MAV_TYPE_CAMERA, dialect.MAV_AUTOPILOT_INVALID)
+            assert (beat.base_mode, beat.custom_mode) == (0, 0)
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_conf_004_autopilot_heartbeat_ends_each_burst(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
+        for _ in range(2):
+            await w.client.wait("CAMERA_HEARTBEAT")
+        await w.client.wait("HEARTBEAT")
+        beats = [(kind_of(m), at, m) for at, m in w.client.received if m.get_type() == "HEARTBEAT"]
+        following = [(one, next) for one, next in itertools.pairwise(beats) if one[0] == "CAMERA_HEARTBEAT"]
+        assert len(following) >= 2
+        for (_, at, _), (kind, later, _) in following:
+            assert kind == "HEARTBEAT"
+            assert later - at < 0.1
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_conf_009_camera_answers_for_itself(flavour: str) -> None:
+    """It refuses what it does not have; the autopilot answers for component 0, and nobody for one that is absent."""
+    async with world(flavour=flavour) as w:
+        for command in (TAKE_OFF, SET_MODE, dialect.MAV_CMD_DO_WINCH):
+            mark = w.client.mark()
+            ack = await w.client.command(command, 1, target=(1, CAMERA))
+            assert (ack.get_srcComponent(), ack.result) == (CAMERA, UNSUPPORTED)
+            w.client.send_command(dialect.MAV_CMD_DO_WINCH, target=(1, 0))
+            await w.client.wait("COMMAND_ACK", lambda m: m.get_srcComponent() == 1)
+            assert len(w.client.since(mark, "COMMAND_ACK")) == 2
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
 async def test_conf_005_frames(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         await w.client.command(ARM, 1)
@@ -62,8 +98,10 @@ async def test_conf_005_frames(flavour: str) -> None:
         frames = [message.get_msgbuf() for _, message in w.client.received]
         assert len(frames) > 30
         assert {frame[0] for frame in frames} == {0xFD}
-        sequence = [frame[4] for frame in frames]
-        assert all(b == (a + 1) % 256 for a, b in itertools.pairwise(sequence))
+        for component in (1, CAMERA):
+            sequence = [frame[4] for frame in frames if frame[6] == component]
+            assert sequence
+            assert all(b == (a + 1) % 256 for a, b in itertools.pairwise(sequence))
         assert w.client.bad == 0
 
 
@@ -116,10 +154,10 @@ async def test_conf_009_unsupported_at_once(flavour: str) -> None:
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 async def test_conf_009_other_components_are_not_ours(flavour: str) -> None:
-    """Nobody answers for components that do not exist: no camera or gimbal is behind 100 and 154 yet."""
+    """Nobody answers for components that do not exist: a second camera, a gimbal device."""
     async with world(flavour=flavour) as w:
         mark = w.client.mark()
-        for component in (100, 154, 190):
+        for component in (101, 154, 190):
             w.client.send_command(dialect.MAV_CMD_WAYPOINT_USER_1, target=(1, component))
         w.client.send_command(dialect.MAV_CMD_WAYPOINT_USER_1, target=(2, 1))
         assert (await w.client.command(dialect.MAV_CMD_DO_GRIPPER)).result == UNSUPPORTED

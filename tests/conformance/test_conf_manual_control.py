@@ -123,7 +123,7 @@ async def test_a_stick_flies_in_mode_position_only(flavour: str) -> None:
 
 
 @both
-async def test_throttle_resting_at_its_end_sends_no_text(flavour: str) -> None:
+async def test_throttle_at_rest_sends_no_text(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         mark = w.client.mark()
         async with streaming(w.client, manual(z=0), 0.04):

@@ -224,7 +224,7 @@ async def test_conf_126_the_fence_is_a_check() -> None:
         assert (await w.client.command(ARM, 1)).result == TEMPORARILY_REJECTED
 
 
-async def test_conf_126_what_happens() -> None:
+async def test_conf_126_flight_events_are_sent_in_sequence() -> None:
     async with world() as w:
         events = await reader(w.client)
         mark = w.client.mark()

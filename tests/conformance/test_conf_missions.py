@@ -46,7 +46,7 @@ from anafi_mav.mavlink import dialect as newer
 
 
 @both
-async def test_conf_049_073_a_mission_from_the_ground_to_its_end(flavour: str) -> None:
+async def test_conf_049_073_mission_from_the_ground_is_flown_completely(flavour: str) -> None:
     async with world(flavour=flavour, web=True) as w:
         await put(w, ROUND)
         assert (await state(w, NOT_STARTED, since=0)).seq == 0  # for ArduPilot that is home
@@ -138,7 +138,7 @@ async def test_conf_049_qgroundcontrols_order_the_mode_first_and_then_arm() -> N
         assert len(w.commands("common.Mavlink.Start")) == 1
 
 
-async def test_conf_049_a_mission_that_waits_for_arming_is_forgotten() -> None:
+async def test_conf_049_mission_waiting_for_arming_expires() -> None:
     async with world(web=True, speed=1.0) as w:
         await put(w, ROUND)
         assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 4)).result == dialect.MAV_RESULT_ACCEPTED
@@ -150,7 +150,7 @@ async def test_conf_049_a_mission_that_waits_for_arming_is_forgotten() -> None:
         assert w.commands("common.Mavlink.Start") == []
 
 
-async def test_conf_049_a_start_at_arming_whose_file_cannot_be_loaded_leaves_mission() -> None:
+async def test_conf_049_start_at_arming_without_loadable_file_leaves_mission() -> None:
     """The drone's web server is not reached: a text says so, and the mode no longer says that a mission is flown."""
     async with world() as w:
         await put(w, ROUND)
@@ -164,7 +164,7 @@ async def test_conf_049_a_start_at_arming_whose_file_cannot_be_loaded_leaves_mis
         assert w.commands("common.Mavlink.Start") == []
 
 
-async def test_conf_049_a_start_at_arming_that_a_disarming_ends_leaves_mission() -> None:
+async def test_conf_049_start_at_arming_ended_by_disarm_leaves_mission() -> None:
     """The file is on its way to the drone when the client disarms: nothing begins, and no mode says that it does."""
     async with world(web=True) as w:
         await put(w, ROUND)
@@ -181,7 +181,7 @@ async def test_conf_049_a_start_at_arming_that_a_disarming_ends_leaves_mission()
 
 
 @both
-async def test_conf_049_refused_by_the_gateway_itself(flavour: str) -> None:
+async def test_conf_049_mission_refused_by_the_gateway_names_the_reason(flavour: str) -> None:
     async with world(flavour=flavour, web=True) as w:
         number = MISSION_MODE[flavour]
         params = (1, number) if first(w) else (1, 4, 4)
@@ -204,7 +204,7 @@ async def test_conf_049_refused_by_the_gateway_itself(flavour: str) -> None:
         assert flown(w) == [] == reached(w)
 
 
-async def test_conf_049_items_outside_the_fence_are_refused_when_it_begins() -> None:
+async def test_conf_049_mission_with_items_outside_the_fence_is_refused() -> None:
     """Also the straight way to one: nothing is armed, uploaded or flown."""
     async with world(web=True) as w:
         assert (await upload(w.client, square(PLACE, 20.0), FENCE)).type == ACCEPTED
@@ -271,7 +271,7 @@ async def test_conf_074_paused_flown_elsewhere_and_resumed_by_the_mode(flavour: 
 
 @both
 @pytest.mark.parametrize("order", ["land", "return", "goto"])
-async def test_conf_074_whatever_takes_over_pauses_it(flavour: str, order: str) -> None:
+async def test_conf_074_mission_is_paused_by_other_flight_commands(flavour: str, order: str) -> None:
     async with world(flavour=flavour, web=True) as w:
         await put(w, ROUND)
         await start(w)
@@ -299,7 +299,7 @@ async def test_conf_074_whatever_takes_over_pauses_it(flavour: str, order: str) 
 
 
 @both
-async def test_conf_074_a_return_that_the_drone_begins_is_not_fought(flavour: str) -> None:
+async def test_conf_074_return_begun_by_the_drone_pauses_the_mission(flavour: str) -> None:
     """The battery sends it home in mid-mission: paused, nothing is sent against it, and the mission does not begin."""
     async with world(flavour=flavour, web=True) as w:
         await put(w, [takeoff(6.0), way(60.0, 0.0, 6.0), way(60.0, 5.0, 6.0)])
@@ -393,7 +393,7 @@ async def test_conf_072_a_reset_in_flight_keeps_the_item(flavour: str) -> None:
 
 @both
 @pytest.mark.parametrize("paused", [False, True])
-async def test_conf_072_a_reset_gives_a_loop_its_turns_again_at_the_same_item(flavour: str, paused: bool) -> None:
+async def test_conf_072_reset_restores_loop_count_at_the_same_item(flavour: str, paused: bool) -> None:
     """Between the two ways of the second turn: the drone flies on to the second one, and then a third turn."""
     async with world(flavour=flavour, web=True) as w:
         jump = Item(dialect.MAV_CMD_DO_JUMP, 0.0, 0.0, p1=1.0 + first(w), p2=1.0, frame=2)
@@ -418,7 +418,7 @@ async def test_conf_072_a_reset_gives_a_loop_its_turns_again_at_the_same_item(fl
         assert flown(w).count("takeoff") == 1
 
 
-async def test_conf_072_ai_starts_inside_the_file_that_it_has() -> None:
+async def test_conf_072_ai_resumes_inside_its_stored_file() -> None:
     async with world(web=True, model="ai") as w:
         await put(w, [takeoff(6.0), way(12.0, 0.0, 6.0), way(12.0, 12.0, 6.0), way(0.0, 12.0, 6.0)])
         await start(w)
@@ -452,7 +452,7 @@ async def order(client: Client, current: int, x: float, y: float, z: float, *, f
 
 @both
 @pytest.mark.parametrize("as_int", [False, True])
-async def test_conf_141_items_that_are_orders(flavour: str, as_int: bool) -> None:
+async def test_conf_141_guided_items_move_the_drone_without_changing_the_plan(flavour: str, as_int: bool) -> None:
     """current 2 goes to a place (dronekit's simple_goto), 3 changes the height (MAVProxy's); the plan is untouched."""
     async with world(flavour=flavour) as w:
         await w.take_off(5.0)
@@ -485,7 +485,7 @@ async def test_conf_141_outside_guided_an_item_moves_nothing(number: int, curren
 
 
 @both
-async def test_conf_141_a_height_said_as_a_command_and_as_an_item(flavour: str) -> None:
+async def test_conf_141_height_sent_as_command_and_item_moves_once(flavour: str) -> None:
     """MAVProxy's changealt says both at once. Both are answered by the one move that the drone is asked for."""
     async with world(flavour=flavour) as w:
         await w.take_off(5.0)
@@ -517,7 +517,7 @@ async def test_conf_141_a_height_behind_a_landing_is_refused(flavour: str) -> No
 
 
 @both
-async def test_conf_141_a_height_that_the_drone_refuses_twice(flavour: str) -> None:
+async def test_conf_141_height_refused_by_drone_rejects_command_and_item(flavour: str) -> None:
     """What the first order was refused for, the second is refused for as well, after the drone was asked again."""
     async with world(flavour=flavour) as w:
         await w.take_off(5.0)

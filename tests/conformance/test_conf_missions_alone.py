@@ -169,7 +169,7 @@ async def test_conf_122_killed_gateway_recognises_the_drones_plan(tmp_path: Path
 
 @pytest.mark.parametrize("returns", [0, 1])
 @pytest.mark.parametrize("model", ["4k", "ai"])
-async def test_conf_122_a_gateway_that_ends_pauses_the_mission(model: str, returns: int) -> None:
+async def test_conf_122_gateway_shutdown_pauses_the_mission(model: str, returns: int) -> None:
     """Also of a drone that would fly it on without a link: it is told to pause, hovers, and flies home as it does
     without anybody."""
     drone, address = loopback(), loopback()
@@ -239,7 +239,7 @@ async def test_conf_122_ctrl_c_pauses_the_mission(tmp_path: Path) -> None:
 # What the gateway flies itself.
 
 
-async def test_items_that_the_gateway_flies_between_two_files() -> None:
+async def test_gateway_flies_items_between_two_files() -> None:
     async with world(web=True) as w:
         await put(w, [takeoff(6.0), way(10.0, 0.0, 6.0), TURN, ZOOM, way(10.0, 10.0, 6.0)])
         await said(w, "flown by gateway: item 3: COND")
@@ -256,7 +256,7 @@ async def test_items_that_the_gateway_flies_between_two_files() -> None:
 
 
 @pytest.mark.parametrize("returns", [0, 1])
-async def test_items_that_the_gateway_flies_are_not_flown_without_it(returns: int) -> None:
+async def test_items_of_the_gateway_are_not_flown_without_it(returns: int) -> None:
     """The drone may fly its first file to the end while the link is lost; the turn behind it is nobody's then."""
     async with world(web=True, speed=1.5) as w:
         await put(w, [takeoff(6.0), way(40.0, 0.0, 6.0), TURN, way(40.0, 10.0, 6.0)])

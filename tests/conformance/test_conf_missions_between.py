@@ -65,7 +65,7 @@ def tells_of_its_plan(w: World) -> None:
 
 
 @both
-async def test_conf_011_049_a_mode_that_takes_its_time(flavour: str) -> None:
+async def test_conf_011_049_slow_mission_start_sends_no_early_progress(flavour: str) -> None:
     """MAVSDK asks for it four times in 2 s and takes IN_PROGRESS for the end of it: none is said while it waits."""
     async with world(flavour=flavour, web=True) as w:
         await w.take_off(6.0)
@@ -90,7 +90,7 @@ async def test_conf_011_049_a_mode_that_takes_its_time(flavour: str) -> None:
 
 @both
 @pytest.mark.parametrize("how", ["another", "one item", "cleared"])
-async def test_conf_074_another_mission_before_the_drone_has_begun_ends_the_start(flavour: str, how: str) -> None:
+async def test_conf_074_other_mission_uploaded_during_start_ends_the_start(flavour: str, how: str) -> None:
     """The start is answered with a refusal, the drone is told to stop and hovers, and the mode is not Mission."""
     async with world(flavour=flavour, web=True) as w:
         mark = await asked_for(w, CORNERS)
@@ -152,7 +152,7 @@ async def test_conf_074_another_mission_before_the_drone_has_begun_at_arming(how
 
 
 @both
-async def test_conf_074_the_same_mission_before_the_drone_has_begun_disturbs_nothing(flavour: str) -> None:
+async def test_conf_074_same_mission_uploaded_during_start_changes_nothing(flavour: str) -> None:
     """Two files with a turn between them: the start is accepted, and all of it is flown once."""
     async with world(flavour=flavour, web=True) as w:
         turned = [way(14.0, 0.0, 6.0), TURN, way(14.0, 10.0, 6.0)]
@@ -195,7 +195,7 @@ async def test_conf_074_same_mission_uploaded_during_a_failed_start_is_new(flavo
 # Between two files, and by somebody else.
 
 
-async def test_conf_074_mission_paused_before_a_file_continues_after_the_flown_items() -> None:
+async def test_conf_074_mission_paused_before_a_file_resumes_after_flown_items() -> None:
     """A loop whose turn was just made: the drone turns as often as without the pause, and goes round as often."""
     async with world(web=True) as w:
         await w.take_off(6.0)

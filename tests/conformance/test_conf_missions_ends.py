@@ -82,7 +82,7 @@ async def to_the_last_line(w: World, last: Item, do: Callable[[], Any] = lambda:
 @both
 @pytest.mark.parametrize("model", ["4k", "ai"])
 @pytest.mark.parametrize("last", [LAND, RTL], ids=["land", "return"])
-async def test_conf_073_an_end_that_the_drone_does_not_tell(flavour: str, model: str, last: Item) -> None:
+async def test_conf_073_mission_completes_when_its_end_is_not_reported(flavour: str, model: str, last: Item) -> None:
     """It lands, or returns: that was the plan's last item. Nothing is sent against it."""
     async with world(flavour=flavour, model=model, web=True) as w:
         mark, entry = await to_the_last_line(w, last)
@@ -117,7 +117,7 @@ async def test_conf_073_last_line_reported_after_the_end_completes_the_mission()
 
 @both
 @pytest.mark.parametrize("last", [LAND, RTL], ids=["land", "return"])
-async def test_conf_074_a_plan_that_is_stopped_before_its_landing_is_paused(flavour: str, last: Item) -> None:
+async def test_conf_074_plan_stopped_before_its_landing_is_paused(flavour: str, last: Item) -> None:
     """Somebody else stops it there and the drone hovers: nothing has landed or returned, so nothing is complete."""
     async with world(flavour=flavour, web=True) as w:
         stop = w.drone.firmware.flight_plan.stop
@@ -131,7 +131,7 @@ async def test_conf_074_a_plan_that_is_stopped_before_its_landing_is_paused(flav
 
 
 @both
-async def test_conf_074_a_return_of_the_batterys_at_the_last_line_is_not_the_plans(flavour: str) -> None:
+async def test_conf_074_battery_return_at_last_line_is_not_the_plans(flavour: str) -> None:
     async with world(flavour=flavour, web=True) as w:
         mark, entry = await to_the_last_line(w, RTL, lambda: return_by_itself(w))
         await state(w, PAUSED, seq=3, since=mark)
@@ -157,7 +157,7 @@ def lines_reported(w: World) -> list[int]:
 @both
 @pytest.mark.parametrize("model", ["4k", "ai"])
 @plain
-async def test_mission_whose_last_line_is_not_reported_completes_at_the_last_way_point(
+async def test_mission_with_last_line_unreported_completes_at_last_waypoint(
     flavour: str, model: str, items: list[Item]
 ) -> None:
     async with world(flavour=flavour, model=model, web=True) as w:
@@ -174,7 +174,7 @@ async def test_mission_whose_last_line_is_not_reported_completes_at_the_last_way
 
 
 @plain
-async def test_mission_whose_last_line_is_reported_after_stopped_completes(items: list[Item]) -> None:
+async def test_mission_with_last_line_reported_after_stop_completes(items: list[Item]) -> None:
     async with world(web=True) as w:
         w.drone.faults.quirks = frozenset({Quirk.STOPPED_BEFORE_EXECUTED})
         await put(w, items)
@@ -186,7 +186,7 @@ async def test_mission_whose_last_line_is_reported_after_stopped_completes(items
 
 @pytest.mark.parametrize("last", [LAND, RTL], ids=["land", "return"])
 @pytest.mark.parametrize("quirk", [Quirk.LAST_ITEM_NOT_REPORTED, Quirk.STOPPED_BEFORE_EXECUTED])
-async def test_mission_with_quirk_that_lands_or_returns_completes(quirk: Quirk, last: Item) -> None:
+async def test_mission_with_quirk_ending_by_return_or_landing_completes(quirk: Quirk, last: Item) -> None:
     async with world(web=True) as w:
         w.drone.faults.quirks = frozenset({quirk})
         await put(w, [takeoff(6.0), way(9.0, 0.0, 6.0), last])
@@ -195,7 +195,7 @@ async def test_mission_with_quirk_that_lands_or_returns_completes(quirk: Quirk, 
         assert reached(w) == [0, 1, 2]
 
 
-async def test_mission_stopped_on_the_way_to_its_last_way_point_is_paused() -> None:
+async def test_mission_stopped_before_its_last_waypoint_is_paused() -> None:
     """Another controller stops it 60 m before its end: nothing is there to be claimed."""
     async with world(web=True) as w:
         await put(w, [takeoff(6.0), way(9.0, 0.0, 6.0), way(80.0, 0.0, 6.0)])
@@ -207,7 +207,7 @@ async def test_mission_stopped_on_the_way_to_its_last_way_point_is_paused() -> N
         assert reached(w) == [0, 1]
 
 
-async def test_mission_stopped_by_an_alert_at_its_last_way_point_is_paused() -> None:
+async def test_mission_stopped_by_alert_at_last_waypoint_is_paused() -> None:
     async with world(web=True) as w:
         w.drone.faults.quirks = frozenset({Quirk.LAST_ITEM_NOT_REPORTED})
         await put(w, PLAIN["wait"])
@@ -227,7 +227,7 @@ async def report_last_line(w: World) -> None:
 
 
 @both
-async def test_mission_whose_last_line_is_reported_after_the_pause_completes(flavour: str) -> None:
+async def test_mission_with_last_line_reported_after_pause_completes(flavour: str) -> None:
     """The drone's own report is the answer, however late. What flies by then is not disturbed."""
     async with world(flavour=flavour, web=True) as w:
         stop = w.drone.firmware.flight_plan.stop
@@ -242,7 +242,7 @@ async def test_mission_whose_last_line_is_reported_after_the_pause_completes(fla
         await settled(w, (0.0, 0.0, 9.0))
 
 
-async def test_mission_paused_by_a_client_stays_paused_when_its_last_line_is_reported() -> None:
+async def test_mission_paused_by_client_stays_paused_after_last_line() -> None:
     """Resume must not begin the whole mission again for a pilot who has paused it."""
     async with world(web=True) as w:
         mark, _ = await to_the_last_line(w, PLAIN["way-point"][-1])
@@ -254,7 +254,7 @@ async def test_mission_paused_by_a_client_stays_paused_when_its_last_line_is_rep
         assert reached(w) == [0, 1, 2]
 
 
-async def test_mission_stopped_by_the_drone_is_not_completed_by_the_lines_of_another_plan() -> None:
+async def test_stopped_mission_ignores_the_lines_of_another_plan() -> None:
     async with world(web=True) as w:
         stop = w.drone.firmware.flight_plan.stop
         mark, _ = await to_the_last_line(w, LAND, lambda: stop(hover=True))
@@ -294,7 +294,7 @@ async def stopped_without(w: World, report: str) -> int:
 
 
 @pytest.mark.parametrize("report", MOVED)
-async def test_mission_end_without_a_position_waits_for_one_and_completes(report: str) -> None:
+async def test_mission_end_without_position_completes_when_position_is_known(report: str) -> None:
     """The last position that was received is of the way to the last way point: it proves nothing."""
     async with world(web=True) as w:
         await stopped_without(w, report)

@@ -115,7 +115,7 @@ async def test_a_loop_without_end_is_flown_file_after_file(model: str, cuts: int
         assert "C" in visits(w, A, B, C)[-2:]
 
 
-async def test_long_loop_has_its_number_of_rounds() -> None:
+async def test_long_loop_is_flown_the_requested_number_of_rounds() -> None:
     """Over a cut, and over a pause in which the drone was flown elsewhere and forgot its file."""
     async with world(web=True, speed=4.0) as w:
         w.drone.faults.battery = 80
@@ -140,7 +140,7 @@ def paused(w: World) -> float:
     return float(w.commands("common.Mavlink.Pause")[-1].t)
 
 
-async def test_ai_starts_inside_its_file_after_jumps_and_item_changes() -> None:
+async def test_ai_resumes_inside_file_after_jumps_and_item_changes() -> None:
     """Where what is left to fly is the end of the file that it has; the counts of a loop that is chosen begin anew."""
     async with world(web=True, model="ai") as w:
         jump = Item(mav_enums.MAV_CMD_DO_JUMP, 0.0, 0.0, p1=1.0, p2=2.0, frame=2)

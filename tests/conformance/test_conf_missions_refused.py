@@ -87,7 +87,7 @@ async def told(w: World, part: Part, ok: bool, since: float) -> None:
 @both
 @pytest.mark.parametrize("model", ["4k", "ai"])
 @pytest.mark.parametrize("part", REASONS, ids=lambda part: part.name.lower())
-async def test_conf_049_refused_by_the_drone_for_its_own_reason(part: Part, model: str, flavour: str) -> None:
+async def test_conf_049_mission_refused_by_the_drone_names_its_reason(part: Part, model: str, flavour: str) -> None:
     """MISSION_START and mode Mission are both refused in its words, and nothing flies until that is over."""
     fail, reason = REASONS[part]
     async with world(flavour=flavour, web=True, model=model) as w:

@@ -47,7 +47,7 @@ async def test_conf_027_land_by_the_message(flavour: str, number: int) -> None:
 
 
 @pytest.mark.parametrize("number", [0, 1, 2, 7])  # STABILIZE, ACRO, ALT_HOLD, CIRCLE
-async def test_conf_028_a_mode_that_an_anafi_has_not(number: int) -> None:
+async def test_conf_028_unsupported_mode_is_refused(number: int) -> None:
     async with world(flavour="ardupilot") as w:
         before = (await w.client.heartbeat(lambda beat: True)).custom_mode
         mark = w.client.mark()

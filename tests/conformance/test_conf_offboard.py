@@ -129,7 +129,7 @@ async def test_conf_105_silence_of_a_move(flavour: str, setpoint: Any, command: 
         assert w.drone.pose.north < 30.0
 
 
-async def test_conf_105_a_late_position_of_a_stream_that_has_ended() -> None:
+async def test_conf_105_late_position_of_an_ended_stream_is_dropped() -> None:
     """In Guided a lone position is flown to its end, but not one that a bad link delivers when its sender is dead."""
     async with world(speed=1.0, flavour="ardupilot") as w:
         await w.take_off(8.0)
@@ -175,7 +175,7 @@ async def test_setpoints_of_px4s_clients_do_not_fly_in_guided() -> None:
 
 
 @both
-async def test_a_setpoint_that_comes_is_flown_at_once(flavour: str) -> None:
+async def test_setpoint_is_flown_on_arrival(flavour: str) -> None:
     """Not at the next of the 20 per second, and not at the drone's next report."""
     async with world(speed=1.0, flavour=flavour) as w:
         await w.take_off(8.0)
@@ -385,7 +385,7 @@ async def test_a_place_and_a_climb_rate() -> None:
         assert pose.up == pytest.approx(11.0, abs=0.6)
 
 
-async def test_a_position_with_a_velocity_ahead_of_it() -> None:
+async def test_position_with_velocity_feed_forward_is_followed_without_lag() -> None:
     """MAVSDK's set_position_velocity_ned: a target that moves is followed without the lag of a position alone."""
     async with world(speed=1.0) as w:
         await w.take_off(8.0)
@@ -491,7 +491,7 @@ WRONG = [
 
 
 @both
-async def test_conf_106_what_may_not_be_flown(flavour: str) -> None:
+async def test_conf_106_invalid_setpoints_are_dropped_with_a_text(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         await w.take_off(8.0)
         w.drone.firmware.receive(ardrone3.NoFlyOverMaxDistance(1), now())
@@ -520,7 +520,7 @@ async def test_a_wrong_setpoint_among_right_ones_changes_nothing() -> None:
             assert len(heard(w, "moveTo")) == 1
 
 
-async def test_full_tilt_of_ten_degrees_does_not_hold_five_metres_a_second() -> None:
+async def test_tilt_of_ten_degrees_cannot_hold_five_m_s() -> None:
     """The factory's MaxTilt: it is said, and not raised."""
     async with world(speed=1.0) as w:
         await w.take_off(8.0)
@@ -573,7 +573,7 @@ async def test_velocities_do_not_fight_the_drones_own_return(flavour: str) -> No
 # ArduPilot's single setpoints.
 
 
-async def test_a_single_offset_is_flown_to_its_end() -> None:
+async def test_single_offset_is_flown_to_its_end() -> None:
     """QGroundControl's "change altitude" for ArduPilot is one message; silence does not end it."""
     async with world(speed=1.0, flavour="ardupilot") as w:
         await w.take_off(8.0)
@@ -586,7 +586,7 @@ async def test_a_single_offset_is_flown_to_its_end() -> None:
         assert beats == {4}
 
 
-async def test_a_single_place_is_flown_to_its_end() -> None:
+async def test_single_position_is_flown_to_its_end() -> None:
     """Mission Planner's "fly to here" is one SET_POSITION_TARGET_GLOBAL_INT."""
     async with world(flavour="ardupilot") as w:
         await w.take_off(8.0)
@@ -596,7 +596,7 @@ async def test_a_single_place_is_flown_to_its_end() -> None:
         assert (w.drone.pose.north, w.drone.pose.east, w.drone.pose.up) == pytest.approx((20.0, 10.0, 12.0), abs=1.0)
 
 
-async def test_second_setpoint_begins_a_stream_that_ends_by_silence() -> None:
+async def test_second_setpoint_begins_a_stream_ended_by_silence() -> None:
     async with world(speed=1.0, flavour="ardupilot") as w:
         await w.take_off(8.0)
         setpoint = local(POSITION_ONLY, at=(60.0, 0.0, -8.0))
@@ -635,7 +635,7 @@ async def test_a_setpoint_does_not_overtake_a_newer_order() -> None:
 
 
 @both
-async def test_sticks_that_follow_the_camera_are_no_sticks_for_setpoints(flavour: str) -> None:
+async def test_setpoints_with_camera_relative_sticks_are_refused(flavour: str) -> None:
     async with world(speed=1.0, flavour=flavour) as w:
         await w.take_off(8.0)
         style = piloting_style.SetStyle(piloting_style.PilotingStyleStyle.CAMERA_OPERATED)

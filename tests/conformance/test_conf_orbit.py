@@ -129,7 +129,7 @@ async def test_without_gps_the_orbit_ends_in_a_hover() -> None:
         assert {(e.args["roll"], e.args["pitch"]) for e in last} == {(0, 0)}
 
 
-async def test_sticks_that_follow_the_camera_are_no_sticks_for_an_orbit() -> None:
+async def test_orbit_with_camera_relative_sticks_is_ended_and_refused() -> None:
     """Ahead would be where the camera looks: the orbit ends in a hover, and there is no other while that is so."""
     orbit: dict[str, Any] = {"frame": GLOBAL, "x": HOME[0], "y": HOME[1], "z": HOME[2] + 10.0}
     async with world(speed=1.0) as w:
@@ -164,7 +164,7 @@ async def test_sticks_that_follow_the_camera_are_no_sticks_for_an_orbit() -> Non
         ((10.0, 3.0, 5, -1.0), DENIED),
     ],
 )
-async def test_orbits_that_make_no_sense(parameters: tuple[float, ...], result: int) -> None:
+async def test_invalid_orbits_are_refused(parameters: tuple[float, ...], result: int) -> None:
     async with world() as w:
         await w.take_off(5.0)
         ack = await w.client.command(ORBIT, *parameters, frame=GLOBAL, x=CENTRE[0], y=CENTRE[1], z=HOME[2] + 10.0)

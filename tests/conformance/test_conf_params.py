@@ -226,7 +226,7 @@ TWINS_ARDUPILOT = [
     [*(("px4", row) for row in TWINS_PX4), *(("ardupilot", row) for row in TWINS_ARDUPILOT)],
     ids=lambda value: value if isinstance(value, str) else value[0],
 )
-async def test_a_twin_and_its_native_are_one_value(flavour: str, row: tuple[Any, ...]) -> None:
+async def test_alias_and_native_parameter_are_one_value(flavour: str, row: tuple[Any, ...]) -> None:
     name, number, kind, native, expected, command, args = row
     async with world(flavour=flavour) as w:
         mark = w.client.mark()
@@ -265,7 +265,7 @@ async def test_the_ai_avoids_obstacles_by_parameter() -> None:
 
 
 @pytest.mark.parametrize("model", ["4k", "thermal", "usa", "ai"])
-async def test_a_model_has_what_the_page_says(model: str) -> None:
+async def test_model_has_the_parameters_of_its_documentation(model: str) -> None:
     """docs/parameters.md tells which models have a parameter; the drone's own events decide."""
     async with world(model=model) as w:
         names = {name for name in await fetch(w.client) if name.startswith("ANF_")}
@@ -283,7 +283,7 @@ async def test_two_flavours_see_one_value() -> None:
         assert (value.param_value, value.param_type) == (2000.0, INT16)
 
 
-async def test_a_value_that_the_drone_changes_is_pushed() -> None:
+async def test_value_changed_by_the_drone_is_pushed() -> None:
     """Somebody else, say Parrot's app on the same Skycontroller, changes a setting: the drone's event is all we see."""
     async with world() as w:
         mark = w.client.mark()

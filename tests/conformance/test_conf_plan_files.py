@@ -49,7 +49,7 @@ async def write(w: World, kind: int, data: bytes) -> tuple[int, bytes]:
 
 
 @pytest.mark.parametrize("kind", LISTS)
-async def test_list_is_read_as_a_file_by_an_ardupilot_client(kind: int) -> None:
+async def test_ardupilot_client_reads_a_plan_as_a_file(kind: int) -> None:
     async with world(flavour="ardupilot") as w:
         assert (await upload(w.client, LISTS[kind], kind)).type == 0
         found = unpack_plan(await Ftp(w.client).download(PATHS[kind]), kind)
@@ -62,7 +62,7 @@ async def test_list_is_read_as_a_file_by_an_ardupilot_client(kind: int) -> None:
 
 
 @pytest.mark.parametrize("kind", LISTS)
-async def test_file_of_a_list_replaces_it_without_a_mission_ack(kind: int) -> None:
+async def test_plan_file_upload_replaces_plan_without_mission_ack(kind: int) -> None:
     async with world(flavour="ardupilot") as w:
         mark = w.client.mark()
         assert await write(w, kind, file_of(LISTS[kind], kind, autocontinue=0)) == (ACK, b"")
@@ -86,7 +86,7 @@ async def test_file_of_a_list_replaces_it_without_a_mission_ack(kind: int) -> No
         (FENCE, file_of([circle(PLACE, -5.0)], FENCE), "Fence refused: item 0: radius -5 m"),
     ],
 )
-async def test_file_that_is_not_good_leaves_the_list_and_says_why(kind: int, data: bytes, reason: str) -> None:
+async def test_invalid_plan_file_keeps_plan_and_names_the_reason(kind: int, data: bytes, reason: str) -> None:
     async with world(flavour="ardupilot") as w:
         assert (await upload(w.client, LISTS[kind], kind)).type == 0
         mark = w.client.mark()
@@ -95,7 +95,7 @@ async def test_file_that_is_not_good_leaves_the_list_and_says_why(kind: int, dat
         assert len(await download(w.client, kind)) == len(LISTS[kind])
 
 
-async def test_mission_that_cannot_be_flown_is_refused_by_a_text() -> None:
+async def test_mission_file_that_cannot_fly_is_refused_with_text() -> None:
     """It is examined after the file is closed."""
     async with world(flavour="ardupilot") as w:
         mark = w.client.mark()

@@ -184,7 +184,7 @@ async def test_conf_063_an_aborted_upload_keeps_the_old_plan(flavour: str, kind:
 
 
 @both
-async def test_conf_063_closed_channel_frees_its_transfer(flavour: str) -> None:
+async def test_conf_063_closed_channel_frees_its_plan_transfer(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         other = await w.connect(254)
         mark = send_count(other, 5, FENCE)
@@ -307,7 +307,7 @@ BAD_ITEMS = [
 
 
 @both
-async def test_conf_066_items_that_cannot_be_kept(flavour: str) -> None:
+async def test_conf_066_unstorable_items_are_refused(flavour: str) -> None:
     """Refused with the reason and the item, and what was there before stays."""
     async with world(flavour=flavour) as w:
         for kind in (MISSION, FENCE, RALLY):

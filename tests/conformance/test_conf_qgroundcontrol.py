@@ -16,7 +16,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.flavours import both
 from support.ftp import Ftp
-from support.mav import Client
+from support.mav import Client, kind_of
 from support.missions import ACTIVE, COMPLETE, MISSION_MODE, ROUND, first, mode, put, said, start, state, takeoff, way
 from support.params import fetch, read, send_set, value_of
 from support.world import ARMED, HOLD, HOME, World, world
@@ -82,14 +82,14 @@ async def test_battery_page_shows_the_cells_of_the_model(model: str, cells: int)
         assert value_of(await read(w.client, "BAT1_SOURCE")) == 1
 
 
-async def test_compass_of_the_ardupilot_flavour_is_the_first_by_priority() -> None:
+async def test_ardupilot_compass_is_first_by_priority() -> None:
     """Otherwise QGroundControl's summary calls it unused (APMSensorsComponentSummary.qml)."""
     async with world(flavour="ardupilot") as w:
         first = await read(w.client, "COMPASS_PRIO1_ID")
         assert first.param_value == (await read(w.client, "COMPASS_DEV_ID")).param_value != 0
 
 
-async def test_obstacle_avoidance_is_off_on_a_model_without_it() -> None:
+async def test_obstacle_avoidance_is_off_on_models_without_it() -> None:
     async with world() as w:
         assert value_of(await read(w.client, "COM_OBS_AVOID")) == 0
 
@@ -170,7 +170,7 @@ def position_of(w: World, mark: int, kind: str, true: Any) -> int:
     return next(
         index
         for index, (_, message) in enumerate(w.client.received[mark:])
-        if message.get_type() == kind and true(message)
+        if kind_of(message) == kind and true(message)
     )
 
 
@@ -200,7 +200,7 @@ def resume_index(messages: list[Any], mode: int, items: int, home: int) -> int:
         if message.get_type() == "MISSION_CURRENT":
             if message.seq not in (last, cached):
                 cached = message.seq
-        elif message.get_type() == "HEARTBEAT" and cached != -1 and message.custom_mode == mode:
+        elif kind_of(message) == "HEARTBEAT" and cached != -1 and message.custom_mode == mode:
             cached, last = -1, cached
     index = last + (0 if home else 1)
     return index - 1 if index > 1 and index != items else 0
@@ -217,7 +217,7 @@ async def test_complete_mission_is_not_offered_for_resuming(flavour: str) -> Non
         messages = [message for _, message in w.client.received[mark:]]
         assert resume_index(messages, MISSION_MODE[flavour], len(ROUND), first(w)) == 0
         # One change of mode, from Mission to Return, and not by way of Hold.
-        modes = [message.custom_mode for message in messages if message.get_type() == "HEARTBEAT"]
+        modes = [message.custom_mode for message in messages if kind_of(message) == "HEARTBEAT"]
         begun = modes.index(MISSION_MODE[flavour])
         assert [number for number, _ in itertools.groupby(modes[begun:])] == [MISSION_MODE[flavour], w.modes.returning]
 
@@ -243,7 +243,7 @@ async def test_mission_current_leaves_once_per_change(flavour: str) -> None:
 
 
 @both
-async def test_mission_current_without_a_mission_does_not_leave_when_the_mode_changes(flavour: str) -> None:
+async def test_mission_current_without_mission_ignores_mode_changes(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         stop = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
         ack = await w.client.command(stop, dialect.MAVLINK_MSG_ID_MISSION_CURRENT, -1)
@@ -329,7 +329,7 @@ async def test_critical_battery_is_one_line_of_the_arming_report() -> None:
         assert len(texts) == 1
 
 
-async def test_battery_return_in_a_mission_is_one_change_of_mode() -> None:
+async def test_battery_return_in_a_mission_changes_mode_once() -> None:
     """The drone stops its plan and then begins to return; QGroundControl announces each heartbeat's mode."""
     async with world(web=True, speed=4.0) as w:
         await put(w, [takeoff(8.0), way(60.0, 0.0, 8.0), way(200.0, 0.0, 8.0)])
@@ -343,7 +343,7 @@ async def test_battery_return_in_a_mission_is_one_change_of_mode() -> None:
         assert [number for number, _ in itertools.groupby(modes[begun:])] == [MISSION_MODE["px4"], w.modes.returning]
 
 
-async def test_mission_that_is_paused_shows_hold() -> None:
+async def test_paused_mission_shows_hold() -> None:
     """Heartbeats say Mission for a quarter of a second more, and not longer."""
     async with world(web=True) as w:
         await put(w, [takeoff(6.0), way(100.0, 0.0, 6.0)])

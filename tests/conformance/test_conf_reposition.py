@@ -12,7 +12,7 @@ from support.world import HOME, World, world
 
 from anafi_mav import geo
 from anafi_mav.sim.world.quirks import Quirk
-from anafi_mav.vehicle.vehicle import POSITION_OLD
+from anafi_mav.vehicle.base.aircraft import POSITION_OLD
 
 ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
 REJECTED, UNSUPPORTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED, dialect.MAV_RESULT_UNSUPPORTED
@@ -79,7 +79,7 @@ async def test_reposition_with_nothing_set_stops_without_change_mode_too(flavour
 
 
 @both
-async def test_target_beyond_4_km_is_refused_with_the_drones_geofence_off(flavour: str) -> None:
+async def test_target_beyond_4_km_is_refused_without_geofence(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         await w.take_off(5.0)
         far, farther = (geo.destination(HOME[0], HOME[1], metres, 0.0) for metres in (3990.0, 4010.0))
@@ -100,7 +100,7 @@ async def without_fix(w: World) -> None:
 
 @pytest.mark.parametrize("command", ["DO_REPOSITION", "DO_CHANGE_ALTITUDE"])
 @both
-async def test_change_of_height_without_gps_is_flown_by_move_by(flavour: str, command: str) -> None:
+async def test_height_change_without_gps_is_flown_by_move_by(flavour: str, command: str) -> None:
     async with world(flavour=flavour) as w:
         await w.take_off(5.0)
         # The climb counts from the reported height: the report of the take-off's end may still be on its way.
@@ -122,7 +122,7 @@ async def test_change_of_height_without_gps_is_flown_by_move_by(flavour: str, co
 
 
 @both
-async def test_custom_home_that_the_drone_refuses_is_refused_at_once(flavour: str) -> None:
+async def test_custom_home_refused_by_the_drone_is_refused_immediately(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         await w.take_off(5.0)
         before = asyncio.get_running_loop().time()
@@ -138,7 +138,7 @@ async def test_custom_home_that_the_drone_refuses_is_refused_at_once(flavour: st
 # An old position (S21).
 
 
-async def test_position_is_not_sent_in_flight_while_gps_locations_have_stopped() -> None:
+async def test_position_in_flight_without_gps_locations_is_not_sent() -> None:
     """On the ground the last one stays: nothing has moved."""
     async with world() as w:
         stopped = frozenset({Quirk.GPS_LOCATION_STOPS})

@@ -19,7 +19,7 @@ def shown(beats: list[int]) -> list[int]:
 
 
 @both
-async def test_return_that_the_drone_ends_by_landing_shows_no_mode_between(flavour: str) -> None:
+async def test_return_ended_by_landing_shows_no_mode_between(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         await w.take_off(5.0)
         w.drone.firmware.settings.set("rth_ending", RthEndingBehavior.LANDING)
@@ -37,7 +37,7 @@ async def test_return_that_the_drone_ends_by_landing_shows_no_mode_between(flavo
 
 
 @both
-async def test_commanded_return_that_the_drone_ends_by_landing_shows_return_and_land(flavour: str) -> None:
+async def test_commanded_return_ended_by_landing_shows_return_and_land(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         await w.take_off(5.0)
         w.drone.firmware.settings.set("rth_ending", RthEndingBehavior.LANDING)

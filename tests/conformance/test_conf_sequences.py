@@ -167,7 +167,7 @@ async def mode(w: World, number: int) -> None:
     await w.client.heartbeat(lambda beat: beat.custom_mode == number, since=mark, timeout=1.3)
 
 
-async def test_the_same_flight_ends_at_the_same_place_in_both_flavours() -> None:
+async def test_same_flight_ends_at_same_place_in_both_flavours() -> None:
     """Each in the words of its own clients: up, over there, another height, a turn, back down where it is."""
     places = []
     for flavour in FLAVOURS:

@@ -251,7 +251,7 @@ async def test_conf_132_flight_information(flavour: str) -> None:
 
 
 @both
-async def test_conf_133_what_is_below_and_nothing_invented(flavour: str) -> None:
+async def test_conf_133_ground_distance_is_reported_and_unmeasured_fields_are_unknown(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         await airborne(w, 8.0)
         below = await w.client.wait("DISTANCE_SENSOR")

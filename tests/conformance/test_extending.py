@@ -48,7 +48,7 @@ def sections() -> dict[str, list[str]]:
 @pytest.fixture
 def _restored(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The tables of the program are as before when a test ends."""
-    monkeypatch.setattr(system, "SERVICES", system.SERVICES)
+    monkeypatch.setattr(system, "AUTOPILOT_SERVICES", system.AUTOPILOT_SERVICES)
     monkeypatch.setattr(parameter_service, "NATIVE_NAMES", parameter_service.NATIVE_NAMES)
     monkeypatch.setattr(telemetry_status, "STREAMS", telemetry_status.STREAMS)
     monkeypatch.setattr(battery.Battery, "NOTHING", battery.Battery.NOTHING)

@@ -47,7 +47,7 @@ async def flies_nowhere(w: World, seconds: float = 3.0) -> None:
     assert w.drone.pose.ground_speed < 0.5
 
 
-async def test_pause_that_replaces_another_one_holds_against_setpoints() -> None:
+async def test_pause_that_replaces_a_pause_blocks_setpoints() -> None:
     """Two stations press Pause at a goto, the answer to the first is on its way: a program that begins is ignored."""
     async with world(speed=1.0, flavour="ardupilot", clients=2) as w:
         program = await w.connect(sysid=240)
@@ -84,7 +84,7 @@ async def test_pause_during_the_takeoff_command_holds_against_setpoints() -> Non
         await flies_nowhere(w)
 
 
-async def test_land_in_the_second_before_a_guided_takeoff_ends_it() -> None:
+async def test_land_just_before_a_guided_takeoff_ends_it() -> None:
     """The program streams on, armed and in Guided: Land is as good an end of the second as Hold."""
     async with world(flavour="ardupilot", clients=2) as w:
         mark = w.client.mark()
@@ -98,7 +98,7 @@ async def test_land_in_the_second_before_a_guided_takeoff_ends_it() -> None:
         assert heard(w, "TakeOff") == []
 
 
-async def test_takeoff_that_waits_for_arming_ends_a_session_on_the_ground() -> None:
+async def test_takeoff_waiting_for_arming_ends_a_session_on_ground() -> None:
     """QGroundControl sends its take-off before it arms; a program in Offboard on the ground streams a velocity."""
     async with world(clients=2) as w:
         station = w.clients[1]
@@ -113,7 +113,7 @@ async def test_takeoff_that_waits_for_arming_ends_a_session_on_the_ground() -> N
         assert [e for e in heard(w, "PCMD") if e.args["pitch"]] == []
 
 
-async def test_session_on_the_ground_does_not_fly_after_takeoff_by_another_client() -> None:
+async def test_ground_session_does_not_fly_after_another_clients_takeoff() -> None:
     """The pilot at a Skycontroller takes off while a program, not armed, is in Offboard: the flight is the pilot's."""
     async with world(clients=1) as w:
         async with streaming(w.client, NORTH):
@@ -145,7 +145,7 @@ async def test_offboard_during_the_climb_replaces_a_waiting_goto() -> None:
         assert heard(w, "moveTo") == []
 
 
-async def test_refused_goto_keeps_the_goto_that_waits_for_takeoff() -> None:
+async def test_refused_goto_keeps_the_goto_waiting_for_takeoff() -> None:
     async with world(clients=2) as w:
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
         assert (await w.client.command(TAKEOFF, x=0.0, y=0.0, z=6.0)).result == ACCEPTED
@@ -162,7 +162,7 @@ async def test_refused_goto_keeps_the_goto_that_waits_for_takeoff() -> None:
 
 
 @pytest.mark.parametrize("kind", ["position", "attitude"])
-async def test_setpoint_after_a_guided_velocity_has_its_own_timeout(kind: str) -> None:
+async def test_setpoint_after_guided_velocity_has_its_own_timeout(kind: str) -> None:
     """A program that ends its velocities, sends one kind that lasts half a second, and dies."""
     async with world(speed=1.0, flavour="ardupilot") as w:
         await w.take_off()
@@ -178,7 +178,7 @@ async def test_setpoint_after_a_guided_velocity_has_its_own_timeout(kind: str) -
         assert loop.time() - died < 0.8
 
 
-async def test_landing_at_home_ended_by_another_controller_ends_in_the_heartbeat() -> None:
+async def test_landing_at_home_ended_elsewhere_ends_in_the_heartbeat() -> None:
     """While Return is shown, station loss and fence leave the drone alone: it has to be true."""
     async with world(speed=1.0) as w:
         w.drone.firmware.receive(
@@ -194,7 +194,7 @@ async def test_landing_at_home_ended_by_another_controller_ends_in_the_heartbeat
         await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, since=mark)
 
 
-async def test_silence_before_takeoff_waits_half_a_second_for_the_replaced_command() -> None:
+async def test_silence_before_takeoff_waits_half_a_second() -> None:
     """A home that is being undone takes five seconds: the motors stop before."""
     async with world(speed=1.0, clients=2) as w:
         program: Any = attitude(thrust=0.4)
@@ -213,7 +213,7 @@ async def test_silence_before_takeoff_waits_half_a_second_for_the_replaced_comma
 
 
 @pytest.mark.parametrize("action", [3, 5], ids=["return", "land"])
-async def test_hold_while_the_fence_acts_replaces_what_the_fence_commanded(action: int) -> None:
+async def test_hold_during_a_fence_action_replaces_the_action(action: int) -> None:
     """The fence's Landing is not confirmed when a person presses Hold: accepted, the drone hovers, nothing follows."""
     async with world(speed=1.0) as w:
         assert (await upload(w.client, [circle((HOME[0], HOME[1]), 20.0)], FENCE)).type == TAKEN
@@ -230,7 +230,7 @@ async def test_hold_while_the_fence_acts_replaces_what_the_fence_commanded(actio
         assert w.drone.pose.up > 8.0
 
 
-async def test_repeated_land_does_not_restart_a_landing_ended_by_another_client() -> None:
+async def test_repeated_land_does_not_restart_landing_another_client_ended() -> None:
     """The acknowledgement of Land was lost, and its client's program repeats it after another client's Hold."""
     async with world(speed=1.0, clients=2) as w:
         await w.take_off(10.0)
@@ -245,7 +245,7 @@ async def test_repeated_land_does_not_restart_a_landing_ended_by_another_client(
         await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.land)
 
 
-async def test_repeated_land_after_a_takeoff_by_another_client_is_executed() -> None:
+async def test_repeated_land_after_another_clients_takeoff_is_executed() -> None:
     """It had nothing to do on the ground. Now it has, and a landing may not have to wait."""
     async with world(speed=1.0, clients=2) as w:
         assert (await w.client.command(LAND)).result == ACCEPTED
@@ -255,7 +255,7 @@ async def test_repeated_land_after_a_takeoff_by_another_client_is_executed() -> 
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landing", 5.0)
 
 
-async def test_emergency_while_gaz_ends_a_landing_cancels_that() -> None:
+async def test_emergency_while_gaz_ends_a_landing_stops_the_gaz() -> None:
     """No gaz follows the cut, and the client of the Hold receives CANCELLED."""
     async with world(speed=1.0, allow_kill=True, clients=2) as w:
         await w.take_off(10.0)
@@ -296,7 +296,7 @@ async def test_link_silence_above_home_leaves_the_drone_hovering() -> None:
         assert w.drone.flying_state.name == "HOVERING"
 
 
-async def test_link_silence_ends_a_goto_that_waits_for_a_takeoff() -> None:
+async def test_link_silence_ends_a_goto_waiting_for_takeoff() -> None:
     async with world(speed=1.0) as w:
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
         assert (await w.client.command(TAKEOFF, x=0.0, y=0.0, z=20.0)).result == ACCEPTED
@@ -310,7 +310,7 @@ async def test_link_silence_ends_a_goto_that_waits_for_a_takeoff() -> None:
         assert heard(w, "moveTo") == []
 
 
-async def test_return_that_is_not_available_leaves_the_landing_alone() -> None:
+async def test_unavailable_return_leaves_the_landing_alone() -> None:
     """The drone has no GPS fix: it is not to hover and drift instead of landing."""
     async with world(speed=1.0) as w:
         await w.take_off(10.0)

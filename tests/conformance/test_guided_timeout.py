@@ -28,7 +28,7 @@ async def test_velocity_once_a_second_flies_on_in_guided() -> None:
 
 
 @pytest.mark.parametrize("seconds", [0.5, 3.0])
-async def test_guided_timeout_is_what_a_client_sets(seconds: float) -> None:
+async def test_guided_timeout_follows_the_clients_parameter(seconds: float) -> None:
     async with world(speed=1.0, flavour="ardupilot") as w:
         assert value_of(await write(w.client, "GUID_TIMEOUT", seconds, 9, "ardupilot"), "ardupilot") == seconds
         await w.take_off()

@@ -146,7 +146,7 @@ async def test_cancelled_home_leaves_the_old_one(how: str) -> None:
 # -- the ground station is back
 
 
-async def test_command_of_a_returning_client_ends_the_link_loss_action() -> None:
+async def test_returning_clients_command_ends_the_link_loss_action() -> None:
     async with world(speed=1.0) as w:
         other = await w.connect(sysid=254)
         await w.take_off(8.0)

@@ -87,7 +87,7 @@ async def set_out(w: World, way: str) -> None:
 
 
 @pytest.mark.parametrize("way", ["goto", "mission", "return", "land", "orbit"])
-async def test_stick_takes_over_from_what_a_client_commanded(way: str) -> None:
+async def test_stick_acquires_control_from_a_clients_command(way: str) -> None:
     async with world(speed=1.0, web=True, clients=2) as w, joystick(w) as stick:
         await set_out(w, way)
         assert not taken(w)
@@ -109,7 +109,7 @@ async def test_joystick_on_the_table_does_nothing(sticks: dict[str, int]) -> Non
         assert heard(w, "CancelMoveTo") == []
 
 
-async def test_throttle_alone_does_not_take_over_and_waits_for_the_middle() -> None:
+async def test_throttle_alone_does_not_override_before_passing_the_middle() -> None:
     async with world(speed=1.0) as w, joystick(w, z=0) as stick:
         await set_out(w, "goto")
         began = w.drone.pose.up
@@ -132,7 +132,7 @@ async def test_throttle_alone_does_not_take_over_and_waits_for_the_middle() -> N
     ("bits", "way", "ends"),
     [(0, "goto", False), (2, "goto", False), (1, "offboard", False), (2, "offboard", True), (3, "offboard", True)],
 )
-async def test_bits_select_what_is_overridden(bits: int, way: str, ends: bool) -> None:
+async def test_override_bits_select_the_commands(bits: int, way: str, ends: bool) -> None:
     async with world(speed=1.0) as w:
         await write(w.client, "COM_RC_OVERRIDE", bits, dialect.MAV_PARAM_TYPE_INT32)
         program = await w.connect(sysid=250) if way == "offboard" else w.client

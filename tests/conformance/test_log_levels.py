@@ -42,7 +42,7 @@ def listening(beginning: str) -> Iterator[Lines]:
         logging.getLogger().removeHandler(handler)
 
 
-async def test_drone_link_loss_and_recovery_are_logged_at_one_level() -> None:
+async def test_drone_link_loss_and_recovery_have_one_log_level() -> None:
     with listening("alpha: ") as lines:
         async with world() as w:
             assert lines.none()  # a first connection is nothing to warn of

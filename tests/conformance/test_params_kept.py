@@ -51,7 +51,7 @@ async def test_parameter_echo_waits_until_the_value_is_stored(flavour: str) -> N
                 assert stored(serial)[name] == value
 
 
-async def test_parameter_read_while_it_is_stored_waits_too() -> None:
+async def test_parameter_read_during_storing_waits_too() -> None:
     async with world() as w:
         memory._WRITER.submit(time.sleep, SLOW)
         send_set(w.client, "ANF_GCS_LOSS_T", 7.0, REAL32)
@@ -63,7 +63,7 @@ async def test_parameter_read_while_it_is_stored_waits_too() -> None:
         assert stored(w.drone.identity.serial)["ANF_GCS_LOSS_T"] == 7.0
 
 
-async def test_parameters_written_at_once_are_all_stored_before_their_echo() -> None:
+async def test_parameters_written_together_are_stored_before_their_echo() -> None:
     async with world() as w:
         serial = w.drone.identity.serial
         memory._WRITER.submit(time.sleep, SLOW)

@@ -89,7 +89,7 @@ async def test_restart_in_flight_keeps_takeoff_point_and_goto(tmp_path: Path) ->
         assert not [m for _, m in w.client.since(0, "STATUSTEXT") if ESTIMATED in m.text]
 
 
-async def test_restart_in_flight_without_flight_id_estimates_and_keeps_away_from_the_ground(tmp_path: Path) -> None:
+async def test_restart_without_flight_id_estimates_the_height_safely(tmp_path: Path) -> None:
     async with flying(tmp_path, 20.0, Quirk.NO_FLIGHT_ID) as w:
         home = await w.client.wait("HOME_POSITION", since=0)
         assert abs(home.altitude - 35_000) < 1_500
@@ -107,7 +107,7 @@ async def test_restart_in_flight_without_flight_id_estimates_and_keeps_away_from
         await at(w.drone, 0.0, 5.0)
 
 
-async def test_restart_in_flight_without_flight_id_refuses_low_mission_items_above_sea_level(tmp_path: Path) -> None:
+async def test_restart_without_flight_id_refuses_low_amsl_items(tmp_path: Path) -> None:
     async with flying(tmp_path, 20.0, Quirk.NO_FLIGHT_ID) as w:
         await put(
             w,
@@ -122,7 +122,7 @@ async def test_restart_in_flight_without_flight_id_refuses_low_mission_items_abo
         assert w.commands("common.Mavlink.Start") == []
 
 
-async def test_restart_in_flight_flies_local_setpoints_from_the_takeoff_place(tmp_path: Path) -> None:
+async def test_restart_in_flight_flies_local_setpoints_from_takeoff_place(tmp_path: Path) -> None:
     async with flying(tmp_path, 6.0, Quirk.NO_FLIGHT_ID) as w:
         assert w.drone.pose.north < 0.5
         async with streaming(w.client, local(POSITION_ONLY, at=(8.0, 0.0, -7.0))):
@@ -147,7 +147,7 @@ async def test_goto_after_a_link_loss_of_seconds_is_flown(quirks: frozenset[Quir
         assert any(ESTIMATED in text for text in texts) is bool(quirks)
 
 
-async def test_goto_after_a_restart_over_a_bad_link_is_flown(tmp_path: Path) -> None:
+async def test_goto_after_restart_over_a_bad_link_is_flown(tmp_path: Path) -> None:
     """200 ms and a quarter of the datagrams lost, both ways, from before the second gateway has connected."""
     air = Impairment(loss=0.25, delay=0.2)
     async with flying(tmp_path, 6.0, air=air) as w:
@@ -161,7 +161,7 @@ async def test_goto_after_a_restart_over_a_bad_link_is_flown(tmp_path: Path) -> 
     [((), (rth.TakeoffLocation,)), ((Quirk.NO_FLIGHT_ID,), (rth.TakeoffLocation,))],
     ids=["kept with the flight id", "home of type take-off"],
 )
-async def test_restart_in_flight_without_takeoff_location_keeps_the_local_frame(
+async def test_restart_in_flight_without_takeoff_location_keeps_local_frame(
     tmp_path: Path, quirks: tuple[Quirk, ...], untold: tuple[type[Message], ...]
 ) -> None:
     async with flying(tmp_path, 6.0, *quirks, untold=untold) as w:
@@ -169,7 +169,7 @@ async def test_restart_in_flight_without_takeoff_location_keeps_the_local_frame(
         await w.client.wait("LOCAL_POSITION_NED", lambda m: abs(m.x - 12.0) < 0.7 and abs(m.y) < 0.7, timeout=30.0)
 
 
-async def test_restart_in_flight_with_no_takeoff_place_refuses_the_local_frame(tmp_path: Path) -> None:
+async def test_restart_in_flight_without_takeoff_place_refuses_local_frame(tmp_path: Path) -> None:
     async with flying(tmp_path, 6.0, Quirk.NO_FLIGHT_ID, untold=(rth.TakeoffLocation, rth.HomeType)) as w:
         async with streaming(w.client, local(POSITION_ONLY, at=(8.0, 0.0, -7.0))):
             await w.client.wait("STATUSTEXT", lambda m: m.text == "Setpoint refused: take-off point unknown", since=0)

@@ -111,7 +111,7 @@ async def test_hold_above_home_cancels_the_landing() -> None:
         assert w.drone.flying_state.name == "HOVERING"
 
 
-async def test_return_commanded_again_above_home_does_not_begin_once_more() -> None:
+async def test_return_commanded_again_above_home_does_not_restart() -> None:
     """PX4 and ArduCopter stay in their mode then: a program that sends it every second must come down."""
     async with world(speed=FAST) as w:
         await away(w)
@@ -143,7 +143,7 @@ async def test_return_ended_by_another_clients_hold_does_not_land() -> None:
         assert "Landing" not in " ".join(texts(w.client, mark))
 
 
-async def test_finished_report_of_an_earlier_return_does_not_end_this_one() -> None:
+async def test_late_report_of_an_earlier_return_ends_nothing() -> None:
     """Reports come late, or twice: before the drone has reported this return, none is about it."""
     async with world(speed=FAST) as w:
         await away(w)
@@ -157,7 +157,7 @@ async def test_finished_report_of_an_earlier_return_does_not_end_this_one() -> N
         await said(w.client, "Landing in 5 s", 0)
 
 
-async def test_return_ends_hovering_where_the_parameter_says_so() -> None:
+async def test_return_with_hover_parameter_ends_hovering() -> None:
     async with world(speed=FAST) as w:
         assert value_of(await write(w.client, "ANF_RTL_END", 1, INT32)) == 1
         await away(w)
@@ -166,7 +166,7 @@ async def test_return_ends_hovering_where_the_parameter_says_so() -> None:
         await hovers(w, "", mark)
 
 
-async def test_return_with_the_drones_own_landing_needs_no_landing_of_ours() -> None:
+async def test_return_with_landing_by_drone_needs_no_gateway_landing() -> None:
     async with world(speed=FAST) as w:
         await write(w.client, "ANF_RTH_END", 0, INT32)
         await write(w.client, "ANF_RTL_END", 1, INT32)
@@ -177,7 +177,7 @@ async def test_return_with_the_drones_own_landing_needs_no_landing_of_ours() -> 
         assert landings(w) == []
 
 
-async def test_drones_own_return_keeps_its_own_end() -> None:
+async def test_return_begun_by_the_drone_keeps_its_end() -> None:
     """Low battery sends the drone home: it hovers there, as its own setting says, and the gateway lands nothing."""
     async with world(speed=FAST) as w:
         await away(w)
@@ -220,7 +220,7 @@ async def test_return_to_the_pilot_hovers() -> None:
 
 
 @pytest.mark.parametrize("when", ["in this flight", "before the take-off"])
-async def test_return_to_a_home_that_was_set_lands_only_in_the_same_flight(when: str) -> None:
+async def test_return_to_set_home_lands_only_in_same_flight(when: str) -> None:
     async with world(speed=FAST) as w:
         place = geo.destination(*HOME[:2], 8.0, 0.0)
 
@@ -254,7 +254,7 @@ async def test_return_not_reported_as_finished_hovers_with_a_text() -> None:
         await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
 
 
-async def test_return_that_ends_far_from_home_hovers() -> None:
+async def test_return_ending_far_from_home_hovers() -> None:
     """The drone reports finished where its home is not: a wind, or another home than the reported one."""
     async with world(speed=FAST) as w:
         await away(w, 20.0)
@@ -269,7 +269,7 @@ async def test_return_that_ends_far_from_home_hovers() -> None:
 
 
 @both
-async def test_mission_that_ends_with_a_return_lands(flavour: str) -> None:
+async def test_mission_ending_with_a_return_lands(flavour: str) -> None:
     async with world(speed=FAST, flavour=flavour, web=True) as w:
         await put(w, [takeoff(6.0), way(9.0, 0.0, 6.0), RTL_ITEM])
         mark = w.client.mark()
@@ -294,7 +294,7 @@ async def test_return_of_a_lost_ground_station_lands() -> None:
 
 
 @both
-async def test_gateway_that_ends_in_a_return_aborts_nothing(flavour: str) -> None:
+async def test_gateway_shutdown_does_not_abort_a_return(flavour: str) -> None:
     """SIGTERM: the drone goes on home and ends there as its own setting says; the terminal names both."""
     async with world(speed=FAST, flavour=flavour) as w:
         await away(w)
@@ -310,7 +310,7 @@ async def test_gateway_that_ends_in_a_return_aborts_nothing(flavour: str) -> Non
         assert over.t
 
 
-async def test_gateway_that_ends_in_a_landing_aborts_nothing() -> None:
+async def test_gateway_shutdown_does_not_abort_a_landing() -> None:
     async with world(speed=FAST) as w:
         await w.take_off()
         assert (await w.client.command(LAND)).result == ACCEPTED

@@ -20,7 +20,7 @@ from anafi_mav.sim.world.quirks import Quirk
 from anafi_mav.sim.world.wind import WindSpec
 from anafi_mav.texts import ROLL_SIGN_INVERTED as INVERTED
 from anafi_mav.texts import ROLL_SIGN_VERIFIED as VERIFIED
-from anafi_mav.vehicle.base.roll_sign import Sign
+from anafi_mav.vehicle.base.roll_sign import RollSign
 
 SET_MODE, ORBIT = dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_CMD_DO_ORBIT
 ACCEPTED, REJECTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_TEMPORARILY_REJECTED
@@ -55,7 +55,7 @@ async def said(w: World, text: str, since: int = 0, timeout: float = 60.0) -> No
     await w.client.wait("STATUSTEXT", lambda m: m.text == text, since=since, timeout=timeout)
 
 
-async def test_velocity_setpoints_with_roll_as_assumed_verify_its_sign() -> None:
+async def test_velocity_setpoints_with_normal_roll_verify_its_sign() -> None:
     async with world(speed=1.0) as w:
         allow_speed(w)
         await w.take_off()
@@ -67,7 +67,7 @@ async def test_velocity_setpoints_with_roll_as_assumed_verify_its_sign() -> None
         assert "Tilt limit 10 deg: roll sign not verified" in texts(w)
 
 
-async def test_velocity_setpoints_with_inverted_roll_end_in_a_hover_and_are_refused() -> None:
+async def test_velocity_setpoints_with_inverted_roll_hover_and_are_refused() -> None:
     async with world(speed=1.0) as w:
         w.drone.faults.quirks = INVERT
         allow_speed(w)
@@ -99,7 +99,7 @@ async def test_velocity_setpoints_with_inverted_roll_end_in_a_hover_and_are_refu
 
 
 @pytest.mark.parametrize("quirks", [frozenset(), INVERT], ids=["assumed", "inverted"])
-async def test_velocity_setpoints_with_unverified_roll_over_a_bad_link_stay_bounded(quirks: frozenset[Quirk]) -> None:
+async def test_velocity_setpoints_with_unverified_roll_stay_bounded(quirks: frozenset[Quirk]) -> None:
     """200 ms and a quarter of the datagrams lost, both ways, in 3 m/s of wind from the side."""
     async with world(speed=1.0) as w:
         w.drone.faults.quirks = quirks
@@ -128,7 +128,7 @@ async def test_inverted_roll_is_kept_for_the_same_firmware_only(tmp_path: Path, 
         state=str(tmp_path),
     )
     async with Simulator([DroneSpec(address=drone, home=HOME, http_port=None)], speed=3.0, seed=1) as simulator:
-        remember_roll(tmp_path, simulator.drones[0], Sign.LEFT, firmware)
+        remember_roll(tmp_path, simulator.drones[0], RollSign.INVERTED, firmware)
         async with Gateway(config) as gateway:
             w = World(simulator, gateway, address)
             await w.connect()

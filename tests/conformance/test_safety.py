@@ -104,7 +104,7 @@ def pitches(w: World, since: int = 0) -> list[int]:
 # Orders that overtake each other.
 
 
-async def test_two_commands_in_one_segment_are_both_answered_and_the_newer_is_flown() -> None:
+async def test_two_commands_in_one_segment_are_answered_newer_flown() -> None:
     async with world() as w:
         await w.take_off()
         mark = w.client.mark()
@@ -114,7 +114,7 @@ async def test_two_commands_in_one_segment_are_both_answered_and_the_newer_is_fl
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
 
 
-async def test_the_older_of_two_orders_does_not_cancel_the_newer() -> None:
+async def test_older_of_two_commands_does_not_cancel_the_newer() -> None:
     """The newer one is refused: the older one goes on, and is answered."""
     async with world() as w:
         await w.take_off()
@@ -124,7 +124,7 @@ async def test_the_older_of_two_orders_does_not_cancel_the_newer() -> None:
         await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
 
 
-async def test_a_late_repetition_is_not_flown_over_the_head_of_another_client() -> None:
+async def test_late_repetition_does_not_replace_another_clients_command() -> None:
     async with world(clients=1) as w:
         other = await w.connect(sysid=250)
         await w.take_off()
@@ -151,7 +151,7 @@ async def test_repeated_takeoff_after_success_is_not_refused() -> None:
         assert heard(w, "TakeOff") == ["TakeOff"]
 
 
-async def test_disarm_right_after_a_take_off_that_waited_for_arming() -> None:
+async def test_disarm_after_a_takeoff_waiting_for_arming_ends_it() -> None:
     async with world() as w:
         assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)).result == ACCEPTED
         mark = w.client.mark()
@@ -221,7 +221,7 @@ async def test_return_repeated_during_a_hold() -> None:
 
 
 @pytest.mark.parametrize("order", [(LAND_CMD,), (ARM, 0.0)])
-async def test_land_and_disarm_are_not_confirmed_while_the_drone_rises_unheard(order: tuple[Any, ...]) -> None:
+async def test_land_and_disarm_during_unreported_climb_are_not_confirmed(order: tuple[Any, ...]) -> None:
     async with world(speed=1.0) as w:
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
         gone = on_command(w, "ardrone3.Piloting.TakeOff", lambda: deaf(w, 3.5))
@@ -384,7 +384,7 @@ async def test_offboard_has_one_pilot() -> None:
 
 
 @pytest.mark.parametrize("q", [[NAN] * 4, [0.0] * 4, [math.inf, 0.0, 0.0, 0.0], [1e30, 0.0, 1e30, 0.0]])
-async def test_setpoints_that_make_no_sense_move_nothing(q: list[float]) -> None:
+async def test_invalid_setpoints_move_nothing(q: list[float]) -> None:
     async with world() as w:
         await w.take_off()
         async with streaming(w.client):
@@ -446,7 +446,7 @@ async def test_a_pilots_stick_ends_offboard_for_good() -> None:
 # What the drone does by itself.
 
 
-async def test_hold_does_not_abort_a_return_that_begins_meanwhile() -> None:
+async def test_hold_does_not_abort_a_return_beginning_meanwhile() -> None:
     async with world(speed=1.0) as w:
         await w.take_off()
         assert await goto(w, 60.0, 10.0) == ACCEPTED
@@ -459,7 +459,7 @@ async def test_hold_does_not_abort_a_return_that_begins_meanwhile() -> None:
         await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
 
 
-async def test_the_climb_after_a_take_off_yields_to_the_drones_own_return() -> None:
+async def test_climb_after_takeoff_yields_to_the_drones_return() -> None:
     async with world(speed=1.0) as w:
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
         assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=20.0)).result == ACCEPTED
@@ -469,7 +469,7 @@ async def test_the_climb_after_a_take_off_yields_to_the_drones_own_return() -> N
         assert heard(w, "moveBy", "abort") == []
 
 
-async def test_the_climb_belongs_to_its_own_take_off() -> None:
+async def test_climb_ends_with_its_own_takeoff() -> None:
     async with world() as w:
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
         assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=20.0)).result == ACCEPTED
@@ -527,7 +527,7 @@ async def test_accepted_motor_cut_cannot_be_cancelled() -> None:
 # The end of the gateway.
 
 
-async def test_the_gateway_ends_with_level_sticks_under_a_living_sender() -> None:
+async def test_gateway_shutdown_levels_sticks_under_an_active_sender() -> None:
     async with world(speed=1.0) as w:
         await w.take_off()
         async with streaming(w.client, pitch=FORWARD):
@@ -539,7 +539,7 @@ async def test_the_gateway_ends_with_level_sticks_under_a_living_sender() -> Non
         assert set(pitches(w, flown + 2)) == {0}  # what was on its way when the closing began aside
 
 
-async def test_the_gateway_does_not_climb_while_it_ends() -> None:
+async def test_gateway_does_not_climb_during_shutdown() -> None:
     async with world(speed=1.0) as w:
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
         assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=20.0)).result == ACCEPTED

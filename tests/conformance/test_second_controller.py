@@ -55,7 +55,7 @@ async def received(client: Client, text: str, timeout: float = 20.0) -> dialect.
     return await client.wait("STATUSTEXT", lambda m: m.text.startswith(text), since=0, timeout=timeout)
 
 
-async def test_gateway_that_found_the_drone_flying_yields(tmp_path: Path) -> None:
+async def test_gateway_connected_to_a_flying_drone_yields(tmp_path: Path) -> None:
     async with world(speed=1.0) as w:
         await w.take_off()
         async with second(w, tmp_path) as (_, client):

@@ -78,7 +78,7 @@ class Program:
     ],
     ids=["position", "velocity", "acceleration", "position and velocity", "attitude"],
 )
-async def test_offboard_setpoint_that_climbs_takes_off_and_is_flown(
+async def test_climbing_offboard_setpoint_takes_off_and_is_flown(
     setpoint: Any, seen: Callable[[dict[str, float]], bool]
 ) -> None:
     """MAVSDK's examples: arm, stream something that stands still, engage on the ground, then climb."""
@@ -101,7 +101,7 @@ async def test_offboard_setpoint_that_climbs_takes_off_and_is_flown(
         await said(w.client, "Offboard setpoints stopped: hovering")
 
 
-async def test_trajectory_that_begins_at_the_ground_takes_off_and_is_flown() -> None:
+async def test_trajectory_from_the_ground_takes_off_and_is_flown() -> None:
     """MAVSDK's offboard_from_csv: ten points a second, the first 10 cm above the ground."""
     async with world(speed=1.0) as w:
         mark, begun = w.client.mark(), asyncio.get_running_loop().time()
@@ -133,7 +133,7 @@ async def test_guided_attitude_with_thrust_takes_off() -> None:
     [local(POSITION_ONLY, at=(0.0, 0.0, -5.0)), local(VELOCITY_ONLY, v=(0.0, 0.0, -1.0)), attitude(thrust=0.5)],
     ids=["position", "velocity", "attitude that holds"],
 )
-async def test_guided_setpoint_on_the_ground_is_reported_and_not_flown(setpoint: Any) -> None:
+async def test_guided_setpoint_on_ground_is_reported_not_flown(setpoint: Any) -> None:
     async with world(flavour="ardupilot") as w:
         await ready(w.client, "ardupilot")
         mark = w.client.mark()
@@ -193,7 +193,7 @@ async def test_second_before_a_setpoint_takeoff_can_be_ended(flavour: str, how: 
 
 
 @pytest.mark.parametrize("moment", ["motor ramping", "motor ramping, landing ignored", "taking off"])
-async def test_silence_in_a_setpoint_takeoff_disarms_on_the_ground_and_hovers_in_the_air(moment: str) -> None:
+async def test_silence_in_setpoint_takeoff_disarms_on_ground_hovers_airborne(moment: str) -> None:
     async with world(speed=1.0) as w:
         if "ignored" in moment:
             w.drone.faults.quirks = frozenset({Quirk.RAMPING_IGNORES_LANDING})
@@ -278,7 +278,7 @@ async def test_goto_during_takeoff_waits_for_the_climb(flavour: str) -> None:
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 11.0, 20.0)
 
 
-async def test_goto_after_hold_during_takeoff_waits_for_the_first_hover() -> None:
+async def test_goto_after_hold_during_takeoff_awaits_first_hover() -> None:
     """MAVSDK's goto_location changes to Hold before it sends the target, in this example 1 s after the take-off."""
     async with world(speed=1.0) as w:
         await rising(w)
@@ -304,7 +304,7 @@ async def test_of_two_gotos_during_takeoff_the_newest_is_flown() -> None:
 
 
 @pytest.mark.parametrize("how", ["hold", "land"])
-async def test_goto_that_waits_for_a_takeoff_is_cancelled(how: str) -> None:
+async def test_goto_waiting_for_takeoff_is_cancelled(how: str) -> None:
     async with world(clients=2) as w:
         await rising(w, 9.0)
         await w.drone.wait_log(lambda e: e.name.endswith("FlyingStateChanged") and e.args["state"] in (2, 3), 10.0)
@@ -318,7 +318,7 @@ async def test_goto_that_waits_for_a_takeoff_is_cancelled(how: str) -> None:
         assert heard(w, "moveTo") == []
 
 
-async def test_goto_that_waits_fails_with_the_takeoff() -> None:
+async def test_goto_waiting_for_takeoff_fails_with_it() -> None:
     """The drone lands by itself in the climb: the goto is answered, and not flown later."""
     async with world() as w:
         await rising(w, 20.0)
@@ -336,7 +336,7 @@ async def test_goto_that_waits_fails_with_the_takeoff() -> None:
         assert heard(w, "moveTo") == []
 
 
-async def test_offboard_during_takeoff_is_accepted_and_flies_after_the_climb() -> None:
+async def test_offboard_during_takeoff_is_accepted_and_flown_after_climb() -> None:
     async with world() as w:
         async with streaming(w.client, local(VELOCITY_ONLY, v=(2.0, 0.0, 0.0))):
             await rising(w)
@@ -349,7 +349,7 @@ async def test_offboard_during_takeoff_is_accepted_and_flies_after_the_climb() -
         assert w.drone.pose.up == pytest.approx(6.0, abs=0.5)
 
 
-async def test_offboard_that_falls_silent_during_takeoff_leaves_the_climb() -> None:
+async def test_offboard_silent_during_takeoff_leaves_the_climb_alone() -> None:
     async with world(speed=1.0) as w:
         mark = w.client.mark()
         async with streaming(w.client, local(VELOCITY_ONLY, v=(2.0, 0.0, 0.0))):
@@ -360,7 +360,7 @@ async def test_offboard_that_falls_silent_during_takeoff_leaves_the_climb() -> N
         assert [e for e in heard(w, "PCMD") if e.args["pitch"]] == []
 
 
-async def test_guided_stream_during_takeoff_flies_after_the_climb_without_complaint() -> None:
+async def test_guided_stream_during_takeoff_flies_after_climb_without_warning() -> None:
     async with world(flavour="ardupilot") as w:
         mark = w.client.mark()
         await rising(w)
@@ -372,7 +372,7 @@ async def test_guided_stream_during_takeoff_flies_after_the_climb_without_compla
 
 
 @both
-async def test_setpoint_takeoff_over_a_bad_link_with_another_client_arming(flavour: str) -> None:
+async def test_setpoint_takeoff_on_bad_link_with_other_client_arming(flavour: str) -> None:
     """200 ms and 25 % loss to the drone: nothing takes off for the client that did not arm, and then once."""
     async with world(speed=1.0, flavour=flavour, clients=2) as w:
         w.drone.faults.up = w.drone.faults.down = Impairment(loss=0.25, delay=0.2)

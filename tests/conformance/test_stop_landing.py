@@ -75,7 +75,7 @@ STOPS: dict[str, Callable[[Client], Any]] = {
 
 
 @pytest.mark.parametrize("stop", STOPS)
-async def test_landing_is_ended_by_each_stop_command_of_another_client(stop: str) -> None:
+async def test_landing_is_ended_by_another_clients_stop_commands(stop: str) -> None:
     async with world(speed=1.0) as w:
         other = await w.connect(sysid=250)
         await landing(w)
@@ -108,7 +108,7 @@ async def test_landing_is_ended_by_modes_of_ardupilot(mode: int, shown: int) -> 
         assert "landed" not in flown(w)
 
 
-async def test_landing_of_an_ai_is_ended_by_takeoff_like_ground_sdk() -> None:
+async def test_ai_landing_is_ended_by_takeoff_like_ground_sdk() -> None:
     async with world(speed=1.0, model="ai") as w:
         await landing(w)
         taken_off = len(heard(w, "TakeOff"))
@@ -138,7 +138,7 @@ async def test_landing_is_not_ended_by_goto_setpoints_or_sticks() -> None:
 
 @pytest.mark.parametrize("quirk", [Quirk.LANDING_IGNORES_TAKEOFF, Quirk.LANDING_IGNORES_GAZ])
 @pytest.mark.parametrize("model", ["4k", "ai"])
-async def test_takeoff_ends_a_landing_of_firmware_with_one_way_to_end_it(quirk: Quirk, model: str) -> None:
+async def test_takeoff_ends_landing_of_firmware_with_one_way(quirk: Quirk, model: str) -> None:
     async with world(speed=1.0, model=model) as w:
         w.drone.faults.quirks = frozenset({quirk})
         await landing(w, 12.0)
@@ -147,7 +147,7 @@ async def test_takeoff_ends_a_landing_of_firmware_with_one_way_to_end_it(quirk: 
         assert "landed" not in flown(w)
 
 
-async def test_hold_is_refused_after_a_landing_that_ignored_gaz() -> None:
+async def test_hold_is_refused_after_a_landing_ignored_gaz() -> None:
     async with world(speed=2.0) as w:
         w.drone.faults.quirks = frozenset({Quirk.LANDING_IGNORES_GAZ})
         await landing(w, 4.0)
@@ -183,7 +183,7 @@ async def test_hold_right_after_land_holds() -> None:
         assert w.drone.pose.up > 5.0
 
 
-async def test_goto_right_after_land_is_refused_and_the_drone_lands() -> None:
+async def test_goto_right_after_land_is_refused() -> None:
     """The Landing has left and is not answered: a goto does not replace it."""
     async with world(speed=1.0) as w:
         await w.take_off(6.0)
@@ -214,7 +214,7 @@ async def test_forced_landing_is_ended_by_no_client() -> None:
 
 
 @pytest.mark.parametrize("skycontroller", [3, 4])
-async def test_landing_by_the_skycontrollers_button_is_ended_by_no_client(skycontroller: int) -> None:
+async def test_landing_by_skycontroller_button_is_ended_by_no_client(skycontroller: int) -> None:
     async with world(speed=1.0, skycontroller=skycontroller) as w:
         await w.take_off(8.0)
         assert w.drone.skycontroller is not None
@@ -227,7 +227,7 @@ async def test_landing_by_the_skycontrollers_button_is_ended_by_no_client(skycon
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
 
 
-async def test_landing_of_a_client_behind_a_skycontroller_is_ended_by_a_client() -> None:
+async def test_client_landing_behind_a_skycontroller_is_ended_by_clients() -> None:
     async with world(speed=1.0, skycontroller=3) as w:
         await landing(w)
         assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
@@ -250,7 +250,7 @@ async def test_no_caller_without_a_clients_right_ends_a_landing(caller: str) -> 
         assert heard(w, "TakeOff") == ["TakeOff"]
 
 
-async def test_joystick_override_ends_a_landing_that_a_client_commanded() -> None:
+async def test_joystick_override_ends_a_clients_landing() -> None:
     """The right that the override has: what clients commanded, and nothing of the drone's own."""
     async with world(speed=1.0) as w:
         await landing(w)
@@ -322,7 +322,7 @@ async def _race(stop: str, offset: float, quirks: frozenset[Quirk]) -> None:
 # Modes that begin once the drone hovers.
 
 
-async def test_offboard_with_setpoints_ends_a_landing_and_flies_them() -> None:
+async def test_offboard_with_setpoints_ends_a_landing_and_flies() -> None:
     async with world(speed=1.0) as w:
         await landing(w, 10.0)
         async with streaming(w.client, local(0b110111000111, v=(1.0, 0.0, 0.0))):
@@ -341,7 +341,7 @@ async def test_mission_ends_a_landing_and_is_flown() -> None:
 
 
 @pytest.mark.parametrize("mode", [PX4_OFFBOARD, PX4_MISSION])
-async def test_mode_that_cannot_begin_leaves_the_landing_alone(mode: tuple[int, int, int]) -> None:
+async def test_unavailable_mode_leaves_the_landing_alone(mode: tuple[int, int, int]) -> None:
     """No setpoints arrive, there is no mission: a command that is refused disturbs nothing."""
     async with world(speed=1.0) as w:
         await landing(w, 6.0)
@@ -352,7 +352,7 @@ async def test_mode_that_cannot_begin_leaves_the_landing_alone(mode: tuple[int, 
         assert flown(w)[-2:] == ["landing", "landed"]
 
 
-async def test_mission_landing_is_ended_by_hold_but_not_by_mission_mode() -> None:
+async def test_mission_landing_is_ended_by_hold_not_mission_mode() -> None:
     async with world(speed=2.0, web=True) as w:
         await put(w, [takeoff(8.0), way(8.0, 0.0, 8.0), LAND_ITEM])
         await start(w)

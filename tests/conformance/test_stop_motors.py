@@ -65,7 +65,7 @@ async def test_disarm_stops_ramping_motors(force: int) -> None:
         assert "takingoff" not in flown(w)
 
 
-async def test_forced_disarm_without_allow_kill_cuts_motors_that_ignore_a_landing() -> None:
+async def test_forced_disarm_without_allow_kill_cuts_motors_ignoring_landing() -> None:
     async with world(speed=0.5) as w:
         await ramping(w, Quirk.RAMPING_IGNORES_LANDING)
         assert (await w.client.command(*DISARM, FORCE)).result == ACCEPTED
@@ -102,7 +102,7 @@ async def test_disarm_in_the_air_is_refused_as_before(force: int, result: int) -
         assert heard(w, "Emergency", "Landing") == []
 
 
-async def test_disarm_of_a_hand_launch_stops_it() -> None:
+async def test_disarm_stops_a_hand_launch() -> None:
     async with world(speed=1.0) as w:
         w.drone.firmware.receive(ardrone3.UserTakeOff(1), asyncio.get_running_loop().time())
         await state(w, "usertakeoff")
@@ -187,7 +187,7 @@ async def test_pause_holds_against_setpoints_of_every_client(pause: str, positio
 
 
 @pytest.mark.parametrize("end", ["another mode", "goto"])
-async def test_pause_is_ended_by_another_mode_and_by_a_command(end: str) -> None:
+async def test_pause_is_ended_by_another_mode_and_command(end: str) -> None:
     async with world(speed=1.0, flavour="ardupilot") as w:
         program = await w.connect(sysid=240)
         await w.take_off(10.0)
@@ -209,7 +209,7 @@ async def test_pause_is_ended_by_another_mode_and_by_a_command(end: str) -> None
 # Nothing of what was replaced follows.
 
 
-async def test_emergency_leaves_before_what_it_replaces_has_ended() -> None:
+async def test_emergency_leaves_before_the_replaced_command_has_ended() -> None:
     """A home that is being undone waits for an answer: the motors are cut before."""
     async with world(speed=1.0, allow_kill=True) as w:
         await w.take_off(5.0)
@@ -224,7 +224,7 @@ async def test_emergency_leaves_before_what_it_replaces_has_ended() -> None:
 
 
 @pytest.mark.parametrize("stop", ["land", "hold"])
-async def test_land_and_hold_wait_half_a_second_for_the_replaced_command(stop: str) -> None:
+async def test_land_and_hold_await_the_replaced_command_briefly(stop: str) -> None:
     async with world(speed=1.0) as w:
         await w.take_off(5.0)
         w.drone.faults.untold = frozenset({rth.CustomLocation.NAME, rth.PreferredHomeType.NAME})

@@ -142,7 +142,7 @@ async def test_return_is_not_ended_by_a_goto(own: bool) -> None:
         assert heard(w, "abort") == []
 
 
-async def test_hold_within_five_seconds_of_another_does_not_end_the_drones_own_return() -> None:
+async def test_hold_within_five_seconds_of_another_keeps_drones_return() -> None:
     async with world(speed=1.0) as w:
         await away(w)
         assert await hold(w.client) == ACCEPTED
@@ -156,7 +156,7 @@ async def test_hold_within_five_seconds_of_another_does_not_end_the_drones_own_r
         assert await hold(w.client) == ACCEPTED
 
 
-async def test_return_with_a_failed_motor_is_ended_by_no_client() -> None:
+async def test_return_with_a_failed_motor_cannot_be_ended() -> None:
     async with world(speed=1.0) as w:
         await away(w)
         by_itself(w, StateReason.MOTOR_DOWN)
@@ -165,7 +165,7 @@ async def test_return_with_a_failed_motor_is_ended_by_no_client() -> None:
         assert heard(w, "abort") == []
 
 
-async def test_aborted_return_is_repeated_to_everybody_until_the_drone_lands() -> None:
+async def test_aborted_return_is_repeated_to_all_until_landed() -> None:
     async with world(speed=1.0) as w:
         other = await w.connect(sysid=250)
         await away(w)
@@ -201,7 +201,7 @@ async def test_lost_connection_as_the_reason_is_reported_once() -> None:
 
 
 @pytest.mark.parametrize("skycontroller", [3])
-async def test_return_by_the_skycontrollers_button_is_ended_by_no_client(skycontroller: int) -> None:
+async def test_return_by_skycontroller_button_is_ended_by_no_client(skycontroller: int) -> None:
     async with world(speed=1.0, skycontroller=skycontroller) as w:
         await away(w)
         assert w.drone.skycontroller is not None
@@ -259,7 +259,7 @@ def returned(w: World) -> bool:
     return any(e.name == "rth.state" and e.args["reason"] == StateReason.LOW_BATTERY for e in w.drone.log)
 
 
-async def test_second_hold_of_the_same_client_cancels_an_announced_return() -> None:
+async def test_second_hold_of_one_client_cancels_announced_return() -> None:
     async with world(speed=1.0) as w:
         other = await w.connect(sysid=250)
         await away(w)

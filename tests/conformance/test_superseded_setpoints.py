@@ -91,7 +91,7 @@ async def test_reached_position_is_not_flown_to_again(orders: list[Any], up: flo
 
 
 @pytest.mark.parametrize("together", [False, True], ids=["later", "together"])
-async def test_setpoints_do_not_end_a_landing_that_has_not_begun(together: bool) -> None:
+async def test_setpoints_do_not_end_a_landing_before_it_begins(together: bool) -> None:
     """A program that sends one velocity a second, as MAVProxy's does, flies the drone for half of each second only."""
     async with world(speed=1.0, flavour="ardupilot") as w:
         await w.take_off(8.0)
@@ -109,7 +109,7 @@ async def test_setpoints_do_not_end_a_landing_that_has_not_begun(together: bool)
 
 @both
 @pytest.mark.parametrize("order", [RTL, PAUSE])
-async def test_held_stick_does_not_end_a_command_that_has_not_begun(flavour: str, order: int) -> None:
+async def test_held_stick_does_not_end_a_command_before_start(flavour: str, order: int) -> None:
     """It is streamed all the time; the mode that it flies in is over when something else is ordered."""
     async with world(speed=1.0, flavour=flavour) as w:
         await w.take_off(8.0)
@@ -128,7 +128,7 @@ async def test_held_stick_does_not_end_a_command_that_has_not_begun(flavour: str
 
 
 @pytest.mark.parametrize("order", [LAND_CMD, RTL, PAUSE])
-async def test_command_ended_by_link_loss_does_not_restore_an_old_mode(order: int) -> None:
+async def test_command_ended_by_link_loss_restores_no_old_mode(order: int) -> None:
     """The setpoint that comes when the drone is there again finds it in Brake, not in Guided."""
     async with world(speed=1.0, flavour="ardupilot") as w:
         await w.take_off(8.0)
@@ -192,7 +192,7 @@ async def test_failed_stream_of_positions_is_repeated() -> None:
 # -- an armed state of before
 
 
-async def test_heartbeat_stays_armed_while_a_mission_is_about_to_lift_off() -> None:
+async def test_heartbeat_stays_armed_before_a_mission_lifts_off() -> None:
     """The start is on a bad way to the drone when the ten seconds since arming are over."""
     async with world(flavour="ardupilot", web=True) as w:
         await put(w, ROUND)

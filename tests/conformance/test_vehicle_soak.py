@@ -35,7 +35,7 @@ async def test_rounds_of_random_flight_keep_every_promise(
 
 
 @pytest.mark.parametrize(("cancel_after", "defect"), [(0.6, AFTER_CANCEL), (1.75, BLAMED)])
-async def test_restart_that_is_cancelled_with_late_answers_shows_known_defect(cancel_after: float, defect: str) -> None:
+async def test_restart_cancelled_with_late_answers_shows_known_defect(cancel_after: float, defect: str) -> None:
     """Defects 3 and 2 of issue CONTROL, as a round's judge sees them. Issue CONTROL turns this into `wrong == []`."""
     late = Impairment(delay=0.5)
     restart = Step(0.5, 0, "withdraw", (1.0, 1.0, 4.0 * cancel_after))

@@ -19,16 +19,16 @@ class Item(NamedTuple):
     """What of it is left to a later issue."""
 
 
-_LATER_CAMERA = "camera and gimbal components"
-
 ITEMS: dict[int, Item] = {
     1: Item("heartbeat at 1 Hz from component 1, type quadrotor, the flavour's autopilot, custom mode flag"),
     2: Item("one more heartbeat within 100 ms of a change of mode or armed state"),
+    3: Item("heartbeats of other components: autopilot invalid, base and custom mode 0, their type"),
+    4: Item("the autopilot's heartbeat is the last of each burst"),
     5: Item("all frames MAVLink 2, sequence contiguous for each component"),
     6: Item("silent within 3 s of the drone's link loss, back with fresh data"),
     7: Item("COMMAND_ACK from the addressed component, to the requester"),
     8: Item("a command to component 0 gets one acknowledgement"),
-    9: Item("an unsupported command is answered within 200 ms", part=_LATER_CAMERA),
+    9: Item("an unsupported command is answered within 200 ms"),
     10: Item("NaN in every parameter of every command means the default and breaks nothing"),
     11: Item("a long action says IN_PROGRESS at least once a second (DO_SET_MODE after 2.5 s only), then how it ended"),
     12: Item("a command sent four times in two seconds is executed once"),

@@ -20,6 +20,18 @@ from anafi_mav.mavlink import dialect as newer
 
 NAN = math.nan
 
+CAMERA = 100
+"""Component id of a vehicle's camera."""
+
+
+def kind_of(message: Any) -> str:
+    """Return the name of a message, and CAMERA_HEARTBEAT for a heartbeat that is not the vehicle's own.
+
+    Tests of flights wait for HEARTBEAT, and mean the autopilot's.
+    """
+    name: str = message.get_type()
+    return "CAMERA_HEARTBEAT" if name == "HEARTBEAT" and message.get_srcComponent() == CAMERA else name
+
 
 class Client:
     """A ground station: keeps every frame it received, sends what a test tells it to."""
@@ -100,7 +112,7 @@ class Client:
 
     def since(self, mark: int, kind: str) -> list[tuple[float, Any]]:
         """What was received of one kind from a mark on."""
-        return [(at, message) for at, message in self.received[mark:] if message.get_type() == kind]
+        return [(at, message) for at, message in self.received[mark:] if kind_of(message) == kind]
 
     async def wait(
         self,
@@ -119,7 +131,7 @@ class Client:
             while position < len(self.received):
                 message = self.received[position][1]
                 position += 1
-                if message.get_type() in kinds and accept(message):
+                if kind_of(message) in kinds and accept(message):
                     return message
             left = deadline - time.monotonic()
             news = self._updated
@@ -127,7 +139,7 @@ class Client:
                 await asyncio.wait_for(news.wait(), max(left, 0.0))
             except asyncio.TimeoutError:
                 told = (*kinds, "STATUSTEXT", "COMMAND_ACK")
-                seen = [str(m) for _, m in self.received[start:] if m.get_type() in told]
+                seen = [str(m) for _, m in self.received[start:] if kind_of(m) in told]
                 raise AssertionError(f"no such {kind} within {timeout} s; seen: {seen[-8:]}") from None
 
     async def silence(self, kind: str, seconds: float, *, timeout: float = 20.0) -> None:

@@ -23,7 +23,7 @@ _GUIDED = "conformance/test_conf_guided.py::"
 _TELEMETRY = "conformance/test_conf_telemetry.py::"
 _ANAFI = "conformance/test_anafi_messages.py::"
 _MAINTENANCE = "conformance/test_conf_maintenance.py::"
-_TWIN = "conformance/test_conf_params.py::test_a_twin_and_its_native_are_one_value"
+_TWIN = "conformance/test_conf_params.py::test_alias_and_native_parameter_are_one_value"
 _PARAMETER = "conformance/test_conf_params.py::test_native_settings_reach_the_drone"
 _MISSIONS = "conformance/test_conf_missions.py::"
 _SAFETY = "conformance/test_safety.py::"
@@ -59,7 +59,7 @@ REACHED: dict[str, Reach] = {
     "camera/zoom": Reach("`ANAFI_CAMERA_EXPOSURE`.zoom", _ANAFI + "test_camera_exposure_and_intrinsics"),
     "drone/altitude": Reach(
         "`ALTITUDE`.bottom_clearance, `DISTANCE_SENSOR`",
-        _TELEMETRY + "test_conf_133_what_is_below_and_nothing_invented",
+        _TELEMETRY + "test_conf_133_ground_distance_is_reported_and_unmeasured_fields_are_unknown",
     ),
     "drone/altitude_above_to": Reach(
         "`GLOBAL_POSITION_INT`.relative_alt, `ALTITUDE`", _TELEMETRY + "test_conf_035_altitudes_agree"
@@ -101,11 +101,12 @@ REACHED: dict[str, Reach] = {
         "`MAV_CMD_DO_PAUSE_CONTINUE`, mode Hold", _MISSIONS + "test_conf_074_pause_and_resume_at_the_same_item"
     ),
     "flightplan/start": Reach(
-        "mode Mission, `MAV_CMD_MISSION_START`", _MISSIONS + "test_conf_049_073_a_mission_from_the_ground_to_its_end"
+        "mode Mission, `MAV_CMD_MISSION_START`",
+        _MISSIONS + "test_conf_049_073_mission_from_the_ground_is_flown_completely",
     ),
     "flightplan/stop": Reach(
         "`MISSION_CLEAR_ALL`",
-        "conformance/test_conf_missions_changed.py::test_conf_074_another_mission_stops_the_one_that_is_flown",
+        "conformance/test_conf_missions_changed.py::test_conf_074_other_mission_uploaded_in_flight_stops_the_flown_one",
     ),
     "flightplan/upload": Reach(
         "mission protocol", "conformance/test_conf_plans.py::test_conf_047_upload_and_download_are_equal"

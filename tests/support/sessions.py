@@ -25,7 +25,7 @@ from anafi_mav.mavlink import dialect as newer
 from anafi_mav.sim.world.faults import Impairment
 from support import setpoints
 from support.ftp import LIST, OPEN, READ, RESET, TERMINATE, Ftp
-from support.mav import NAN, Client
+from support.mav import NAN, Client, kind_of
 from support.missions import LAND as LAND_ITEM
 from support.missions import PLACE, RTL, takeoff, way
 from support.params import fetch, send_set
@@ -114,7 +114,7 @@ class Session:
             recipient = f"mavlink {client.sysid}/{client.compid} #{self._worlds}.{index}"
             whole: dict[tuple[tuple[int, int], str], list[tuple[float, dict[str, Any]]]] = {}
             for at, message in client.received:
-                name = message.get_type()
+                name = kind_of(message)
                 source = (message.get_srcSystem(), message.get_srcComponent())
                 fields = {key: value for key, value in message.to_dict().items() if key != "mavpackettype"}
                 if name == FILES:

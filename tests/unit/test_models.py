@@ -58,7 +58,7 @@ def test_model_with_a_known_key_or_number_is_refused(change: dict[str, Any]) -> 
 
 
 @pytest.mark.usefixtures("_restored")
-def test_record_that_is_added_is_known_in_every_room() -> None:
+def test_added_model_is_known_in_every_room() -> None:
     models.add(scout(skycontrollers=(4,)))
     SIMULATED["scout"] = replace(SIMULATED["4k"], name="scout")
     assert ANNOUNCED[0x09FF].title == "ANAFI Scout"
@@ -73,7 +73,7 @@ def test_record_that_is_added_is_known_in_every_room() -> None:
 
 
 @pytest.mark.usefixtures("_restored")
-def test_simulated_model_without_figures_says_which_are_missing() -> None:
+def test_simulated_model_without_figures_names_the_missing_ones() -> None:
     models.add(scout())
     with pytest.raises(
         ConfigError, match=re.escape("no figures of 'scout': anafi_mav/sim/world/model.py lacks its entry")
@@ -84,7 +84,7 @@ def test_simulated_model_without_figures_says_which_are_missing() -> None:
 
 
 @pytest.mark.usefixtures("_restored")
-def test_simulated_model_whose_record_is_incomplete_says_what_is_missing() -> None:
+def test_simulated_model_with_incomplete_record_names_the_gaps() -> None:
     models.add(scout(lens=None, plan_figures=None))
     with pytest.raises(ValueError, match="scout: a simulated drone needs plan_figures and lens"):
         replace(SIMULATED["4k"], name="scout")
@@ -93,7 +93,7 @@ def test_simulated_model_whose_record_is_incomplete_says_what_is_missing() -> No
 
 
 @pytest.mark.parametrize("name", ["ua", "bebop"])
-def test_model_that_is_not_simulated_is_refused(name: str) -> None:
+def test_model_without_simulation_is_refused(name: str) -> None:
     with pytest.raises(ConfigError, match=f"expected 4k, thermal, usa or ai, got '{name}'"):
         configured(name)
     with pytest.raises(ConfigError, match=f"expected one of 4k, thermal, usa, ai, got '{name}'"):
@@ -105,7 +105,7 @@ def test_plan_of_a_model_without_figures_is_not_checked() -> None:
         check(Plan((Item(WAYPOINT, 3, (0.0, None, None, None, 48.0, 2.0, 20.0)),)), models.MODELS["ua"])
 
 
-def test_unknown_number_has_a_record_that_assumes_nothing() -> None:
+def test_unknown_product_number_gets_a_neutral_record() -> None:
     unknown = models.unknown(0x0ABC)
     assert (unknown.key, unknown.title, unknown.plan_version) == ("0x0abc", "unknown model", None)
     assert (unknown.lens, unknown.battery_cells, unknown.firmware) == (None, None, ())

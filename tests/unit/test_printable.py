@@ -71,7 +71,7 @@ def test_log_line_of_a_peer_cannot_forge_another() -> None:
     assert "%(levelname)s" in FORMAT
 
 
-def test_log_of_an_exception_keeps_its_lines_and_cleans_them() -> None:
+def test_exception_log_keeps_its_lines_cleaned() -> None:
     stream = io.StringIO()
     handler = logging.StreamHandler(stream)
     handler.setFormatter(CleanFormatter(FORMAT))
@@ -86,7 +86,7 @@ def test_log_of_an_exception_keeps_its_lines_and_cleans_them() -> None:
     assert lines[-1] == r"ValueError: \x1b[2J"
 
 
-def test_log_of_a_refusal_ten_times_a_second_is_throttled() -> None:
+def test_refusal_logged_ten_times_a_second_is_throttled() -> None:
     refusal = "%s: Goto refused: %d m beyond the fence"
     many = [(0.1 * n, logging.WARNING, refusal, ("alpha", n)) for n in range(50)]
     lines = log_of(
@@ -103,7 +103,7 @@ def test_log_of_messages_is_never_throttled() -> None:
     assert log_of([(0.0, logging.DEBUG, "same", ())] * 3) == ["DEBUG same"] * 3
 
 
-async def test_log_line_of_code_that_knows_no_drone_names_it() -> None:
+async def test_log_line_without_drone_argument_names_the_drone() -> None:
     """What a drone's task starts and what its sockets bring is about that drone."""
     stream = io.StringIO()
     handler = logging.StreamHandler(stream)

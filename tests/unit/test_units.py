@@ -61,7 +61,7 @@ def test_quaternions(euler: tuple[float, float, float], quaternion: tuple[float,
 
 
 @pytest.mark.parametrize("broken", [(0.0, 0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 0.0), (math.inf, 0.0, 0.0, 0.0)])
-def test_quaternion_that_is_no_rotation_raises(broken: tuple[float, float, float, float]) -> None:
+def test_quaternion_without_rotation_raises(broken: tuple[float, float, float, float]) -> None:
     with pytest.raises(ValueError, match="not a rotation"):
         units.euler_from_quaternion(*broken)
 

@@ -43,6 +43,7 @@ class Status(enum.IntEnum):
     UNSUPPORTED_TRANSPORT = 461
     INTERNAL_ERROR = 500
     NOT_IMPLEMENTED = 501
+    SERVICE_UNAVAILABLE = 503
     VERSION_NOT_SUPPORTED = 505
 
 
@@ -61,6 +62,7 @@ REASONS = {
     Status.UNSUPPORTED_TRANSPORT: "Unsupported Transport",
     Status.INTERNAL_ERROR: "Internal Server Error",
     Status.NOT_IMPLEMENTED: "Not Implemented",
+    Status.SERVICE_UNAVAILABLE: "Service Unavailable",
     Status.VERSION_NOT_SUPPORTED: "RTSP Version Not Supported",
 }
 
@@ -99,7 +101,7 @@ class Response:
     headers: Headers = ()
     body: bytes = b""
     reason: str = ""
-    """As received; `encode` writes the standard's own."""
+    """For people; empty: `encode` writes the standard's own."""
 
     def header(self, name: str) -> str | None:
         """The first header of that name, in whatever case."""
@@ -119,8 +121,27 @@ class MalformedRtsp:
     reason: str
 
 
+@dataclass(frozen=True)
+class InterleavedData:
+    """A packet of RTP or RTCP inside the RTSP connection (RFC 2326 10.12)."""
+
+    channel: int
+    data: bytes
+
+
 Message = RtspRequest | Response
-Event = RtspRequest | Response | MalformedRtsp
+Event = RtspRequest | Response | InterleavedData | MalformedRtsp
+
+_DOLLAR = 0x24
+_FRAME_HEAD = 4
+"""Bytes before an interleaved packet: "$", channel, and its length in 16 bits."""
+
+
+def encode_interleaved(channel: int, data: bytes) -> bytes:
+    """Return a packet as it travels inside the RTSP connection."""
+    if not 0 <= channel <= 0xFF or len(data) > 0xFFFF:
+        raise LocalProtocolError(f"{len(data)} bytes on channel {channel}")
+    return bytes((_DOLLAR, channel)) + len(data).to_bytes(2, "big") + data
 
 
 def encode(message: Message) -> bytes:
@@ -131,7 +152,7 @@ def encode(message: Message) -> bytes:
     if isinstance(message, RtspRequest):
         first = f"{message.method} {message.uri} {VERSION}"
     else:
-        reason = REASONS.get(message.status) or message.reason or "Unknown"  # type: ignore[call-overload]
+        reason = message.reason or REASONS.get(message.status) or "Unknown"  # type: ignore[call-overload]
         first = f"{VERSION} {message.status:d} {reason}"
     lines = [first, *(f"{name}: {value}" for name, value in message.headers)]
     if message.body:
@@ -142,9 +163,11 @@ def encode(message: Message) -> bytes:
 
 
 class MessageReader:
-    """Cuts a stream of bytes into messages."""
+    """Cuts a stream of bytes into messages, and into the packets between them."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, interleaved: bool = False) -> None:
+        """Create a reader; with `interleaved` packets of RTP and RTCP may stand between messages."""
+        self._interleaved = interleaved
         self._buffer = bytearray()
         self._head: tuple[Message, int] | None = None
         """A message whose body is awaited, and how long that is."""
@@ -168,6 +191,8 @@ class MessageReader:
         if self._head is None:
             # Empty lines between messages are to be ignored (RFC 2326 4.1).
             self._buffer = self._buffer.lstrip(b"\r\n")
+            if self._interleaved and self._buffer[:1] == b"$":
+                return self._packet()
             if self._buffer and not 0x41 <= self._buffer[0] <= 0x5A:
                 return MalformedRtsp(Status.BAD_REQUEST, "no message begins so")
             end = re.search(rb"\r?\n\r?\n", self._buffer[: MAX_HEAD + 4])
@@ -194,6 +219,16 @@ class MessageReader:
         del self._buffer[:size]
         self._head = None
         return replace(message, body=body)
+
+    def _packet(self) -> InterleavedData | None:
+        if len(self._buffer) < _FRAME_HEAD:
+            return None
+        size = int.from_bytes(self._buffer[2:_FRAME_HEAD], "big")
+        if len(self._buffer) < _FRAME_HEAD + size:
+            return None
+        packet = InterleavedData(self._buffer[1], bytes(self._buffer[_FRAME_HEAD : _FRAME_HEAD + size]))
+        del self._buffer[: _FRAME_HEAD + size]
+        return packet
 
 
 def parse_head(head: bytes) -> Message | MalformedRtsp:
@@ -242,6 +277,8 @@ class RtspTransport:
     """(RTP, RTCP)."""
     server_ports: tuple[int, int] | None = None
     ssrc: int | None = None
+    channels: tuple[int, int] | None = None
+    """(RTP, RTCP) inside the RTSP connection."""
     others: tuple[tuple[str, str], ...] = field(default=())
     """Further parameters: "destination", "source", "mode", …"""
 
@@ -249,6 +286,8 @@ class RtspTransport:
 def format_transport(transport: RtspTransport) -> str:
     pieces = [f"RTP/AVP/{transport.lower}", "unicast" if transport.unicast else "multicast"]
     pieces += [f"{key}={value}" if value else key for key, value in transport.others]
+    if transport.channels:
+        pieces.append("interleaved={}-{}".format(*transport.channels))
     if transport.client_ports:
         pieces.append("client_port={}-{}".format(*transport.client_ports))
     if transport.server_ports:
@@ -279,6 +318,8 @@ def parse_transport(value: str) -> list[RtspTransport]:
                 transport = replace(transport, client_ports=_ports(text))
             elif key == "server_port":
                 transport = replace(transport, server_ports=_ports(text))
+            elif key == "interleaved":
+                transport = replace(transport, channels=_channels(text))
             elif key == "ssrc" and re.fullmatch(r"[0-9A-Fa-f]{1,8}", text):
                 transport = replace(transport, ssrc=int(text, 16))
             elif key and key != "multicast":
@@ -292,6 +333,13 @@ def _ports(text: str) -> tuple[int, int] | None:
     rtp = _number(first)
     rtcp = _number(second) if second else rtp and rtp + 1
     return (rtp, rtcp) if rtp and rtcp and rtp < 1 << 16 and rtcp < 1 << 16 else None
+
+
+def _channels(text: str) -> tuple[int, int] | None:
+    first, _, second = text.partition("-")
+    rtp = _number(first)
+    rtcp = _number(second) if second else rtp if rtp is None else rtp + 1
+    return (rtp, rtcp) if rtp is not None and rtcp is not None and rtp <= 0xFF and rtcp <= 0xFF else None
 
 
 def format_session(id: str, timeout: int | None = None) -> str:
@@ -378,11 +426,13 @@ def split_url(url: str) -> tuple[str, int, str] | None:
 
     None when it is not such a URL.
     """
-    match = re.fullmatch(r"rtsp://(?:[^@/]*@)?([^/:@]+)(?::([0-9]{1,5}))?(?:/(.*))?", url)
+    match = re.fullmatch(
+        r"rtsp://(?:[^@/]*@)?(?:\[([0-9A-Fa-f:.%\w]+)\]|([^/:@\[\]]+))(?::([0-9]{1,5}))?(?:/(.*))?", url
+    )
     if match is None:
         return None
-    port = int(match[2]) if match[2] else DEFAULT_PORT
-    return (match[1], port, match[3] or "") if 0 < port < 1 << 16 else None
+    port = int(match[3]) if match[3] else DEFAULT_PORT
+    return (match[1] or match[2], port, match[4] or "") if 0 < port < 1 << 16 else None
 
 
 def join_url(base: str, control: str) -> str:

@@ -116,7 +116,7 @@ class RtspClient:
                         return
                     if isinstance(event, Response):
                         self._answered(event)
-                    else:
+                    elif isinstance(event, RtspRequest):
                         self._asks(event)
             self._end(LinkLost("the drone's video server closed the connection"))
         except OSError as error:

@@ -253,11 +253,11 @@ class FlightPlanWriter:
         if item.frame in (RELATIVE, RELATIVE_INT):
             return value
         if item.frame in (TERRAIN, TERRAIN_INT):
-            self.refuse("its height is above the terrain, which the drone does not know", kind=FaultKind.FRAME)
+            self.refuse("heights above terrain are unsupported", kind=FaultKind.FRAME)
         if item.frame not in (GLOBAL, GLOBAL_INT):
-            self.refuse(f"frame {item.frame} is none of a place on earth", kind=FaultKind.FRAME)
+            self.refuse(f"frame {item.frame} is not global", kind=FaultKind.FRAME)
         if self._amsl is None:
-            problem = "its height is above mean sea level, and that of the take-off point is not known"
+            problem = "height above mean sea level, but that of the take-off point is unknown"
             raise UnknownHeight("mission", problem, self.item)
         return value - self._amsl
 
@@ -271,9 +271,9 @@ class FlightPlanWriter:
         if (latitude or 0.0, longitude or 0.0) == (0.0, 0.0):
             return False
         if latitude is None or not abs(latitude) <= 90.0:
-            self.refuse("it has no latitude" if latitude is None else f"{latitude:g} is no latitude", 5)
+            self.refuse("no latitude" if latitude is None else f"invalid latitude {latitude:g}", 5)
         if longitude is None or not abs(longitude) <= 180.0:
-            self.refuse("it has no longitude" if longitude is None else f"{longitude:g} is no longitude", 6)
+            self.refuse("no longitude" if longitude is None else f"invalid longitude {longitude:g}", 6)
         return True
 
     def destination(self, item: Item) -> Point:
@@ -408,7 +408,7 @@ class FlightPlanWriter:
     def end_modes(self) -> None:
         """Nothing is photographed any more before the mode is set again, or before the end."""
         if self._mode_wanted is not None:
-            what = "the camera's mode changes only with a photo or video, and none comes after it"
+            what = "the camera mode changes only with a photo or video, and none follows"
             self.notes[Loss(what, self._mode_wanted)] = None
         self._mode_wanted = None
 
@@ -444,7 +444,7 @@ class FlightPlanWriter:
 
     def film(self) -> None:
         if self.settings.photos is not None:
-            self.refuse("photos are being taken, and the camera does one of the two", kind=FaultKind.PLAN)
+            self.refuse("video during photos: the camera does one at a time", kind=FaultKind.PLAN)
         self._mode_wanted = None
         self.line(mav_enums.MAV_CMD_VIDEO_START_CAPTURE)
         self.settings = replace(self.settings, films=True)
@@ -460,9 +460,9 @@ class FlightPlanWriter:
     def _idle(self, what: str) -> None:
         """Refuse what the camera cannot begin now."""
         if self.settings.films:
-            self.refuse(f"a {what} while the video runs: the camera does one of the two", kind=FaultKind.PLAN)
+            self.refuse(f"{what} during a video: the camera does one at a time", kind=FaultKind.PLAN)
         if self.settings.photos is not None:
-            self.refuse(f"a {what} while photos are being taken: end them before", kind=FaultKind.PLAN)
+            self.refuse(f"{what} during photos: stop them first", kind=FaultKind.PLAN)
         self._mode_wanted = None
 
     def _many(self, mode: float, step: float, count: float) -> None:

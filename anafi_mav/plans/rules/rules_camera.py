@@ -21,11 +21,11 @@ _UNSET = frozenset({None, 0.0, -1.0})
 
 
 def _camera(writer: FlightPlanWriter, item: Item, number: int) -> None:
-    only(writer, item, number, "the flight plan's camera is component 100, not this", _CAMERAS)
+    only(writer, item, number, "only the main camera, component 100, is supported", _CAMERAS)
 
 
 def _gimbal(writer: FlightPlanWriter, item: Item, number: int) -> None:
-    only(writer, item, number, "the gimbal is component 154, not this", _GIMBALS)
+    only(writer, item, number, "the gimbal is device 1, not this", _GIMBALS)
 
 
 # What is looked at.
@@ -33,7 +33,7 @@ def _gimbal(writer: FlightPlanWriter, item: Item, number: int) -> None:
 
 def _look(writer: FlightPlanWriter, item: Item) -> None:
     if not writer.names_place(item):
-        writer.refuse("it has no place", 5)
+        writer.refuse("no place", 5)
     latitude, longitude = item.params[4:6]
     writer.look_at(Point(latitude or 0.0, longitude or 0.0, writer.height(item) or 0.0))
 
@@ -47,7 +47,7 @@ def _roi_beside(writer: FlightPlanWriter, item: Item) -> None:
     _gimbal(writer, item, 1)
     pitch, roll, yaw = item.params[4:]
     if roll not in (None, 0.0):
-        writer.refuse("a flight plan does not roll the camera", 6)
+        writer.refuse("camera roll is unsupported", 6)
     writer.look_ahead()
     writer.look_beside(yaw or 0.0)
     _tilt(writer, pitch or 0.0, 5)
@@ -68,10 +68,10 @@ def _look_ahead(writer: FlightPlanWriter) -> None:
 def _roi(writer: FlightPlanWriter, item: Item) -> None:
     mode = item.params[0]
     if mode not in (None, 0.0, float(mav_enums.MAV_ROI_LOCATION)):
-        writer.refuse("only a place can be looked at, no way point and no target", 1)
+        writer.refuse("only a place can be a region of interest", 1)
     if writer.numbers_regions:
         if not writer.names_place(item):
-            writer.refuse("it has no place", 5)
+            writer.refuse("no place", 5)
         writer.height(item)
         return
     if mode or writer.names_place(item):
@@ -86,9 +86,9 @@ def _view_mode(writer: FlightPlanWriter, item: Item) -> None:
         writer.view(mode, gimbal)
         return
     if mode != 2.0:
-        writer.refuse("there is no such view mode", 1)
+        writer.refuse("unknown view mode", 1)
     if number is None or not number.is_integer() or not 0 <= number < len(writer.regions):
-        writer.refuse("it looks at a region that is not there", 2)
+        writer.refuse("unknown region of interest", 2)
     _look(writer, writer.regions[int(number)])
 
 
@@ -100,7 +100,7 @@ def _tilt(
 ) -> None:
     lowest, highest = _TILT[writer.version]
     if pitch is not None and not lowest <= pitch <= highest:
-        writer.refuse(f"the camera tilts from {lowest:g} to {highest:g} deg, not to {pitch:g}", number)
+        writer.refuse(f"pitch of {pitch:g} deg, the camera has {lowest:g} to {highest:g} deg", number)
     if writer.settings.roi is not None:
         writer.look_ahead()
     writer.aim(pitch, roll, yaw)
@@ -113,19 +113,19 @@ def _mount(writer: FlightPlanWriter, item: Item) -> None:
         _tilt(writer, 0.0, 1, 0.0, 0.0)
         return
     if mode not in (None, float(mav_enums.MAV_MOUNT_MODE_RETRACT), float(mav_enums.MAV_MOUNT_MODE_MAVLINK_TARGETING)):
-        writer.refuse("the gimbal is aimed by angles only", 7)
+        writer.refuse("only angles are supported", 7)
     if mode == mav_enums.MAV_MOUNT_MODE_RETRACT:
-        writer.say("the gimbal cannot be put away: it is aimed")
+        writer.say("the gimbal cannot retract: it is aimed")
     if writer.version == 1:
-        only(writer, item, 2, "the flight plan does not roll the camera")
-        only(writer, item, 3, "the camera does not turn to the side: turn the drone")
+        only(writer, item, 2, "camera roll is unsupported")
+        only(writer, item, 3, "the camera does not pan: turn the drone")
     _tilt(writer, pitch, 1, roll, yaw)
 
 
 def _mount_mode(writer: FlightPlanWriter, item: Item) -> None:
     mode = item.params[0]
     if mode not in (None, 0.0, 1.0, float(mav_enums.MAV_MOUNT_MODE_MAVLINK_TARGETING)):
-        writer.refuse("the gimbal is aimed by angles only", 1)
+        writer.refuse("only angles are supported", 1)
     if mode == mav_enums.MAV_MOUNT_MODE_NEUTRAL:
         _tilt(writer, 0.0, 1, 0.0, 0.0)
 
@@ -133,18 +133,18 @@ def _mount_mode(writer: FlightPlanWriter, item: Item) -> None:
 def _pitch_yaw(writer: FlightPlanWriter, item: Item) -> None:
     pitch, yaw, _, _, flags = item.params[:5]
     _gimbal(writer, item, 7)
-    only(writer, item, 3, "a flight plan aims at an angle, it does not turn with a speed")
-    only(writer, item, 4, "a flight plan aims at an angle, it does not turn with a speed")
+    only(writer, item, 3, "gimbal rates are unsupported")
+    only(writer, item, 4, "gimbal rates are unsupported")
     bits = int(flags or 0.0)
     if bits & (mav_enums.GIMBAL_MANAGER_FLAGS_RETRACT | mav_enums.GIMBAL_MANAGER_FLAGS_NEUTRAL):
         _tilt(writer, 0.0, 1, 0.0, 0.0)
         if bits & mav_enums.GIMBAL_MANAGER_FLAGS_RETRACT:
-            writer.say("the gimbal cannot be put away: it looks ahead")
+            writer.say("the gimbal cannot retract: it looks ahead")
         return
     earth = bits & (mav_enums.GIMBAL_MANAGER_FLAGS_YAW_LOCK | mav_enums.GIMBAL_MANAGER_FLAGS_YAW_IN_EARTH_FRAME)
     if yaw is not None and (earth or (yaw != 0.0 and writer.version == 1)):
-        writer.refuse("the camera looks where the drone's nose does: turn the drone" if writer.version == 1
-                   else "the camera is aimed from the drone's nose, not from north", 2)  # fmt: skip
+        writer.refuse("the camera does not pan: turn the drone" if writer.version == 1
+                   else "the camera's yaw from north is unsupported", 2)  # fmt: skip
     _tilt(writer, pitch, 1, None, yaw)
 
 
@@ -158,15 +158,15 @@ def _gimbal_owner(writer: FlightPlanWriter, item: Item) -> None:
 def _camera_mode(writer: FlightPlanWriter, item: Item) -> None:
     _camera(writer, item, 1)
     if item.params[1] not in (0.0, 1.0, 2.0):
-        writer.refuse("there is no such camera mode", 2)
+        writer.refuse("unknown camera mode", 2)
     writer.want_mode()
 
 
 def _still_mode(writer: FlightPlanWriter, item: Item) -> None:
     mode, step, form = item.params[:3]
     if mode not in (0.0, 1.0):
-        writer.refuse("photos are taken by time or by distance", 1)
-    only(writer, item, 3, "there is no such format of photos", _FORMATS)
+        writer.refuse("photos need an interval or a distance", 1)
+    only(writer, item, 3, "unknown photo format", _FORMATS)
     writer.set_still(mode, step or 0.0, form or 0.0)
 
 
@@ -184,14 +184,14 @@ def _photos(writer: FlightPlanWriter, item: Item) -> None:
     interval, count = item.params[1:3]
     _camera(writer, item, 1)
     if count is None or count < 0.0 or not count.is_integer():
-        writer.refuse("it does not say how many photos", 3)
+        writer.refuse("no number of photos", 3)
     if count == 1.0:
         writer.photo()
     elif interval:
         _interval(writer, interval, 2)
         writer.photos_in_time(interval, count)
     elif writer.settings.still is None:
-        writer.refuse("it does not say how often", 2)
+        writer.refuse("no interval", 2)
     elif writer.settings.still[0] == 1.0:
         _distance(writer, writer.settings.still[1], 2)
         writer.photos_on_the_way(writer.settings.still[1], count)
@@ -209,7 +209,7 @@ def _trigger_distance(writer: FlightPlanWriter, item: Item) -> None:
     metres, shutter, at_once = item.params[:3]
     _camera(writer, item, 4)
     if metres is None or metres < 0.0:
-        writer.refuse("it does not say how far apart", 1)
+        writer.refuse("no distance", 1)
     if metres == 0.0:
         writer.stop_photos()
         if at_once:
@@ -217,9 +217,9 @@ def _trigger_distance(writer: FlightPlanWriter, item: Item) -> None:
         return
     _distance(writer, metres, 1)
     if shutter not in _UNSET:
-        writer.say(f"the camera chooses its shutter time itself, not {shutter:g} ms")
+        writer.say(f"shutter time of {shutter:g} ms is ignored")
     if not at_once:
-        writer.say("the first photo is taken at once")
+        writer.say("the first photo is taken immediately")
     writer.photos_on_the_way(metres, 0.0)
 
 
@@ -230,15 +230,15 @@ def _trigger_interval(writer: FlightPlanWriter, item: Item) -> None:
         return
     _interval(writer, (period or 0.0) / 1000.0, 1)
     if shutter not in _UNSET:
-        writer.say(f"the camera chooses its shutter time itself, not {shutter:g} ms")
+        writer.say(f"shutter time of {shutter:g} ms is ignored")
     writer.photos_in_time((period or 0.0) / 1000.0, 0.0)
 
 
 def _digicam(writer: FlightPlanWriter, item: Item) -> None:
-    for number, what in ((1, "there is no lens to be shown"), (2, "zoom by SET_CAMERA_ZOOM"),
-                         (3, "zoom by SET_CAMERA_ZOOM"), (4, "a flight plan cannot focus")):  # fmt: skip
+    for number, what in ((1, "lens control is unsupported"), (2, "zoom by SET_CAMERA_ZOOM"),
+                         (3, "zoom by SET_CAMERA_ZOOM"), (4, "focus is unsupported")):  # fmt: skip
         only(writer, item, number, what)
-    only(writer, item, 5, "there is no such shooting command", frozenset({None, 0.0, 1.0}))
+    only(writer, item, 5, "unknown shooting command", frozenset({None, 0.0, 1.0}))
     if item.params[4] == 1.0:
         writer.photo()
 
@@ -255,7 +255,7 @@ def _stop_video(writer: FlightPlanWriter, item: Item) -> None:
 
 def _panorama(writer: FlightPlanWriter, item: Item) -> None:
     if not item.params[0] and not item.params[1]:
-        writer.refuse("its angles are nothing", 1)
+        writer.refuse("no angles", 1)
     writer.panorama(*item.params[:4])
 
 
@@ -263,15 +263,15 @@ def _zoom(writer: FlightPlanWriter, item: Item) -> None:
     kind, value = item.params[:2]
     _camera(writer, item, 3)
     if kind != float(mav_enums.ZOOM_TYPE_RANGE):
-        writer.refuse("only a zoom range in percent can be flown", 1)
+        writer.refuse("only a zoom range in percent is supported", 1)
     if value is None or not 0.0 <= value <= 100.0:
-        writer.refuse("a zoom range is from 0 to 100 %", 2)
+        writer.refuse("zoom range is not 0 to 100 %", 2)
 
 
 _EXACT, _NEARLY, _STEPPED = Fidelity.EXACT, Fidelity.APPROXIMATED, Fidelity.STEPPED
 
 _ONE_CAMERA = "Another camera than the main one (0, 1 or 100) is refused."
-_ONE_GIMBAL = "Another gimbal than the one (0, 1 or 154) is refused."
+_ONE_GIMBAL = "Another gimbal device than 0, 1 or 154, which all mean the one, is refused."
 
 CAMERA = (
     Rule(195, _EXACT, "Version 1: a numbered region of interest, and the view mode that looks at it. "

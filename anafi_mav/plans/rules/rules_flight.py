@@ -19,13 +19,13 @@ def _fly(writer: FlightPlanWriter, item: Item, heading: float | None, radius: fl
 def _waypoint(writer: FlightPlanWriter, item: Item) -> None:
     hold, radius, beside, heading = item.params[:4]
     if (hold or 0.0) < 0.0:
-        writer.refuse(f"it waits for {hold:g} s", 1)
+        writer.refuse(f"invalid wait of {hold:g} s", 1)
     if (radius or 0.0) < 0.0:
-        writer.refuse(f"a radius of {radius:g} m", 2)
+        writer.refuse(f"invalid radius of {radius:g} m", 2)
     if not writer.names_place(item):
-        writer.say("it names no place: it is where the drone is then")
+        writer.say("no place: the drone's position is used")
     if beside:
-        writer.say(f"it is flown over, not passed at {abs(beside):g} m")
+        writer.say(f"flown over, not passed at {abs(beside):g} m")
     _fly(writer, item, heading, radius)
     writer.wait(hold or 0.0)
 
@@ -37,7 +37,7 @@ def _loiter(writer: FlightPlanWriter, item: Item) -> None:
 def _loiter_time(writer: FlightPlanWriter, item: Item) -> None:
     seconds = item.params[0] or 0.0
     if seconds < 0.0:
-        writer.refuse(f"it waits for {seconds:g} s", 1)
+        writer.refuse(f"invalid wait of {seconds:g} s", 1)
     _fly(writer, item, None)
     writer.wait(seconds)
 
@@ -50,9 +50,9 @@ def _take_off(writer: FlightPlanWriter, item: Item) -> None:
     heading, height = item.params[3], writer.height(item) if item.params[6] else None
     away = writer.names_place(item)
     if height is None:
-        writer.say("it says no height: the drone rises as high as it does by itself")
+        writer.say("no height: the drone climbs to its default height")
     elif height < 0.0:
-        writer.refuse(f"it rises to {height:g} m above take-off", 7)
+        writer.refuse(f"invalid take-off height of {height:g} m above take-off", 7)
     else:
         up = replace(writer.place, height=max(height, writer.place.height))
         if height > writer.place.height or heading is not None:
@@ -65,9 +65,9 @@ def _take_off(writer: FlightPlanWriter, item: Item) -> None:
 def _land(writer: FlightPlanWriter, item: Item) -> None:
     precision, heading = item.params[1], item.params[3]
     if precision == mav_enums.PRECISION_LAND_MODE_REQUIRED:
-        writer.refuse("the drone cannot land by a mark on the ground", 2)
+        writer.refuse("precision landing is unsupported", 2)
     if precision:
-        writer.say("it lands without looking for a mark on the ground")
+        writer.say("lands without precision landing")
     if writer.names_place(item):
         latitude, longitude = item.params[4:6]
         over = Point(latitude or 0.0, longitude or 0.0, writer.place.height)
@@ -76,7 +76,7 @@ def _land(writer: FlightPlanWriter, item: Item) -> None:
         else:
             writer.fly(over, heading, None)
     elif heading:
-        writer.say(f"it lands with the heading that it has, not {heading:g} deg")
+        writer.say(f"lands with its current heading, not {heading:g} deg")
     writer.line(mav_enums.MAV_CMD_NAV_LAND)
 
 
@@ -90,16 +90,16 @@ def _return(writer: FlightPlanWriter, item: Item) -> None:
 def _delay(writer: FlightPlanWriter, item: Item) -> None:
     seconds = item.params[0]
     if seconds is None or seconds < 0.0:
-        writer.refuse("it waits for a time of day, which the drone cannot" if seconds == -1.0 else "it says no time", 1)
+        writer.refuse("waiting for a time of day is unsupported" if seconds == -1.0 else "no delay", 1)
     writer.wait(seconds)
 
 
 def _condition_delay(writer: FlightPlanWriter, item: Item) -> None:
     seconds = item.params[0] or 0.0
     if seconds < 0.0:
-        writer.refuse(f"it waits for {seconds:g} s", 1)
+        writer.refuse(f"invalid wait of {seconds:g} s", 1)
     if seconds:
-        writer.say("the drone waits where it is, not on the way to the next way point")
+        writer.say("the drone waits in place, not on the way to the next waypoint")
     writer.wait(seconds)
 
 
@@ -115,11 +115,11 @@ def _turn(writer: FlightPlanWriter, item: Item) -> None:
     """Only what the drone looks at then: the gateway turns it."""
     angle, _, way, reference = item.params[:4]
     if angle is None:
-        writer.refuse("it says no angle", 1)
+        writer.refuse("no angle", 1)
     if reference is not None and not (reference.is_integer() and 0.0 <= reference <= 0xFF):
-        writer.refuse(f"{reference:g} is neither relative nor absolute", 4)
+        writer.refuse(f"invalid reference {reference:g}", 4)
     if way not in (None, -1.0, 0.0, 1.0):
-        writer.refuse(f"{way:g} is no direction to turn in", 3)
+        writer.refuse(f"invalid direction {way:g}", 3)
     relative = is_relative(reference)
     writer.turn(-angle if relative and way == -1.0 else angle, relative=relative)
 
@@ -133,15 +133,15 @@ _SAME = -1.0
 def _speed(writer: FlightPlanWriter, item: Item) -> None:
     kind, speed, throttle, relative = item.params[:4]
     if kind not in (None, _AIRSPEED, _GROUNDSPEED):
-        writer.refuse("a flight plan has a speed over ground only, not one for climbing and sinking", 1)
+        writer.refuse("climb and descent speeds cannot be set", 1)
     if relative == 1.0:
-        writer.refuse("it says how much faster, not how fast", 4)
+        writer.refuse("relative speeds are unsupported", 4)
     if throttle not in (None, 0.0, _SAME):
-        writer.say(f"there is no throttle to be set to {throttle:g} %")
+        writer.say(f"throttle of {throttle:g} % is ignored")
     if speed == _SAME:
         return
     if speed is None or speed <= 0.0:
-        writer.refuse("it says no speed" if speed is None else f"it says a speed of {speed:g} m/s", 2)
+        writer.refuse("no speed" if speed is None else f"invalid speed of {speed:g} m/s", 2)
     writer.set_speed(_GROUNDSPEED if kind is None else kind, speed)
 
 

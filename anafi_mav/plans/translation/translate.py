@@ -77,8 +77,8 @@ class Cursor:
     jumps: tuple[tuple[int, int], ...]
     """Item of a jump, and how often it was taken."""
     settings: ItemSettings
-    anew: bool = False
-    """Photos and videos that the settings have are begun."""
+    restarts: bool = False
+    """True when photos and videos of the settings are started again."""
 
 
 @dataclass(frozen=True)
@@ -90,13 +90,13 @@ class TranslatedMission:
     notes: tuple[Loss, ...]
     """Differences from the mission."""
     rest: Cursor | None
-    """How it goes on when the parts have been flown: `translate` it with what is known then. None: it is over."""
+    """Cursor for the next `translate` after the parts have been flown; None at the end of the mission."""
     done: tuple[int, ...] = ()
-    """The items that are done before anything is flown; only where there are no parts, which else tell it."""
+    """Items completed before anything is flown, if there are no parts. Otherwise the parts list them."""
 
 
 def examine(items: Sequence[Item], version: Version) -> TranslationReport:
-    """Can a drone of this version fly the mission?"""
+    """Return the faults and approximations of a mission for drones of this version."""
     faults, said = _judged(items, version)
     faults = faults or _wrong_ways(items, version)
     if faults:
@@ -109,7 +109,7 @@ def examine(items: Sequence[Item], version: Version) -> TranslationReport:
     except TranslationRefused as error:  # by what came before it on the way, which is not what stands before it
         return TranslationReport((error.fault,), (), ())
     flown = _reached(items) if flight.rest else {*flight.done, *chain(*map(_done, flight.parts))}
-    never = [Loss("it is never reached", number) for number in range(len(items)) if number not in flown]
+    never = [Loss("never reached", number) for number in range(len(items)) if number not in flown]
     # Of a long mission, only the beginning has been flown here.
     notes = dict.fromkeys([*flight.notes, *(loss for loss in said if flight.rest and loss.item in flown), *never])
     return TranslationReport((), tuple(notes), tuple(_stepped(items, flown, flight)))
@@ -167,13 +167,13 @@ def _wrong_item(writer: FlightPlanWriter, item: Item, count: int) -> Translation
     if row is None or row.verdict is Fidelity.REFUSED:
         name = Rule(item.command, Fidelity.REFUSED, "").name
         return TranslationFault(
-            writer.item, f"{name}: {row.why if row else 'no flight plan has it'}", FaultKind.COMMAND
+            writer.item, f"{name}: {row.why if row else 'unsupported in flight plans'}", FaultKind.COMMAND
         )
     for number, value in enumerate(item.params, 1):
         if value is not None and not math.isfinite(value):
-            return TranslationFault(writer.item, f"{value} is no number", FaultKind.PARAM, number)
+            return TranslationFault(writer.item, f"param{number} is not a number", FaultKind.PARAM, number)
     if not item.autocontinue:
-        return TranslationFault(writer.item, "it waits to be continued, which the drone does not", FaultKind.COMMAND)
+        return TranslationFault(writer.item, "autocontinue 0 is unsupported", FaultKind.COMMAND)
     if item.command == DO_JUMP:
         return _wrong_jump(writer.item, item, count)
     try:
@@ -195,10 +195,10 @@ def _write(writer: FlightPlanWriter, item: Item) -> None:
 def _wrong_jump(number: int, item: Item, count: int) -> TranslationFault | None:
     target, often = item.params[:2]
     if target is None or not target.is_integer() or not 0 <= target < count:
-        return TranslationFault(number, "it jumps to an item that is not there", FaultKind.PARAM, 1)
+        return TranslationFault(number, "jump target does not exist", FaultKind.PARAM, 1)
     if often is None or not often.is_integer() or not _ENDLESS <= often <= MAX_JUMPS:
-        times = "nobody knows how often" if often is None else f"{often:g} times"
-        return TranslationFault(number, f"it jumps {times}", FaultKind.PARAM, 2)
+        reason = "no jump count" if often is None else f"invalid jump count {often:g}"
+        return TranslationFault(number, reason, FaultKind.PARAM, 2)
     return None
 
 
@@ -210,21 +210,19 @@ def _wrong_ways(items: Sequence[Item], version: Version) -> list[TranslationFaul
     faults = []
     if sum(max(item.params[1] or 0.0, 0.0) for item in items if item.command == DO_JUMP) > MAX_JUMPS:
         last = max(number for number, item in enumerate(items) if item.command == DO_JUMP)
-        faults.append(TranslationFault(last, f"the mission jumps more than {MAX_JUMPS} times", FaultKind.PARAM, 2))
+        faults.append(TranslationFault(last, f"more than {MAX_JUMPS} jumps in the mission", FaultKind.PARAM, 2))
     for number, item in enumerate(items):
         if item.command == mav_enums.MAV_CMD_NAV_LAND and number in ways:
             after = next((other for other in range(number + 1, len(items)) if other not in ways), None)
             if after is not None:
-                faults.append(
-                    TranslationFault(after, "a landing stands before it, which ends the plan", FaultKind.PLAN)
-                )
+                faults.append(TranslationFault(after, "follows a landing, which ends the plan", FaultKind.PLAN))
                 break
     if not any(TABLE[items[number].command].moves for number in ways):
-        faults.append(TranslationFault(0, "nothing of the mission flies", FaultKind.PLAN))
+        faults.append(TranslationFault(0, "no item moves the drone", FaultKind.PLAN))
     for loop in _endless(items, ways):
         if not _flies(items, version, loop):
             last = max(number for number in loop if items[number].command == DO_JUMP)
-            faults.append(TranslationFault(last, "it goes round for ever and flies nowhere", FaultKind.PLAN))
+            faults.append(TranslationFault(last, "endless loop, no flight", FaultKind.PLAN))
     return faults
 
 
@@ -296,7 +294,7 @@ def _stepped(items: Sequence[Item], flown: set[int], flight: TranslatedMission) 
     if flight.rest is not None:
         jumps = [number for number, item in enumerate(items) if item.command == DO_JUMP and item.params[1]]
         what = f"flown in files of {MAX_LINES} lines"
-        yield Loss(f"{what}: the jump goes on for so long" if jumps else what, max(jumps) if jumps else None)
+        yield Loss(f"{what} because of the jump" if jumps else what, max(jumps) if jumps else None)
 
 
 # The way through it.
@@ -305,18 +303,18 @@ def _stepped(items: Sequence[Item], flown: set[int], flight: TranslatedMission) 
 def _cursor(items: Sequence[Item], version: Version, start: Start, first: int, jumps: Mapping[int, int]) -> Cursor:
     """Return the cursor at an item, with the settings of all items before it in the list."""
     if not 0 <= first < len(items):
-        raise PlanError("mission", f"it has {len(items)} items", first)
+        raise PlanError("mission", f"the mission has {len(items)} items", first)
     writer = FlightPlanWriter(version, start, items)
     writer.muted = True
     for writer.item, item in enumerate(items[:first]):
         if item.command != DO_JUMP:
             _write(writer, item)
-    return Cursor(first, tuple(sorted(jumps.items())), writer.settings, anew=True)
+    return Cursor(first, tuple(sorted(jumps.items())), writer.settings, restarts=True)
 
 
 def _fly(items: Sequence[Item], version: Version, start: Start, cursor: Cursor) -> TranslatedMission:
     writer = FlightPlanWriter(version, start, items, cursor.settings)
-    writer.films_again = cursor.anew
+    writer.films_again = cursor.restarts
     jumps = dict(cursor.jumps)
     index, visits, busy, lively = cursor.item, 0, 0, 0
     """`busy`: what has been flown and photographed by then, and `lively`: when it became more."""
@@ -335,7 +333,7 @@ def _fly(items: Sequence[Item], version: Version, start: Start, cursor: Cursor) 
                 following = target
             elif jumps.get(index, 0) < (often or 0.0):
                 if visits - lively > 2 * len(items) + MAX_IDLE:
-                    writer.refuse("it goes round and round and flies nowhere", kind=FaultKind.PLAN)
+                    writer.refuse("loop without flight", kind=FaultKind.PLAN)
                 jumps[index], following = jumps.get(index, 0) + 1, target
         else:
             if row.verdict is Fidelity.STEPPED:
@@ -371,7 +369,7 @@ def _rise(writer: FlightPlanWriter, items: Sequence[Item], first: int) -> None:
     writer.item = first
     number = _way_up(items, first)
     if number is None:
-        raise PlanError("mission", "on the ground it has nowhere to fly to", first)
+        raise PlanError("mission", "no place to fly to from the ground", first)
     if items[number].command == mav_enums.MAV_CMD_NAV_TAKEOFF:
         if any(TABLE[item.command].moves for item in items[first:number]):
             writer.say("the drone takes off first")
@@ -381,9 +379,9 @@ def _rise(writer: FlightPlanWriter, items: Sequence[Item], first: int) -> None:
     there = writer.destination(items[number])
     climbs = there.height > writer.place.height
     writer.say(
-        f"no item takes off: the drone rises straight to {there.height:g} m above take-off first"
+        f"no take-off item: the drone climbs to {there.height:g} m above take-off first"
         if climbs
-        else "no item takes off"
+        else "no take-off item"
     )
     writer.item = first
     writer.take_off(replace(writer.place, height=there.height) if climbs else None)

@@ -16,15 +16,14 @@ from typing import Any
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.command.actions import change_mode, flight_actions
 from anafi_mav.services.command_targets import UnsupportedFrame
 from anafi_mav.services.commands import (
-    EFFECT_OF_MODE,
     MODE_PROGRESS_AFTER,
     PROGRESS_AFTER,
     PROGRESS_EVERY,
     QUERY,
     Action,
+    ActionGroup,
     Command,
     CommandHistory,
     Definition,
@@ -36,9 +35,7 @@ from anafi_mav.services.commands import (
 )
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Query, Service, client_of
-from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported, text_of
-from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
 
 logger = logging.getLogger(__name__)
@@ -69,12 +66,13 @@ class _Running:
     """Client and command to acknowledge; None for messages without acknowledgement."""
     is_order: bool = True
     """A client has commanded it; neither the gateway began it, nor a stream of setpoints."""
+    group: ActionGroup = ActionGroup.FLIGHT
     replaced_by_order: bool = False
     """A newer order has ended it."""
 
 
 class CommandService(Service):
-    """COMMAND_LONG, COMMAND_INT, COMMAND_CANCEL and SET_MODE of one system."""
+    """COMMAND_LONG, COMMAND_INT and COMMAND_CANCEL of one component."""
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
@@ -101,19 +99,18 @@ class CommandService(Service):
         """True for a command that changes the vehicle's state, and is no query."""
         return command in self._actions
 
-    def actions(self) -> Mapping[int, Action]:
-        return flight_actions(self.host.vehicle)
+    def owns(self, command: int) -> bool:
+        """True for a command that this component has."""
+        return command in self._queries or command in self._actions
 
     def capabilities(self) -> int:
-        cut = dialect.MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION if self.host.vehicle.allow_kill else 0
-        return dialect.MAV_PROTOCOL_CAPABILITY_COMMAND_INT | cut
+        return dialect.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
 
     def messages(self) -> Mapping[int, MessageHandler]:
         return {
             dialect.MAVLINK_MSG_ID_COMMAND_LONG: lambda inbound: self._receive(inbound, from_long),
             dialect.MAVLINK_MSG_ID_COMMAND_INT: lambda inbound: self._receive(inbound, from_int),
             dialect.MAVLINK_MSG_ID_COMMAND_CANCEL: self._cancel,
-            dialect.MAVLINK_MSG_ID_SET_MODE: self._set_mode,
         }
 
     async def settle(self, limit: float = SETTLE) -> None:
@@ -141,10 +138,17 @@ class CommandService(Service):
         if self._running:
             await asyncio.wait(tuple(self._running))
 
-    def run(self, client: Hashable, work: Coroutine[Any, Any, None], *, is_order: bool = True) -> asyncio.Task[None]:
+    def run(
+        self,
+        client: Hashable,
+        work: Coroutine[Any, Any, None],
+        *,
+        is_order: bool = True,
+        group: ActionGroup = ActionGroup.FLIGHT,
+    ) -> asyncio.Task[None]:
         """Run an action of a message that has no acknowledgement; its refusal is sent as a text."""
-        self._history.forget(client)  # the vehicle was moved by other means than this client's newest command
-        return self._spawn(self._explained(work), _Running(client, None, is_order))
+        self._history.forget(client, group)  # this client used other means than its newest command
+        return self._spawn(self._explained(work), _Running(client, None, is_order, group))
 
     @property
     def replaced_by_order(self) -> bool:
@@ -153,19 +157,20 @@ class CommandService(Service):
         running = None if task is None else self._running.get(task)
         return running is not None and running.replaced_by_order
 
-    def end_others(self) -> list[asyncio.Task[None]]:
-        """Cancel all older running actions; their senders get CANCELLED.
+    def end_others(self, group: ActionGroup = ActionGroup.FLIGHT) -> list[asyncio.Task[None]]:
+        """Cancel all older running actions of a group; their senders get CANCELLED.
 
         A newer action than the calling one continues: it will replace this one.
         """
         current = asyncio.current_task()
-        others = list(itertools.takewhile(lambda task: task is not current, self._running))
+        older = itertools.takewhile(lambda task: task is not current, self._running)
+        others = [task for task in older if self._running[task].group is group]
         running = None if current is None else self._running.get(current)
         for task in others:
             if running is not None and running.is_order:
                 self._running[task].replaced_by_order = True
             task.cancel()
-        self._history.supersede(None if running is None else running.client)
+        self._history.supersede(None if running is None else running.client, group)
         return others
 
     def _receive(self, inbound: Inbound, decode: _Decode) -> None:
@@ -197,7 +202,8 @@ class CommandService(Service):
                 self._acknowledge(inbound, command.id, repeated)
             return
         execution = self._history.begin(command.client, command)
-        self._spawn(self._execute(inbound, execution), _Running(command.client, (inbound, execution)))
+        running = _Running(command.client, (inbound, execution), group=command.definition.group)
+        self._spawn(self._execute(inbound, execution), running)
 
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:
         command = execution.command
@@ -285,11 +291,3 @@ class CommandService(Service):
             ),
             inbound.channel,
         )
-
-    def _set_mode(self, inbound: Inbound) -> None:
-        """SET_MODE has no acknowledgement: the heartbeat shows the mode, a text the refusal."""
-        mode: FlightMode | None = flavour_of(inbound.channel).mode_of_number(inbound.message.custom_mode)
-        client, vehicle, now = client_of(inbound), self.host.vehicle, self.host.clock.monotonic()
-        is_hold = mode is not None and EFFECT_OF_MODE[mode] is Effect.HOLD
-        counted = not is_hold or vehicle.holds.arrive(client, now)
-        self.run(client, change_mode(vehicle, mode, Right(client, Extent.ALL, now, counted)))

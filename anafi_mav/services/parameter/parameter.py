@@ -56,7 +56,7 @@ class Parameter:
     group: str = "ANAFI"
     long: str = ""
     default: float | None = None
-    """Of the gateway's own settings; a drone does not tell its own."""
+    """Default of a setting of the gateway; a drone does not report those of its own settings."""
     put: Callable[[Host, float], None] | None = None
     """Sets it without further ado: of the gateway's own settings that outlive it."""
     volatile: bool = False

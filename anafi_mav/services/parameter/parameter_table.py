@@ -40,7 +40,7 @@ def _range(
     long: str = "",
     models: str = "all",
 ) -> Parameter:
-    """A setting that the drone reports with its range."""
+    """Return the parameter of a setting that the drone reports with its range."""
     return Parameter(
         name,
         ParamType.REAL32,
@@ -71,7 +71,7 @@ def _switch(
     long: str = "",
     models: str = "all",
 ) -> Parameter:
-    """A setting of the drone's that is on or off."""
+    """Return the parameter of a setting of the drone that is on or off."""
     return Parameter(
         name,
         ParamType.INT32,
@@ -99,7 +99,7 @@ MAX_TILT = _range(
     unit="deg",
     step=1.0,
     group=FLIGHT,
-    long="What full deflection of the sticks means, and how far setpoints may tilt the drone.",
+    long="Tilt at full stick deflection, and the largest tilt of setpoints.",
 )
 TILT_RATE = _range(
     "ANF_TILT_RATE",
@@ -142,7 +142,7 @@ HORIZONTAL_SPEED = _range(
     step=0.1,
     decimals=1,
     group=FLIGHT,
-    long="Firmware of later generations only; elsewhere a speed is said with each move (ANF_CRUISE_SPEED).",
+    long="Later firmware generations only. Otherwise each move carries its speed (ANF_CRUISE_SPEED).",
     models="none of these",
 )
 MAX_ALTITUDE = _range(
@@ -155,7 +155,7 @@ MAX_ALTITUDE = _range(
     step=1.0,
     decimals=1,
     group=FLIGHT,
-    long="The drone itself keeps below it, whatever it is told.",
+    long="The drone enforces it against every command.",
 )
 MAX_DISTANCE = _range(
     "ANF_MAX_DIST",
@@ -166,7 +166,7 @@ MAX_DISTANCE = _range(
     unit="m",
     step=10.0,
     group=FLIGHT,
-    long="Kept to while ANF_GEOFENCE is on.",
+    long="In force while ANF_GEOFENCE is on.",
 )
 GEOFENCE = _switch(
     "ANF_GEOFENCE",
@@ -178,7 +178,7 @@ GEOFENCE = _switch(
 )
 BANKED_TURN = _switch(
     "ANF_BANKED_TURN",
-    "The drone leans into a turn",
+    "The drone banks in a turn",
     lambda drone: drone.piloting.state.banked_turn,
     lambda drone: drone.piloting.set_banked_turn,
     events.BankedTurnChanged,
@@ -198,12 +198,12 @@ AVOIDANCE = _switch(
     lambda drone: drone.piloting.set_obstacle_avoidance,
     events.ObstacleAvoidanceStatus,
     group=FLIGHT,
-    long="Whether it shall. Whether it can at this moment depends on light and lens.",
+    long="Requested state. Availability depends on the light and on the stereo camera.",
     models="ai",
 )
 RETURN_ALTITUDE = _range(
     "ANF_RTH_ALT",
-    "Height that a return climbs to first",
+    "Height to which a return climbs first",
     lambda drone: drone.home.state.min_altitude,
     lambda drone: drone.home.set_min_altitude,
     events.ReturnMinAltitude,
@@ -214,7 +214,7 @@ RETURN_ALTITUDE = _range(
 )
 RETURN_END_ALTITUDE = _range(
     "ANF_RTH_END_ALT",
-    "Height at which a return ends that ends in hovering",
+    "Height of the hover at the end of a return",
     lambda drone: drone.home.state.ending_altitude,
     lambda drone: drone.home.set_ending_altitude,
     events.ReturnEndingAltitude,
@@ -226,7 +226,7 @@ RETURN_END_ALTITUDE = _range(
 RETURN_ENDING = Parameter(
     "ANF_RTH_END",
     ParamType.INT32,
-    "End of the drone's own returns",
+    "End of a return begun by the drone",
     read=lambda host: number(host.drone.home.state.ending),
     write=lambda host, value: host.drone.home.set_ending(RthEndingBehavior(int(value))),
     values={int(RthEndingBehavior.LANDING): "Landing", int(RthEndingBehavior.HOVERING): "Hovering"},
@@ -234,7 +234,8 @@ RETURN_ENDING = Parameter(
     present=lambda drone: drone.home.state.ending is not None,
     group=HOME,
     source=events.ReturnEnding.NAME,
-    long="Those that it begins by itself, and any when gateway or link dies on the way. Landing: any return lands.",
+    long="Applies to returns that the drone begins, and to every return if gateway or link is lost on the way. "
+    "Landing: every return lands.",
 )
 
 
@@ -260,7 +261,7 @@ RETURN_DELAY = Parameter(
 )
 RETURN_BY_ITSELF = _switch(
     "ANF_RTH_AUTO",
-    "The drone returns when its battery just suffices for it",
+    "The drone returns when its battery is just sufficient for the return",
     lambda drone: drone.home.state.by_itself,
     lambda drone: drone.home.set_by_itself,
     events.ReturnAutoTriggerMode,
@@ -280,11 +281,11 @@ MISSION_RETURN = _switch(
     lambda drone: drone.flight_plan.set_returns_on_disconnect,
     events.ReturnHomeOnDisconnectChanged,
     group=HOME,
-    long="Off: the drone flies the file that it has to its end. So it does when the gateway dies.",
+    long="Off: after link loss, or without the gateway, the drone flies its flight-plan file to the end.",
 )
 PRECISE_HOME = _switch(
     "ANF_RTH_PRECISE",
-    "A return looks for the picture of the take-off place",
+    "A return uses the picture of the take-off place",
     _precise,
     lambda drone: drone.home.set_precise,
     events.PreciseHomeModeChanged,
@@ -293,19 +294,19 @@ PRECISE_HOME = _switch(
 HOME_TYPE = Parameter(
     "ANF_HOME_TYPE",
     ParamType.INT32,
-    "Where home shall be",
+    "Preferred home",
     read=lambda host: number(host.drone.home.state.preferred_type),
     write=lambda host, value: host.drone.home.set_preferred_type(RthHomeType(int(value))),
     values={
         int(RthHomeType.TAKEOFF): "Take-off",
         int(RthHomeType.FOLLOWEE): "Followed target",
-        int(RthHomeType.CUSTOM): "A place of your own",
+        int(RthHomeType.CUSTOM): "Custom place",
         int(RthHomeType.PILOT): "Pilot",
     },
     updates=(events.PreferredHomeType,),
     present=lambda drone: drone.home.state.preferred_type is not None,
     group=HOME,
-    long="The drone uses it when it knows such a place, the take-off point otherwise. Not every model knows all kinds.",
+    long="The take-off point if the drone does not know that place. Some models support fewer kinds.",
     source=events.PreferredHomeType.NAME,
 )
 
@@ -354,7 +355,7 @@ def _takeoff_limits(host: Host) -> Limits:
 TAKEOFF_HEIGHT = Parameter(
     "ANF_TKOFF_ALT",
     ParamType.REAL32,
-    "Height of a take-off that names none",
+    "Height of a take-off without a height",
     read=lambda host: host.vehicle.takeoff.height,
     write=own(_put_takeoff_height),
     put=_put_takeoff_height,
@@ -382,8 +383,8 @@ HAND_LAUNCH = Parameter(
     values=OFF_ON,
     polled=True,
     group=GATEWAY,
-    long="Off: an ANAFI has no armed state, nothing turns until a take-off. On: arming starts the motors, which idle "
-    "until the drone leaves the hand.",
+    long="Off: the motors stay off until a take-off (an ANAFI has no armed state). On: arming starts the motors, "
+    "which idle until the drone leaves the hand.",
     default=0.0,
     source="gateway",
 )
@@ -416,7 +417,7 @@ def _climb_limits(host: Host) -> Limits | None:
 CRUISE_SPEED = Parameter(
     "ANF_CRUISE_SPEED",
     ParamType.REAL32,
-    "Speed over ground that moves keep to",
+    "Ground speed of moves",
     read=lambda host: host.vehicle.cruise_speed or 0.0,
     write=_set_cruise_speed,
     limits=lambda host: (0.0, MAX_CRUISE_SPEED),
@@ -425,14 +426,14 @@ CRUISE_SPEED = Parameter(
     step=0.1,
     decimals=1,
     group=GATEWAY,
-    long="0: the drone's own. MAV_CMD_DO_CHANGE_SPEED sets the same.",
+    long="0: the drone's default. MAV_CMD_DO_CHANGE_SPEED sets the same value.",
     default=0.0,
     source="gateway",
 )
 CLIMB_SPEED = Parameter(
     "ANF_CLIMB_SPEED",
     ParamType.REAL32,
-    "Vertical speed that moves keep to",
+    "Vertical speed of moves",
     read=lambda host: host.vehicle.climb_speed or 0.0,
     write=_set_climb_speed,
     limits=_climb_limits,
@@ -441,9 +442,9 @@ CLIMB_SPEED = Parameter(
     step=0.1,
     decimals=1,
     group=GATEWAY,
-    long="0: the drone's own. MAV_CMD_DO_CHANGE_SPEED sets the same.",
+    long="0: the drone's default. MAV_CMD_DO_CHANGE_SPEED sets the same value.",
     default=0.0,
-    source="gateway; up to the most that ANF_VERT_SPEED can be",
+    source="gateway; up to the maximum of ANF_VERT_SPEED",
 )
 
 
@@ -458,22 +459,22 @@ def _put_loss_time(host: Host, value: float) -> None:
 GCS_LOSS = Parameter(
     "ANF_GCS_LOSS",
     ParamType.INT32,
-    "What to do in the air when no ground station is heard any more",
+    "Action in the air when all ground stations are lost",
     read=lambda host: float(host.vehicle.gcs_loss.action),
     write=own(_put_loss_action),
     put=_put_loss_action,
     values={action.value: action.name.capitalize() for action in LossAction},
     polled=True,
     group=GATEWAY,
-    long="Once a ground station has been heard. Behind a Skycontroller, while nothing of ours flies the drone, a text "
-    "is all, even if its pilot does not hold it. When the drone's link was lost and is back, the time restarts.",
+    long="Only after a ground station has been heard. Behind a Skycontroller without an active flight task of the "
+    "gateway, only a text is sent. The time restarts when the drone's link is restored.",
     default=float(LossAction.NOTHING),
     source="gateway",
 )
 GCS_LOSS_TIME = Parameter(
     "ANF_GCS_LOSS_T",
     ParamType.REAL32,
-    "Silence of all ground stations that counts as their loss",
+    "Time without heartbeats of any ground station that counts as loss",
     read=lambda host: host.vehicle.gcs_loss.after,
     write=own(_put_loss_time),
     put=_put_loss_time,
@@ -489,7 +490,7 @@ GCS_LOSS_TIME = Parameter(
 
 
 def put_end_of_return(host: Host, value: float) -> None:
-    """Set what a commanded return ends in."""
+    """Set the end of a commanded return."""
     host.vehicle.return_end.ending = EndOfReturn(int(value))
 
 
@@ -501,15 +502,15 @@ def put_return_wait(host: Host, value: float) -> None:
 RETURN_LANDING = Parameter(
     "ANF_RTL_END",
     ParamType.INT32,
-    "End of a return that a client or the gateway commanded",
+    "End of a return commanded by a client or the gateway",
     read=lambda host: float(host.vehicle.return_end.ending),
     write=own(put_end_of_return),
     put=put_end_of_return,
     values={int(EndOfReturn.LAND): "Land", int(EndOfReturn.HOVER): "Hover"},
     polled=True,
     group=GATEWAY,
-    long="The gateway lands the drone above a home that is certain, else it hovers and a text gives the reason. "
-    "Nothing is written on the drone: ANF_RTH_END stays its own.",
+    long="The gateway lands the drone above a home that is certain. Otherwise the drone hovers, and a text gives the "
+    "reason. The drone's own ANF_RTH_END does not change.",
     default=float(EndOfReturn.LAND),
     source="gateway",
 )
@@ -526,7 +527,7 @@ RETURN_WAIT = Parameter(
     step=1.0,
     decimals=1,
     group=GATEWAY,
-    long=f"At least {SHORTEST_WAIT:g} s, also where this is less.",
+    long=f"At least {SHORTEST_WAIT:g} s, even if this is less.",
     default=SHORTEST_WAIT,
     source="gateway",
 )
@@ -539,7 +540,7 @@ def _put_guided_time(host: Host, value: float) -> None:
 GUIDED_TIME = Parameter(
     "ANF_GUIDED_T",
     ParamType.REAL32,
-    "Silence after which a velocity of ArduPilot's Guided ends in a hover",
+    "Timeout of velocity setpoints in ArduPilot's Guided; a hover follows",
     read=lambda host: host.vehicle.offboard.guided_timeout,
     write=own(_put_guided_time),
     put=_put_guided_time,
@@ -549,7 +550,8 @@ GUIDED_TIME = Parameter(
     step=0.1,
     decimals=1,
     group=GATEWAY,
-    long="Velocities and yaw rates alone; attitudes and accelerations last 0.5 s, as all does in PX4's Offboard.",
+    long="Velocities and yaw rates only. Attitudes, accelerations and all setpoints of PX4's Offboard time out after "
+    "0.5 s.",
     default=GUIDED_TIMEOUT,
     source="gateway",
 )
@@ -566,22 +568,22 @@ def _put_override_stick(host: Host, value: float) -> None:
 RC_OVERRIDE = Parameter(
     "ANF_RC_OVERRIDE",
     ParamType.INT32,
-    "What a joystick of PX4's clients takes the drone over from",
+    "Flight tasks that a joystick of PX4's clients overrides",
     read=lambda host: float(host.vehicle.manual.override.sources),
     write=own(_put_override),
     put=_put_override,
     values={0: "Nothing", 1: "Goto, mission, follow, orbit, return, landing", 2: "Offboard", 3: "All of these"},
     polled=True,
     group=GATEWAY,
-    long="A stick that leaves the middle after half a second there selects Position. The throttle alone does not. "
-    "Returns and landings only if a client commanded them. ArduPilot's clients have none, as in ArduCopter.",
+    long="A stick that is deflected after half a second at rest selects Position. The throttle alone does not. "
+    "Returns and landings only if a client commanded them. Not for ArduPilot's clients, as in ArduCopter.",
     default=float(Override.AUTO),
     source="gateway",
 )
 RC_OVERRIDE_STICK = Parameter(
     "ANF_RC_STICK_OV",
     ParamType.REAL32,
-    "Deflection from which a joystick takes over",
+    "Stick deflection of a joystick override",
     read=lambda host: host.vehicle.manual.override.threshold * 100.0,
     write=own(_put_override_stick),
     put=_put_override_stick,

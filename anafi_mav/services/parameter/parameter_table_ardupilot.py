@@ -42,9 +42,9 @@ from anafi_mav.vehicle.takeoff import AUTO_DISARM
 
 FACTS = "ArduPilot facts"
 
-UNTOLD = "An ANAFI does not report it."
+NOT_REPORTED = "An ANAFI does not report it."
 
-DRONE_WARNS = "0: ArduPilot's word for no threshold. The drone warns of a low battery by levels of its own."
+DRONE_WARNS = "0: no threshold (ArduPilot). The drone has its own levels of battery warnings."
 
 CM = 100.0
 """cm in a m, centidegrees in a degree."""
@@ -76,7 +76,7 @@ async def _set_final_altitude(host: Host, value: float) -> None:
 FINAL_ALTITUDE = Parameter(
     "RTL_ALT_FINAL",
     ParamType.INT16,
-    "Height at which a commanded return ends, 0: it lands",
+    "Height at the end of a commanded return; 0: it lands",
     read=_final_altitude,
     write=_set_final_altitude,
     limits=_final_limits,
@@ -130,8 +130,8 @@ def _fact(name: str, value: float, short: str, kind: ParamType = ParamType.INT8,
     return fact(name, value, short, kind, group=FACTS, source="fact", **more)
 
 
-def _untold(name: str, short: str, kind: ParamType = ParamType.REAL32, **more: object) -> Parameter:
-    return _fact(name, math.nan, short, kind, long=UNTOLD, **more)
+def _not_reported(name: str, short: str, kind: ParamType = ParamType.REAL32, **more: object) -> Parameter:
+    return _fact(name, math.nan, short, kind, long=NOT_REPORTED, **more)
 
 
 def _compass_offset(host: Host) -> float:
@@ -148,11 +148,11 @@ FACTS_ARDUPILOT: tuple[Parameter, ...] = (
     _fact("FRAME_CLASS", 1, "Frame: a quadrotor"),
     _fact("FRAME_TYPE", 1, "Frame: X"),
     _fact("ARMING_CHECK", 1, "Checks before arming: all", ParamType.INT32),
-    _fact("DISARM_DELAY", AUTO_DISARM, "Disarms when no take-off follows", unit="s"),
-    _untold("FENCE_MARGIN", "Distance to the fence that it keeps", unit="m"),
+    _fact("DISARM_DELAY", AUTO_DISARM, "Time from arming to disarming without a take-off", unit="s"),
+    _not_reported("FENCE_MARGIN", "Distance kept to the fence", unit="m"),
     _fact("FS_THR_ENABLE", 7, "Sticks lost: brake", values={7: "Brake"}),
-    _fact("FS_THR_VALUE", -1, "Throttle that means loss: none", ParamType.INT16),
-    _fact("BATT_MONITOR", 7, "The battery is watched: it tells its charge itself"),
+    _fact("FS_THR_VALUE", -1, "Throttle value of a lost radio: none", ParamType.INT16),
+    _fact("BATT_MONITOR", 7, "Battery monitor: the battery reports its charge"),
     Parameter(
         "BATT_CAPACITY",
         ParamType.INT32,
@@ -169,7 +169,7 @@ FACTS_ARDUPILOT: tuple[Parameter, ...] = (
         for level in ("LOW", "CRT")
         for unit, name in (("VOLT", "V"), ("MAH", "mAh"))
     ),
-    _untold("LAND_SPEED", "Speed of a landing", ParamType.INT16, unit="cm/s"),
+    _not_reported("LAND_SPEED", "Speed of a landing", ParamType.INT16, unit="cm/s"),
     _fact("COMPASS_DEV_ID", 1, "Compass: the drone has one", ParamType.INT32),
     _fact("COMPASS_DEV_ID2", 0, "Second compass: none", ParamType.INT32),
     _fact("COMPASS_DEV_ID3", 0, "Third compass: none", ParamType.INT32),
@@ -180,11 +180,11 @@ FACTS_ARDUPILOT: tuple[Parameter, ...] = (
         Parameter(
             f"COMPASS_OFS_{axis}",
             ParamType.REAL32,
-            "Compass offset: 0 while the drone demands a calibration",
+            "Compass offset: 0 while a calibration is required",
             _compass_offset,
             updates=(events.MagnetoCalibrationRequiredState,),
             group=FACTS,
-            long=UNTOLD,
+            long=NOT_REPORTED,
             source=events.MagnetoCalibrationRequiredState.NAME,
         )
         for axis in "XYZ"
@@ -194,10 +194,10 @@ FACTS_ARDUPILOT: tuple[Parameter, ...] = (
         for number in (2, 3)
         for axis in "XYZ"
     ),
-    *(_untold(f"INS_ACCOFFS_{axis}", "Accelerometer offset") for axis in "XYZ"),
+    *(_not_reported(f"INS_ACCOFFS_{axis}", "Accelerometer offset") for axis in "XYZ"),
     *(_fact(f"RCMAP_{axis}", channel, "Channel of RC_CHANNELS_OVERRIDE") for axis, channel in _CHANNELS.items()),
     *(
-        _fact(f"RC{channel}_{what}", value, "Of RC_CHANNELS_OVERRIDE", ParamType.INT16, unit="PWM")
+        _fact(f"RC{channel}_{what}", value, "PWM value of RC_CHANNELS_OVERRIDE", ParamType.INT16, unit="PWM")
         for channel in _CHANNELS.values()
         for what, value in (("MIN", 1000), ("TRIM", 1500), ("MAX", 2000))
     ),

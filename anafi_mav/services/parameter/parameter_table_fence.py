@@ -48,14 +48,14 @@ async def _set_action(host: Host, value: float) -> None:
 FENCE_ACTION = Parameter(
     "ANF_FENCE_ACTION",
     ParamType.INT32,
-    "What happens at the fence",
+    "Action at the fence",
     read=lambda host: float(_NUMBERS[host.vehicle.fence.action]),
     write=_set_action,
     put=_put_action,
     values={number: action.value.capitalize() for number, action in PX4_ACTIONS.items()},
     polled=True,
     group=GROUP,
-    long="With 0 the fence is told of and nothing else. A motor cut needs allow_kill.",
+    long="0: only a text is sent. A motor cut requires allow_kill.",
     default=float(_NUMBERS[Reaction.HOLD]),
     source="gateway",
 )
@@ -71,13 +71,13 @@ async def _enable(host: Host, value: float) -> None:
 FENCE_ENABLED = Parameter(
     "ANF_FENCE_ON",
     ParamType.INT32,
-    "The fence is in force when there is one",
+    "An uploaded fence is in force",
     read=lambda host: float(host.vehicle.fence.enabled),
     write=_enable,
     values=OFF_ON,
     polled=True,
     group=GROUP,
-    long="The drone's own ceiling holds in any case. MAV_CMD_DO_FENCE_ENABLE sets the same.",
+    long="The drone's own ceiling is always in force. MAV_CMD_DO_FENCE_ENABLE sets the same value.",
     default=1.0,
     source="gateway",
 )
@@ -90,14 +90,14 @@ def _put_types(host: Host, value: float) -> None:
 FENCE_TYPES = Parameter(
     "ANF_FENCE_TYPES",
     ParamType.INT32,
-    "Kinds of boundaries that are in force",
+    "Kinds of boundaries in force",
     read=lambda host: float(host.vehicle.fence.types),
     write=own(_put_types),
     put=_put_types,
     limits=lambda host: (0.0, float(EVERYTHING)),
     polled=True,
     group=GROUP,
-    long="Bits: 1 the drone's own ceiling, to which it keeps in any case, 2 circles around home, 4 all other zones, "
+    long="Bits: 1 the drone's own ceiling, which is always in force, 2 circles around home, 4 all other zones, "
     "8 the floor.",
     default=float(EVERYTHING),
     source="gateway",
@@ -111,14 +111,14 @@ def _put_predict(host: Host, value: float) -> None:
 FENCE_AHEAD = Parameter(
     "ANF_FENCE_AHEAD",
     ParamType.INT32,
-    "Act when the drone is too fast to stop before the fence",
+    "Act before the fence when the drone is too fast to stop",
     read=lambda host: float(host.vehicle.fence.predict),
     write=own(_put_predict),
     put=_put_predict,
     values=OFF_ON,
     polled=True,
     group=GROUP,
-    long="Of a drone that is flown by sticks or setpoints; moves stop where they were told to.",
+    long="Only for flight by sticks or setpoints: other moves end at their target.",
     default=1.0,
     source="gateway",
 )
@@ -131,7 +131,7 @@ def _put_floor(host: Host, value: float) -> None:
 FENCE_FLOOR = Parameter(
     "ANF_FENCE_FLOOR",
     ParamType.REAL32,
-    "Lowest height of the fence above the take-off point, 0: none",
+    "Lowest height of the fence above the take-off point; 0: none",
     read=lambda host: host.vehicle.fence.floor,
     write=own(_put_floor),
     put=_put_floor,
@@ -154,14 +154,14 @@ def _put_rtl_type(host: Host, value: float) -> None:
 RTL_TYPE = Parameter(
     "ANF_RTL_TYPE",
     ParamType.INT32,
-    "Where a return ends",
+    "Place where a return ends",
     read=lambda host: float(host.vehicle.rally.rtl_type),
     write=own(_put_rtl_type),
     put=_put_rtl_type,
     values={number: purpose.value.capitalize() for number, purpose in RTL_TYPES.items()},
     polled=True,
     group=GROUP,
-    long="The numbers are PX4's. Where rally points count, the drone's custom home is set while it flies.",
+    long="The numbers are PX4's. If rally points are used, the gateway sets the drone's custom home in flight.",
     default=float(DEFAULT_TYPE),
     source="gateway",
 )
@@ -200,7 +200,7 @@ _TYPE_WORDS = {CEILING: "ceiling", HOME_CIRCLE: "circle", ZONES: "polygon", FLOO
 FENCE_TYPE = Parameter(
     "FENCE_TYPE",
     ParamType.INT8,
-    "Kinds of boundaries that are enabled",
+    "Kinds of boundaries enabled",
     read=_types,
     write=_set_types,
     values={

@@ -39,22 +39,22 @@ def _number(
     )
 
 
-HEIGHT = _number("ANF_FOLLOW_HT", "height", "Height that a target is followed at", 1.0, 500.0, 8.0, unit="m")
-DISTANCE = _number("ANF_FOLLOW_DST", "distance", "Distance that a target is followed at", 1.0, 100.0, 8.0, unit="m")
+HEIGHT = _number("ANF_FOLLOW_HT", "height", "Height while following a target", 1.0, 500.0, 8.0, unit="m")
+DISTANCE = _number("ANF_FOLLOW_DST", "distance", "Distance while following a target", 1.0, 100.0, 8.0, unit="m")
 ANGLE = _number(
     "ANF_FOLLOW_ANG", "angle", "Side of the target, clockwise from its course", -180.0, 180.0, 180.0, unit="deg"
 )
 RESPONSIVENESS = _number(
     "ANF_FOLLOW_RS",
     "responsiveness",
-    "Low follows each move of the target, high smoothes them",
+    "Smoothing of the target's moves, 0: none",
     0.0,
     1.0,
     0.1,
     decimals=2,
 )
 TANGENTIAL = _number(
-    "ANF_FOLLOW_VEL", "tangential_speed", "Speed at most around a target that turns", 0.0, 20.0, 5.0, unit="m/s"
+    "ANF_FOLLOW_VEL", "tangential_speed", "Maximum speed around a turning target", 0.0, 20.0, 5.0, unit="m/s"
 )
 
 
@@ -65,14 +65,14 @@ def _put_altitude(host: Host, value: float) -> None:
 ALTITUDE = Parameter(
     "ANF_FOLLOW_ALT",
     ParamType.INT32,
-    "What the height counts from",
+    "Reference of the height",
     read=lambda host: float(host.vehicle.follow.settings.altitude_mode),
     write=own(_put_altitude),
     put=_put_altitude,
     values={0: "Take-off point", 1: "Ground below", 2: "Target"},
     polled=True,
     group=GROUP,
-    long="The altitude that a target tells is often metres off, and phones may count it from the ellipsoid.",
+    long="The altitude reported by a target is often metres off, and phones may use the ellipsoid.",
     default=0.0,
     source="gateway",
 )

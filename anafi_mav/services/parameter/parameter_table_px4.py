@@ -49,7 +49,7 @@ from anafi_mav.vehicle.takeoff import AUTO_DISARM
 
 FACTS = "PX4 facts"
 
-UNTOLD = "An ANAFI does not report it."
+NOT_REPORTED = "An ANAFI does not report it."
 
 
 def _calibrated(host: Host) -> float:
@@ -118,7 +118,7 @@ async def _set_land_delay(host: Host, value: float) -> None:
 LAND_DELAY = Parameter(
     "RTL_LAND_DELAY",
     ParamType.REAL32,
-    "Wait above home before landing, -1: a commanded return ends hovering",
+    "Wait above home before landing; -1: a commanded return ends hovering",
     read=_land_delay,
     write=_set_land_delay,
     limits=lambda host: (HOVERS, LONGEST_WAIT),
@@ -144,7 +144,7 @@ def _high_word(host: Host) -> float:
 
 
 def _low_word(host: Host) -> float:
-    """The low 32 bits, which PX4 keeps in an INT32 whatever its sign."""
+    """Return the low 32 bits, which PX4 stores in an INT32 as they are."""
     time = _flight_time_us(host)
     if time is None:
         return math.nan
@@ -201,12 +201,12 @@ FACTS_PX4: tuple[Parameter, ...] = (
     _fact("SYS_HITL", 0, "Simulation inside the autopilot: none"),
     _fact("SYS_HAS_MAG", 1, "The drone has a magnetometer"),
     _fact("SYS_HAS_BARO", 1, "The drone has a barometer"),
-    _fact("CAL_GYRO0_ID", 1, "Gyroscope: calibrated by its maker"),
-    _fact("CAL_ACC0_ID", 1, "Accelerometer: calibrated by its maker"),
+    _fact("CAL_GYRO0_ID", 1, "Gyroscope: calibrated by the manufacturer"),
+    _fact("CAL_ACC0_ID", 1, "Accelerometer: calibrated by the manufacturer"),
     Parameter(
         "CAL_MAG0_ID",
         ParamType.INT32,
-        "Magnetometer: 0 while the drone demands its calibration",
+        "Magnetometer: 0 while a calibration is required",
         _calibrated,
         updates=(events.MagnetoCalibrationRequiredState,),
         group=FACTS,
@@ -214,22 +214,27 @@ FACTS_PX4: tuple[Parameter, ...] = (
     ),
     _fact("CAL_MAG1_ID", 0, "Second magnetometer: none"),
     _fact("CAL_MAG2_ID", 0, "Third magnetometer: none"),
-    _fact("COM_RC_IN_MODE", 1, "Sticks come by MAVLink"),
-    _fact(
-        "COM_RC_LOSS_T", SILENCE, "Silence of the sticks until the drone hovers", ParamType.REAL32, unit="s", decimals=2
-    ),
+    _fact("COM_RC_IN_MODE", 1, "Stick input: MAVLink"),
+    _fact("COM_RC_LOSS_T", SILENCE, "Timeout of stick input; a hover follows", ParamType.REAL32, unit="s", decimals=2),
     _fact(
         "COM_OF_LOSS_T",
         0.5,
-        "Silence of setpoints until the drone hovers",
+        "Timeout of setpoints; a hover follows",
         ParamType.REAL32,
         unit="s",
         decimals=1,
         long="Stricter than PX4's 1.0 s.",
     ),
     _fact("NAV_RCL_ACT", 1, "Sticks lost: hold", values={1: "Hold"}),
-    _fact("COM_DISARM_PRFLT", AUTO_DISARM, "Disarms when no take-off follows", ParamType.REAL32, unit="s", decimals=0),
-    _fact("COM_DISARM_LAND", 0, "Disarmed the moment it has landed", ParamType.REAL32, unit="s"),
+    _fact(
+        "COM_DISARM_PRFLT",
+        AUTO_DISARM,
+        "Time from arming to disarming without a take-off",
+        ParamType.REAL32,
+        unit="s",
+        decimals=0,
+    ),
+    _fact("COM_DISARM_LAND", 0, "Time from landing to disarming", ParamType.REAL32, unit="s"),
     *(
         _fact(name, 0, "Radio channel: none")
         for name in (
@@ -245,15 +250,15 @@ FACTS_PX4: tuple[Parameter, ...] = (
     ),
     *(_fact(f"COM_FLTMODE{slot}", -1, "Mode switch: none") for slot in range(1, 7)),
     *(
-        _fact(name, math.nan, f"Battery: {what} level", ParamType.REAL32, long=UNTOLD)
+        _fact(name, math.nan, f"Battery: {what} level", ParamType.REAL32, long=NOT_REPORTED)
         for name, what in (("BAT_LOW_THR", "low"), ("BAT_CRIT_THR", "critical"), ("BAT_EMERGEN_THR", "emergency"))
     ),
     _fact("CP_DIST", -1, "Collision prevention by distance: none", ParamType.REAL32),
-    _fact("MPC_LAND_SPEED", math.nan, "Speed of a landing", ParamType.REAL32, unit="m/s", long=UNTOLD),
+    _fact("MPC_LAND_SPEED", math.nan, "Speed of a landing", ParamType.REAL32, unit="m/s", long=NOT_REPORTED),
     _fact(
         "MPC_XY_VEL_MAX",
         MAX_CRUISE_SPEED,
-        "The fastest that may be asked for",
+        "Maximum requested ground speed",
         ParamType.REAL32,
         unit="m/s",
         decimals=1,

@@ -44,7 +44,7 @@ def _volts(millivolts: int | None) -> float:
 
 
 _BATTERY: tuple[Parameter, ...] = (
-    _px4("BAT1_SOURCE", 1, "Battery: it reports its charge itself", values={1: "External"}, long=""),
+    _px4("BAT1_SOURCE", 1, "Battery: reports its charge", values={1: "External"}, long=""),
     Parameter(
         "BAT1_N_CELLS",
         ParamType.INT32,

@@ -41,9 +41,9 @@ MAX_DOWNLOADS = 16
 
 
 class State(enum.Enum):
-    IDLE = "nobody uploads"
+    IDLE = "no client uploads"
     RECEIVING = "a client uploads"
-    STORING = "a whole plan, or none, is being stored"
+    STORING = "a complete or an empty plan is being stored"
 
 
 class Event(enum.Enum):
@@ -51,9 +51,9 @@ class Event(enum.Enum):
     ITEM = "the expected item"
     LAST_ITEM = "the last expected item"
     CLEAR = "MISSION_CLEAR_ALL, or MISSION_COUNT of 0"
-    REFUSE = "an item or the plan is not good"
-    CANCEL = "the client gives up, or its channel is gone"
-    SILENCE = "the item was requested in vain"
+    REFUSE = "an item or the plan is invalid"
+    CANCEL = "the client aborts, or its channel is closed"
+    SILENCE = "the requested item was not received"
     STORED = "stored"
 
 
@@ -111,7 +111,7 @@ class Changed:
 
 @dataclass(frozen=True)
 class Say:
-    """A text to everybody."""
+    """A text to all clients."""
 
     severity: Severity
     text: OperatorText
@@ -290,7 +290,7 @@ class PlanTransfer:
                 before.tries, old.heard, old.lossy = 1, now, True
                 return []
             upload.as_float = old.as_float
-            upload.lossy = True  # it says the same again, or begins anew because something was lost
+            upload.lossy = True  # repeated, or restarted because a message was lost
         elif old is not None:
             effects += [self._ack(old.peer, dialect.MAV_MISSION_OPERATION_CANCELLED)]
         else:

@@ -25,10 +25,10 @@ class Event(enum.Enum):
     FORCED_LANDING = "battery empty"
     RAMPED_UP = "motors at speed, take-off wanted"
     IDLING = "motors at speed, hand launch wanted"
-    THROWN = "somebody threw the drone"
+    THROWN = "the drone is thrown"
     AIRBORNE = "take-off height reached"
     BUSY = "sticks, a move, a return, or still moving"
-    AT_REST = "nothing to do and no motion"
+    AT_REST = "no task and no motion"
     TOUCHDOWN = "on the ground"
     SETTLED = "motors off and at rest for a moment"
 

@@ -103,8 +103,11 @@ class VideoServer:
         hears: Callable[[], bool],
         send: Send,
         session_timeout: int = SESSION_TIMEOUT,
+        latency: float = 0.0,
     ) -> None:
+        """`latency`: s from a picture to its first packet."""
         self._firmware = firmware
+        self._latency = latency
         self._profile = video.profile(firmware.model)
         self._chance = chance
         self._note = note
@@ -388,15 +391,16 @@ class VideoServer:
                 continue
             recorded = session.resource.seconds is not None
             for track, _ in session.tracks.values():
+                track.report(now)
                 title = track.stream.title
                 if recorded:
                     # A recording keeps nothing but its place: its pictures have no metadata and look north.
-                    track.send(now, None, track.camera.draw(self._replayed(session)))
+                    self._send_picture(track, now, None, track.camera.draw(self._replayed(session)))
                     continue
                 if title not in live:
                     said = video.metadata(self._firmware, track.stream)
                     live[title] = said, track.camera.draw(self._seen(track.stream, said))
-                track.send(now, *live[title])
+                self._send_picture(track, now, *live[title])
             if recorded:
                 session.position += PERIOD
                 if session.position >= session.until - 0.5 / FRAME_RATE:
@@ -417,6 +421,13 @@ class VideoServer:
         """Return the moment that a picture of a recording shows."""
         number, time = round(session.position * FRAME_RATE), round(session.position * 1000.0)
         return CameraView(self._firmware.identity.name, number, time, _LEVEL, _REPLAY_HFOV)
+
+    def _send_picture(self, track: Track, taken: float, metadata: FrameMetadata | None, blocks: Blocks) -> None:
+        """Send a picture once it is encoded."""
+        if self._latency > 0.0:
+            asyncio.get_running_loop().call_later(self._latency, track.send, taken, metadata, blocks)
+        else:
+            track.send(taken, metadata, blocks)
 
 
 _HANDLERS: dict[str, Callable[[VideoServer, RtspRequest, str], Awaitable[tuple[list[tuple[str, str]], bytes]]]] = {

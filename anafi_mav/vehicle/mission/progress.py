@@ -13,26 +13,27 @@ from collections.abc import Sequence
 from anafi_mav import mav_enums
 from anafi_mav.plans.plan import DO_JUMP, Item
 from anafi_mav.plans.translation.translate import FlightPlanFile
+from anafi_mav.vehicle.mission.payload_items import PayloadItems
 
 ENDINGS = (mav_enums.MAV_CMD_NAV_LAND, mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)
 """Items that end in a landing or a return, which is the plan's own and no take-over of the drone's."""
 
 
 class State(enum.Enum):
-    NONE = "there is no mission"
+    NONE = "no mission stored"
     READY = "not begun"
-    ACTIVE = "it is flown"
-    PAUSED = "it was begun, and somebody or something has stopped it"
-    COMPLETE = "flown to its end"
+    ACTIVE = "the drone flies the mission"
+    PAUSED = "begun and then stopped"
+    COMPLETE = "flown completely"
 
 
 class Event(enum.Enum):
     TAKE = "a mission is uploaded"
-    CLEAR = "there is none any more"
+    CLEAR = "the mission is deleted"
     CHOOSE = "a client sets the current item"
-    BEGIN = "the drone flies it, from its beginning or where it was stopped"
-    STOP = "it is stopped"
-    FINISH = "its last item is done"
+    BEGIN = "the drone starts or resumes the mission"
+    STOP = "the drone stops flying the mission"
+    FINISH = "the last item is completed"
 
 
 TRANSITIONS: dict[State, dict[Event, State]] = {
@@ -80,6 +81,7 @@ class MissionProgress:
     def __init__(self) -> None:
         self.state = State.NONE
         self.items: tuple[Item, ...] = ()
+        self._payload = PayloadItems()
         self.current = 0
         """The item that is flown, or will be when it goes on."""
         self.leg: FlightPlanFile | None = None
@@ -125,6 +127,16 @@ class MissionProgress:
         return self.items[leg.origins[-1]].command == mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH
 
     @property
+    def needs_gimbal(self) -> bool:
+        """True while the mission is flown and an item to come needs the gimbal."""
+        return self.state is State.ACTIVE and self._payload.needs_gimbal(self.current, self.jumps)
+
+    @property
+    def needs_camera(self) -> bool:
+        """True while the mission is flown and an item to come needs the camera."""
+        return self.state is State.ACTIVE and self._payload.needs_camera(self.current, self.jumps)
+
+    @property
     def at_last_line(self) -> bool:
         """All but one line of the file are executed."""
         return self.leg is not None and self.line == len(self.leg.origins) - 2
@@ -133,6 +145,7 @@ class MissionProgress:
         """A mission was uploaded, or none any more."""
         self.state = TRANSITIONS[self.state][Event.TAKE if items else Event.CLEAR]
         self.items = tuple(items)
+        self._payload = PayloadItems(self.items)
         self._forget()
         self.current, self.jumps, self._chosen = 0, {}, False
 

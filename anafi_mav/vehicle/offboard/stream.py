@@ -44,7 +44,7 @@ class State(enum.Enum):
     """State of an offboard session."""
 
     IDLE = "no setpoints"
-    STREAMING = "setpoints come, another mode flies"
+    STREAMING = "setpoints arrive while another mode is active"
     ENGAGED = "setpoints fly the drone"
     SINGLE = "a single setpoint is flown to its end"
 
@@ -53,9 +53,9 @@ class Event(enum.Enum):
     """Event that changes the state."""
 
     SETPOINT = "a usable setpoint of the pilot arrived"
-    ENGAGE = "mode Offboard asked for, or a stream in mode Guided"
+    ENGAGE = "mode Offboard is requested, or a stream arrives in mode Guided"
     ENGAGE_SINGLE = "a single position in mode Guided"
-    DISENGAGE = "another mode took over"
+    DISENGAGE = "another mode is active"
     SILENCE = "no setpoint for too long"
 
 

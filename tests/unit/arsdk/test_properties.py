@@ -169,7 +169,7 @@ def test_each_acknowledged_message_arrives_exactly_once_and_in_order(version: in
 
 
 @pytest.mark.parametrize(("version", "type"), [(1, Role.CONTROLLER), (1, Role.DEVICE), (3, Role.DEVICE)])
-def test_a_late_copy_is_no_new_message_across_the_wrap_of_the_numbers(version: int, type: Role) -> None:
+def test_late_copy_across_number_wrap_is_no_new_message(version: int, type: Role) -> None:
     """Parrot's receiver takes the copy of a frame from before the wrap for a new one; ours does not."""
     speaker = Transport(type, version, 0.0)
     listener = Transport(Role.DEVICE if type is Role.CONTROLLER else Role.CONTROLLER, version, 0.0)
@@ -238,7 +238,7 @@ def test_the_tables_are_here() -> None:
 
 @settings(max_examples=1000, deadline=None)
 @given(data=st.data())
-def test_whatever_a_message_carries_comes_back(data: st.DataObject) -> None:
+def test_message_decodes_to_the_encoded_values(data: st.DataObject) -> None:
     message = data.draw(st.sampled_from(PLAIN))
     arguments = [data.draw(values(type, python)) for _, type, python in wire.wire_fields(message)]
     sent = message(*arguments)
@@ -252,7 +252,7 @@ def test_whatever_a_message_carries_comes_back(data: st.DataObject) -> None:
 
 @settings(max_examples=300, deadline=None)
 @given(name=st.text(max_size=60), serial=st.text(max_size=40), port=st.integers(1, 65535), data=st.data())
-def test_an_announcement_is_read_however_it_was_cut(name: str, serial: str, port: int, data: st.DataObject) -> None:
+def test_announcement_is_decoded_in_any_split(name: str, serial: str, port: int, data: st.DataObject) -> None:
     info = handshake.DeviceInfo(0x0914, serial, port, name)
     text = handshake.format_discovery(info)
     cuts = sorted(data.draw(st.lists(st.integers(0, len(text) - 2), max_size=5)))

@@ -91,7 +91,7 @@ async def test_mistakes(arguments: list[str], line: str) -> None:
 NET42, NET53 = ipaddress.IPv4Network("192.168.42.0/24"), ipaddress.IPv4Network("192.168.53.0/24")
 
 
-def test_where_it_looks() -> None:
+def test_search_covers_known_addresses_on_each_interface() -> None:
     here = [("eth0", ipaddress.IPv4Network("10.0.0.0/24")), ("wlan1", NET42), ("wlan2", NET42), ("usb0", NET53)]
     assert places([], here) == [
         SearchAddress("192.168.42.1", "wlan1"),
@@ -120,7 +120,7 @@ def test_discover_names_the_interface_of_ambiguous_addresses() -> None:
 
 
 @pytest.mark.parametrize("name", ["", "no", "007", "2026-01-01", '"}\n- evil: {', "ÄÖÜ", "-", "a" * 300, "x: y # z"])
-def test_whatever_a_device_calls_itself_is_no_trouble(name: str) -> None:
+def test_unusual_device_name_makes_valid_configuration(name: str) -> None:
     device = DeviceInfo(0x1234, name, 44444, name)
     lines = configuration([Find(SearchAddress("192.168.42.1"), device)])
     (drone,) = from_text("\n".join(lines), "lines").drones

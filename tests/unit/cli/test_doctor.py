@@ -172,7 +172,7 @@ async def test_doctor_with_an_unknown_adapter_stops_there() -> None:
     assert not [finding for finding in findings if finding.check.startswith("port")]
 
 
-async def test_doctor_without_a_route_says_so() -> None:
+async def test_doctor_without_a_route_reports_it() -> None:
     findings, _ = await before_handshake(DroneAddress("255.255.255.255"))  # no socket is let send there unasked
     assert faults(findings)["route"].startswith("route: WRONG: none to 255.255.255.255: ")
 
@@ -188,7 +188,7 @@ async def test_doctor_refused_by_the_drone_names_another_controller() -> None:
     assert "refused the connection (status -3); another controller has the drone" in line
 
 
-async def test_doctor_thrown_out_by_another_controller_names_it() -> None:
+async def test_doctor_displaced_by_another_controller_names_it() -> None:
     async with simulated() as drone:
         rival = Drone(drone.address)
 
@@ -205,7 +205,7 @@ async def test_doctor_thrown_out_by_another_controller_names_it() -> None:
     assert "another controller has the drone" in faults(findings)["controller"]
 
 
-async def test_doctor_reports_what_keeps_the_drone_on_the_ground() -> None:
+async def test_doctor_reports_the_reasons_against_takeoff() -> None:
     async with simulated() as drone:
         drone.faults.magneto_required = True
         findings = await with_handshake(place(drone.address))
@@ -227,7 +227,7 @@ async def test_doctor_firmware_is_compared_by_numbers(version: str, is_wrong: bo
 # Consent.
 
 
-async def test_doctor_without_a_terminal_asks_no_controller_firmware_or_settings() -> None:
+async def test_doctor_without_terminal_skips_controller_firmware_and_settings() -> None:
     async with simulated() as drone:
         options = ("--http-port", str(HTTP), "--rtsp-port", str(RTSP))
         async with command("doctor", drone.address, *options) as held:
@@ -254,7 +254,7 @@ async def test_info_without_a_terminal_or_take_is_refused() -> None:
 
 
 @pytest.mark.parametrize(("name", "status"), [("info", 1), ("doctor", 0)])
-async def test_drone_of_a_gateway_is_not_taken_even_with_take(name: str, status: int) -> None:
+async def test_drone_of_a_gateway_is_left_alone_with_take(name: str, status: int) -> None:
     folder = state_folder(None)
     assert folder is not None
     lock = StateLock(folder)
@@ -283,7 +283,7 @@ async def test_drone_of_a_gateway_is_not_taken_even_with_take(name: str, status:
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="it needs a terminal")
 @pytest.mark.parametrize(("answer", "connects"), [(b"y\n", True), (b"n\n", False), (b"\n", False), (b"\x04", False)])
-async def test_info_at_a_terminal_asks_before_it_connects(answer: bytes, connects: bool) -> None:
+async def test_info_at_a_terminal_confirms_before_connecting(answer: bytes, connects: bool) -> None:
     async with simulated() as drone:
         parent, child = os.openpty()
         process = await asyncio.create_subprocess_exec(

@@ -114,7 +114,7 @@ async def interrupted(p: Process) -> int:
 
 
 @pytest.mark.parametrize("words", [["info", "ADDRESS", "--take"], ["doctor", "ADDRESS"], ["discover", "ADDRESS"]])
-async def test_ctrl_c_while_a_command_waits_for_a_drone_ends_it(words: list[str]) -> None:
+async def test_ctrl_c_while_awaiting_a_drone_ends_the_command(words: list[str]) -> None:
     async with silent_device() as (address, accepted):
         words = [address if word == "ADDRESS" else word for word in words]
         async with program(sys.executable, "-m", "anafi_mav", *words) as p:
@@ -123,7 +123,7 @@ async def test_ctrl_c_while_a_command_waits_for_a_drone_ends_it(words: list[str]
             assert (p.lines, p.complaints) == ([], [])
 
 
-async def test_ctrl_c_while_an_upload_waits_for_a_vehicle_ends_it() -> None:
+async def test_ctrl_c_while_awaiting_a_vehicle_ends_the_upload() -> None:
     connected = asyncio.Event()
     address = loopback()
     server = await asyncio.start_server(lambda reader, writer: connected.set(), address, 5760)
@@ -135,7 +135,7 @@ async def test_ctrl_c_while_an_upload_waits_for_a_vehicle_ends_it() -> None:
     server.close()
 
 
-async def test_ctrl_c_when_a_simulator_is_ready_ends_it_well() -> None:
+async def test_ctrl_c_with_a_ready_simulator_ends_it_cleanly() -> None:
     words = ("sim", "--address", loopback(), "--http-port", "0", "--rtsp-port", "0")
     async with program(sys.executable, "-m", "anafi_mav", *words) as p:
         await p.line(lambda line: line.startswith("ready"))
@@ -143,7 +143,7 @@ async def test_ctrl_c_when_a_simulator_is_ready_ends_it_well() -> None:
         assert p.complaints == []
 
 
-async def test_ctrl_c_that_is_ignored_stays_ignored() -> None:
+async def test_ignored_ctrl_c_stays_ignored() -> None:
     """A shell starts its background jobs so: Ctrl-C is for the job in front."""
     code = (
         "import signal, sys; signal.signal(signal.SIGINT, signal.SIG_IGN)\n"

@@ -35,7 +35,7 @@ def test_show(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert len(lines) == 2 + 12
 
 
-def test_show_in_a_pipe_prints_one_aligned_line_per_item(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_show_in_a_pipe_prints_aligned_lines(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", "show", str(flight)]) == 0
     head, *rows = capsys.readouterr().out.splitlines()[1:]
     place = head.index("latitude")
@@ -113,7 +113,7 @@ def test_wrong_options_are_one_line(
     assert error.count("\n") == 1
 
 
-def test_a_file_that_is_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_missing_plan_file_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", "show", str(tmp_path / "none.plan")]) == 1
     assert capsys.readouterr().err == "anafi-mav: none.plan: No such file or directory\n"
 
@@ -172,16 +172,14 @@ def test_check_without_a_model_is_for_all(flight: Path, capsys: pytest.CaptureFi
     assert capsys.readouterr().out.splitlines().count(error) == 1
 
 
-def test_check_without_a_model_names_the_models_of_a_problem(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_check_without_a_model_names_models_with_problems(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", "check", str(MISSIONS / "inspection.plan")]) == 0
     said = capsys.readouterr().out
     assert "inspection.plan: ANAFI Ai: warning: item 0: an Ai begins at 20 m" in said
     assert "inspection.plan: warning: item 8: flown by the gateway" in said
 
 
-def test_check_for_a_fleet_is_for_its_models(flight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_for_a_fleet_covers_its_models(flight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     fleet = tmp_path / "fleet.yaml"
     fleet.write_text("drones: [{name: a, sysid: 1, sim: {model: ai}}, {name: b, sysid: 2, sim: {model: usa}}]")
     assert main(["plan", "check", str(flight), "-c", str(fleet)]) == 0
@@ -192,7 +190,7 @@ def test_check_for_a_fleet_is_for_its_models(flight: Path, tmp_path: Path, capsy
     assert capsys.readouterr().out.count(" flies it") == 4
 
 
-def test_check_of_a_parrot_file_covers_the_models_that_read_it(
+def test_check_of_parrot_file_covers_models_reading_it(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert main(["plan", "check", str(MISSIONS / "loop.v1.mavlink")]) == 0

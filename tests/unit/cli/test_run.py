@@ -98,7 +98,7 @@ def left_hovering(p: Product) -> None:
 # Start.
 
 
-async def test_a_simulated_drone_takes_wind_card_and_scenario_from_the_configuration(tmp_path: Path) -> None:
+async def test_simulated_drone_uses_wind_card_and_scenario_of_configuration(tmp_path: Path) -> None:
     address, alpha, bravo = loopback(), loopback(), loopback()
     (tmp_path / "days").mkdir()
     (tmp_path / "days" / "bad.yaml").write_text(
@@ -141,7 +141,7 @@ UNPRIVILEGED = Path("/proc/sys/net/ipv4/ip_unprivileged_port_start")
 @pytest.mark.skipif(
     not UNPRIVILEGED.exists() or int(UNPRIVILEGED.read_text()) <= 554, reason="here anybody may open ports 80 and 554"
 )
-async def test_an_ordinary_user_gets_stand_ins_for_the_ports_of_the_aircraft() -> None:
+async def test_ordinary_user_gets_substitutes_for_privileged_ports() -> None:
     script = """
 import os, sys
 from anafi_mav.cli.addresses import Reservations
@@ -158,12 +158,12 @@ with Reservations() as reservations:
     assert out.decode().splitlines() == ["8080 8554", "8081 8555"]
 
 
-def test_without_a_configuration_it_flies_the_default_fleet() -> None:
+def test_run_without_configuration_flies_the_default_fleet() -> None:
     assert configuration(None, None, None, False) == Config()
     assert configuration(None, ["192.168.42.1"], None, True).drones[0].sysid == 1
 
 
-async def test_a_line_for_each_drone_and_endpoint_and_then_ready(tmp_path: Path) -> None:
+async def test_run_prints_each_drone_and_endpoint_before_ready(tmp_path: Path) -> None:
     address, first, second, nobody = loopback(), loopback(), loopback(), loopback()
     port = free_udp_port(address)
     config = f"""
@@ -248,7 +248,7 @@ async def test_sigterm_does_not_ask(tmp_path: Path) -> None:
         assert free(address, 5760)
 
 
-async def test_ctrl_c_before_it_is_ready(tmp_path: Path) -> None:
+async def test_ctrl_c_before_ready_ends_cleanly(tmp_path: Path) -> None:
     """A drone that takes the connection and says nothing keeps the start waiting, not the end."""
     address, silent = loopback(), loopback()
     accepted = asyncio.Event()
@@ -414,7 +414,7 @@ async def test_a_mistake_is_one_line_and_nothing_is_started(tmp_path: Path, conf
             assert free(host, 5761)
 
 
-async def test_endpoint_open_to_the_network_is_warned_of_at_the_start(tmp_path: Path) -> None:
+async def test_endpoint_open_to_the_network_warns_at_start(tmp_path: Path) -> None:
     """192.0.2.1 is nobody's (RFC 5737): nothing is opened by this test."""
     config = f"""
         endpoints: ["tcpin://{loopback()}:5760", "tcpin://192.0.2.1:5760"]
@@ -437,7 +437,7 @@ async def test_error_of_an_option_names_the_option(tmp_path: Path) -> None:
         assert p.complaints[-1].startswith("anafi-mav: --drone: expected an IPv4 address or a host name")
 
 
-async def test_a_log_that_cannot_be_written(tmp_path: Path) -> None:
+async def test_unwritable_log_is_reported(tmp_path: Path) -> None:
     config = fleet(loopback(), loopback())
     async with product(tmp_path, config, "--sim-log", str(tmp_path), ready=False) as p:
         assert await p.end() == 2

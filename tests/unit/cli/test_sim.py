@@ -118,7 +118,7 @@ async def test_three_drones_in_one_process() -> None:
         assert len({device["name"] for device in devices}) == 3
 
 
-async def test_a_fleet_from_stdin_that_ends_with_it() -> None:
+async def test_fleet_from_stdin_ends_with_stdin() -> None:
     network = loopback().rpartition(".")[0]
     drones = [
         {
@@ -150,7 +150,7 @@ async def test_a_fleet_from_a_file(tmp_path: Path) -> None:
         assert (await discover(address))["model.id"] == "0x0914"
 
 
-async def test_its_log_is_lines_of_json(tmp_path: Path) -> None:
+async def test_simulator_log_is_lines_of_json(tmp_path: Path) -> None:
     log = tmp_path / "log.jsonl"
     address = loopback()
     async with running("--address", address, "--http-port", "0", "--log", str(log)) as (process, _):
@@ -243,7 +243,7 @@ async def test_a_taken_web_port_costs_the_web_server_only() -> None:
             await discover(address)
 
 
-async def test_a_log_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
+async def test_unwritable_simulator_log_is_one_line(tmp_path: Path) -> None:
     complaint = f"--log: expected a file that can be written, got {tmp_path}: Is a directory"
     assert await refused("--log", str(tmp_path)) == f"anafi-mav: {complaint}"
 
@@ -267,7 +267,7 @@ async def test_a_log_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
         ({"telemetry_rate": float("nan")}, "telemetry_rate"),
     ],
 )
-def test_a_drone_that_cannot_be(values: dict[str, Any], key: str) -> None:
+def test_invalid_simulated_drone_is_refused(values: dict[str, Any], key: str) -> None:
     with pytest.raises(ConfigError) as caught:
         DroneSpec(**values)
     assert caught.value.key_path == key
@@ -275,7 +275,7 @@ def test_a_drone_that_cannot_be(values: dict[str, Any], key: str) -> None:
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, 101.0, float("nan")])
-def test_a_speed_that_cannot_be(speed: float) -> None:
+def test_invalid_speed_is_refused(speed: float) -> None:
     with pytest.raises(ConfigError, match="speed"):
         Simulator([DroneSpec()], speed=speed)
 

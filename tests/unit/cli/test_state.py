@@ -27,7 +27,7 @@ def fleet(address: str, drone: str, state: str = "") -> str:
     """
 
 
-async def test_second_gateway_on_a_state_folder_is_refused_with_the_process_id(tmp_path: Path) -> None:
+async def test_second_gateway_on_a_state_folder_names_the_process(tmp_path: Path) -> None:
     (tmp_path / "one").mkdir()
     (tmp_path / "two").mkdir()
     drone = loopback()
@@ -56,7 +56,7 @@ async def test_second_gateway_on_a_state_folder_is_refused_with_the_process_id(t
     assert read_holder(state_folder(None)) is None
 
 
-async def test_unusable_state_folder_is_reported_to_each_upload_and_by_the_exit_status(tmp_path: Path) -> None:
+async def test_unusable_state_folder_is_reported_and_sets_exit_status(tmp_path: Path) -> None:
     (tmp_path / "state").write_text("a file in its place")
     address = loopback()
     async with product(tmp_path, fleet(address, loopback(), f"state: {tmp_path / 'state'}")) as p:

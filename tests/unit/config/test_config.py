@@ -111,7 +111,7 @@ def test_every_value_survives() -> None:
     )
 
 
-def test_anchors_and_merges_are_not_mistaken_for_keys_written_twice() -> None:
+def test_anchors_and_merges_are_no_duplicate_keys() -> None:
     text = (
         "drones:\n  - &a {name: a, sysid: 1, sim: {seed: 1}}\n"
         "  - &b {<<: *a, name: b, sysid: 2}\n  - {<<: *b, sysid: 3, name: c}\n"
@@ -155,7 +155,7 @@ def test_scenario_path_is_relative_to_the_configuration(tmp_path: Path) -> None:
 def test_system_id_245_is_legal_and_remarked_upon() -> None:
     config = from_text("drones: [{name: a, sysid: 1, sim: {}}, {name: b, sysid: 245, sim: {}}]", "fleet.yaml")
     assert remarks(config) == [
-        "drones[1].sysid: 245 is what MAVSDK calls itself unless told otherwise: such a client will not see this drone"
+        "drones[1].sysid: 245 is the default system id of MAVSDK: such a client will not see this drone"
     ]
     assert remarks(Config()) == []
 
@@ -269,12 +269,12 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("text", MISTAKES, ids=lambda text: text[:60])
-def test_each_mistake_is_one_line_with_its_place(text: str) -> None:
+def test_configuration_mistake_is_one_line_with_its_place(text: str) -> None:
     wanted = MISTAKES[text]
     assert problem(text) == (wanted if wanted.startswith("fleet.yaml") else f"fleet.yaml: {wanted}")
 
 
-def test_bytes_that_are_not_text_are_one_line() -> None:
+def test_undecodable_configuration_is_one_line() -> None:
     assert problem(b"a: \xff").startswith("fleet.yaml: unacceptable character #x00ff")
     assert problem("a: \x00").startswith("fleet.yaml: unacceptable character #x0000")
 
@@ -294,14 +294,14 @@ def test_the_error_keeps_the_key_path() -> None:
     assert caught.value.key_path == "drones[0].sysid"
 
 
-def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
+def test_unreadable_configuration_is_reported(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"^cannot read .*missing\.yaml: No such file or directory$"):
         load(tmp_path / "missing.yaml")
     with pytest.raises(ConfigError, match=r"^cannot read .*: Is a directory$"):
         load(tmp_path)
 
 
-def test_a_file_that_is_no_configuration_is_not_read_whole(tmp_path: Path) -> None:
+def test_oversized_configuration_is_not_read_whole(tmp_path: Path) -> None:
     path = tmp_path / "film.mp4"
     path.write_bytes(b"#" * (1 << 20) + b"#")
     with pytest.raises(ConfigError, match=r"expected a file of at most 1048576 bytes$"):

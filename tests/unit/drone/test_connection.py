@@ -62,7 +62,7 @@ async def test_block_on_the_ground_commands_nothing(real: SimulatedDrone) -> Non
     assert commands(real, "PCMD", "Landing", "TakeOff", "CancelMoveTo", "moveBy") == []
 
 
-async def test_block_that_ends_during_a_move_stops_the_move(real: SimulatedDrone) -> None:
+async def test_block_ending_during_a_move_stops_the_move(real: SimulatedDrone) -> None:
     async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
         await lift(drone)
         await drone.piloting.move_to(HOME[0] + 0.001, HOME[1], 20.0)
@@ -72,7 +72,7 @@ async def test_block_that_ends_during_a_move_stops_the_move(real: SimulatedDrone
     assert real.flying_state == FlyingState.HOVERING
 
 
-async def test_exception_in_the_block_stops_the_move_and_is_raised(real: SimulatedDrone) -> None:
+async def test_exception_in_the_block_stops_the_move(real: SimulatedDrone) -> None:
     async def fly() -> None:
         async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
             await lift(drone)
@@ -132,7 +132,7 @@ async def test_return_home_continues_after_the_block(real: SimulatedDrone) -> No
     assert commands(real, "Abort", "abort") == []
 
 
-async def test_block_that_ends_while_motors_ramp_lands(real: SimulatedDrone) -> None:
+async def test_block_ending_while_motors_ramp_lands(real: SimulatedDrone) -> None:
     async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
         taking_off = asyncio.ensure_future(drone.piloting.take_off())
         await drone.wait_for(FlyingState.MOTOR_RAMPING)
@@ -141,14 +141,14 @@ async def test_block_that_ends_while_motors_ramp_lands(real: SimulatedDrone) -> 
     assert real.flying_state in (FlyingState.LANDED, FlyingState.LANDING)
 
 
-async def test_block_that_ends_while_a_hand_launch_waits_stops_the_motors(real: SimulatedDrone) -> None:
+async def test_block_ending_during_a_hand_launch_stops_motors(real: SimulatedDrone) -> None:
     async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
         await drone.piloting.hand_launch()
         assert real.flying_state == FlyingState.USERTAKEOFF
     assert real.flying_state == FlyingState.LANDED
 
 
-async def test_block_behind_a_skycontroller_leaves_the_drone_to_its_pilot() -> None:
+async def test_block_behind_skycontroller_leaves_the_drone_to_its_pilot() -> None:
     async with Simulator([spec(skycontroller=3)], speed=4.0, seed=1) as simulator:
         real = simulator.drones[0]
         async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
@@ -158,7 +158,7 @@ async def test_block_behind_a_skycontroller_leaves_the_drone_to_its_pilot() -> N
         assert sources(real) == []
 
 
-async def test_move_behind_a_skycontroller_is_stopped_and_the_sticks_return_to_the_pilot() -> None:
+async def test_move_behind_skycontroller_is_stopped_and_sticks_are_released() -> None:
     async with Simulator([spec(skycontroller=3)], speed=4.0, seed=1) as simulator:
         real = simulator.drones[0]
         async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
@@ -168,7 +168,7 @@ async def test_move_behind_a_skycontroller_is_stopped_and_the_sticks_return_to_t
         assert sources(real) == ["CONTROLLER", "SKY_CONTROLLER"]
 
 
-async def test_block_behind_a_skycontroller_4_ends_without_an_error_of_the_event_loop() -> None:
+async def test_block_behind_skycontroller_4_ends_without_event_loop_error() -> None:
     """The web server is reached through a proxy of the mux, whose open connections end with the block."""
     problems: list[object] = []
     asyncio.get_running_loop().set_exception_handler(lambda loop, context: problems.append(context))
@@ -195,14 +195,14 @@ async def test_connect_without_a_drone_raises_link_lost(real: SimulatedDrone) ->
             pytest.fail("nothing answers there")
 
 
-async def test_wait_that_is_not_met_names_the_state_and_the_time(real: SimulatedDrone) -> None:
+async def test_expired_wait_names_the_state_and_the_time(real: SimulatedDrone) -> None:
     async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
         await drone.wait_for(FlyingState.LANDED, timeout=0.0)  # it is in that state
         with pytest.raises(CommandTimeout, match=r"the state hovering or flying within 0\.5 s"):
             await drone.wait_for(FlyingState.HOVERING, FlyingState.FLYING, timeout=0.5)
 
 
-async def test_condition_that_raises_ends_the_wait_with_its_error(real: SimulatedDrone) -> None:
+async def test_raising_condition_ends_the_wait_with_its_error(real: SimulatedDrone) -> None:
     async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
         answers = [False]
         with pytest.raises(IndexError):  # from the second look on

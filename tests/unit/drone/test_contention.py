@@ -30,7 +30,7 @@ def test_controller_from_before_takeoff_yields_after_five_short_connections() ->
     assert pauses == [None, None, None, None, 30.0, 60.0, 120.0]
 
 
-def test_guest_that_saw_the_landing_is_patient_in_the_next_flight() -> None:
+def test_guest_after_seeing_a_landing_waits_in_next_flight() -> None:
     guest = Contention(middle)
     guest.connected(airborne=True)
     guest.on_ground()
@@ -39,7 +39,7 @@ def test_guest_that_saw_the_landing_is_patient_in_the_next_flight() -> None:
     assert guest.stay_away() is None
 
 
-def test_pauses_double_up_to_five_minutes_and_begin_again_after_a_long_connection() -> None:
+def test_pauses_double_to_five_minutes_until_a_long_connection() -> None:
     guest = Contention(middle)
     guest.connected(airborne=True)
     pauses = []
@@ -61,7 +61,7 @@ def test_pauses_vary_by_a_fifth(chance: float, pause: float) -> None:
     assert guest.stay_away() == pytest.approx(pause)
 
 
-def test_connection_that_never_was_complete_counts_as_a_guests() -> None:
+def test_incomplete_connection_counts_as_a_guests() -> None:
     stranger = Contention(middle)
     assert stranger.lost(0.5)
     assert stranger.stay_away() == 30.0

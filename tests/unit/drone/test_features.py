@@ -59,7 +59,7 @@ async def test_the_models(model: str) -> None:
         assert set(drone.features.values()) == {Support.UNKNOWN}
 
 
-async def test_a_drone_that_reports_little() -> None:
+async def test_features_of_a_drone_with_few_reports_are_absent() -> None:
     async with ScriptedDevice() as device:
         drone = device.drone()
         await drone.connect()

@@ -41,7 +41,7 @@ def test_every_exported_name_exists() -> None:
 
 
 @pytest.mark.parametrize("owner", classes(), ids=lambda owner: owner.__name__)
-def test_public_class_and_its_methods_are_documented_and_typed(owner: type) -> None:
+def test_public_class_and_methods_are_documented_and_typed(owner: type) -> None:
     undocumented = [] if inspect.getdoc(owner) and owner.__doc__ else [owner.__name__]
     untyped = []
     for name, member in members(owner):

@@ -29,7 +29,7 @@ def test_the_table_has_every_row_of_the_appendix() -> None:
         assert set(row.models) <= set(MODELS)
 
 
-def test_the_page_is_what_the_table_says() -> None:
+def test_seed_page_equals_the_generated_table() -> None:
     generate = Path(__file__).parents[3] / "docs" / "generate.py"
     page = subprocess.run([sys.executable, generate, "--check"], capture_output=True, text=True, check=False)
     assert "seed.md" not in page.stderr, page.stderr

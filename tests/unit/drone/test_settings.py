@@ -125,7 +125,7 @@ def settings() -> list[Message]:
 
 
 @pytest.mark.parametrize("case", VERBS, ids=[command.NAME for _, command, _, _ in VERBS])
-async def test_a_verb_returns_what_the_drone_confirms(
+async def test_setting_returns_the_confirmed_value(
     device: ScriptedDevice, drone: Drone, case: tuple[Callable[[Drone], Awaitable[Any]], Message, Message, Any]
 ) -> None:
     verb, command, answer, result = case
@@ -134,7 +134,7 @@ async def test_a_verb_returns_what_the_drone_confirms(
     assert device.got(type(command)) == [command]
 
 
-async def test_setting_that_was_never_reported_is_not_supported(device: ScriptedDevice) -> None:
+async def test_unreported_setting_is_unsupported(device: ScriptedDevice) -> None:
     device.script[common.AllSettings] = lambda _: [*SETTINGS, common.AllSettingsChanged()]
     drone = device.drone()
     with pytest.raises(LinkLost):
@@ -148,16 +148,14 @@ async def test_setting_that_was_never_reported_is_not_supported(device: Scripted
     await drone.close()
 
 
-async def test_a_home_that_this_drone_does_not_have(device: ScriptedDevice, drone: Drone) -> None:
+async def test_unsupported_home_type_is_refused(device: ScriptedDevice, drone: Drone) -> None:
     with pytest.raises(NotSupported, match="pilot"):
         await drone.home.set_preferred_type(RthHomeType.PILOT)
     with pytest.raises(LocalProtocolError):
         await drone.home.set_custom_location(500.0, 500.0, 0.0)
 
 
-async def test_custom_home_that_the_drone_refuses_is_refused_before_the_timeout(
-    device: ScriptedDevice, drone: Drone
-) -> None:
+async def test_refused_custom_home_is_reported_before_the_timeout(device: ScriptedDevice, drone: Drone) -> None:
     """It reports the place that it keeps, or nothing; one that has not received the command is another matter."""
     device.script[rth.SetCustomLocation] = lambda _: [rth.CustomLocation(1.0, 1.0, 0.0)]
     with pytest.raises(CommandRejected, match="does not accept the place"):
@@ -190,7 +188,7 @@ async def test_hand_launch(device: ScriptedDevice, drone: Drone) -> None:
     assert [m.state for m in device.got(ardrone3.UserTakeOff)] == [1, 0]
 
 
-async def test_hand_launch_that_times_out_is_cancelled(device: ScriptedDevice, drone: Drone) -> None:
+async def test_timed_out_hand_launch_is_cancelled(device: ScriptedDevice, drone: Drone) -> None:
     with pytest.raises(CommandTimeout):
         await drone.piloting.hand_launch(timeout=0.3)
     assert (await device.until(ardrone3.UserTakeOff, 2)).state == 0

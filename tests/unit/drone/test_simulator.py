@@ -50,7 +50,7 @@ def now() -> float:
     return asyncio.get_running_loop().time()
 
 
-async def test_the_simulator_reports_everything_that_the_elements_read(drone: Drone) -> None:
+async def test_simulator_reports_everything_the_elements_read(drone: Drone) -> None:
     assert drone.identity.model.key == "4k"
     assert drone.identity.serial
     assert drone.identity.firmware
@@ -189,7 +189,7 @@ async def held(drone: Drone, command: PilotingCommand) -> AsyncIterator[None]:
         await asyncio.wait([task])
 
 
-async def test_sticks_move_the_drone_their_way(drone: Drone, real: SimulatedDrone) -> None:
+async def test_sticks_move_the_drone_in_their_direction(drone: Drone, real: SimulatedDrone) -> None:
     await flying(drone)
     start = real.pose
     # Nose down, right, and up: heading north that is north, east and up.
@@ -265,7 +265,7 @@ async def test_emergency_cuts_the_motors(drone: Drone, real: SimulatedDrone) -> 
     await real.wait_log(lambda e: e.kind == "pose" and e.args["up"] < 0.05, 5.0)
 
 
-async def test_a_verb_that_timed_out_is_never_carried_out(drone: Drone, real: SimulatedDrone) -> None:
+async def test_timed_out_verb_is_never_carried_out(drone: Drone, real: SimulatedDrone) -> None:
     real.faults.mute = True
     with pytest.raises(CommandTimeout):
         await drone.piloting.take_off(timeout=0.4)

@@ -284,7 +284,7 @@ def test_events_make_states(element: type[Element[Any]], events: list[wire.Messa
     assert {name: getattr(state, name) for name in expected} == expected
 
 
-def test_reduction_leaves_the_state_before_as_it_was() -> None:
+def test_reducer_leaves_the_previous_state_unchanged() -> None:
     before = reduce(Battery, [battery.Alert(BatteryAlert.TOO_HOT, AlertLevel.WARNING, 3)])
     Battery.REDUCERS[battery.Alert](before, battery.Alert(BatteryAlert.TOO_COLD, AlertLevel.WARNING, 0))
     assert before.alerts == {BatteryAlert.TOO_HOT: AlertLevel.WARNING}

@@ -56,7 +56,7 @@ def test_channels_count_for_themselves() -> None:
     assert sequence(other.read(), (1, 1)) == [0]
 
 
-def test_a_full_socket_makes_it_wait_and_answers_leave_first() -> None:
+def test_full_socket_queues_frames_and_answers_leave_first() -> None:
     wire = Wire()
     wire.channel.pause()
     wire.channel.forward(frame(pack(ATTITUDE), 98, 43, 1), give_way=True)
@@ -99,7 +99,7 @@ def test_answers_are_dropped_last() -> None:
     assert wire.channel.counters["dropped_frames"] == 3
 
 
-def test_a_socket_that_fills_again_while_the_queue_leaves() -> None:
+def test_socket_filling_again_while_the_queue_leaves_stops_it() -> None:
     written: list[bytes] = []
 
     def write(raw: bytes) -> None:
@@ -128,7 +128,7 @@ def test_a_closed_channel_only_counts() -> None:
     assert wire.channel.counters == {"dropped_frames": 3}
 
 
-def test_a_field_that_does_not_fit_costs_no_sequence_number() -> None:
+def test_invalid_field_costs_no_sequence_number() -> None:
     wire = Wire()
     with pytest.raises(LocalProtocolError):
         wire.channel.send(dialect.MAVLink_command_ack_message(70000, 0), 1, 1)

@@ -120,14 +120,14 @@ def generator() -> ModuleType:
     return module
 
 
-def test_the_modules_in_use_are_those_that_the_definitions_give(generator: ModuleType, tmp_path: Path) -> None:
+def test_generated_modules_agree_with_their_definitions(generator: ModuleType, tmp_path: Path) -> None:
     (tmp_path / "mavlink").mkdir()
     fresh = {path.name: path.read_bytes() for path in generator.generate(tmp_path)}
     used = [Path(str(module.__file__)) for module in (mav_enums, dialect)]
     assert fresh == {path.name: path.read_bytes() for path in used}, "run dialect/generate.py"
 
 
-def test_enums_are_the_numbers_and_names_that_mavgen_writes(generator: ModuleType, tmp_path: Path) -> None:
+def test_enums_equal_mavgens_numbers_and_names(generator: ModuleType, tmp_path: Path) -> None:
     """mavgen's own module, before its enums are taken out, is the referee."""
     path = tmp_path / "whole.py"
     generator._run_mavgen(path, "Python3")

@@ -42,7 +42,7 @@ RANGES = [
 ]
 
 
-def test_ids_are_in_our_range_and_fit_into_message_interval() -> None:
+def test_ids_are_in_range_and_fit_message_interval() -> None:
     assert len(OURS) == len(list(DEFINITIONS.iterfind("messages/message")))
     assert all(61_400 <= id <= 61_499 for id in OURS)
     assert not any(first <= id <= last for id in OURS for first, last in RANGES)
@@ -82,7 +82,7 @@ def _extra(message: ET.Element) -> tuple[int, int]:
 
 
 @pytest.mark.parametrize("id", sorted(OURS))
-def test_the_generated_message_has_the_checksum_that_the_rules_give(id: int) -> None:
+def test_generated_message_has_the_specified_checksum(id: int) -> None:
     kind = dialect.mavlink_map[id]
     assert kind.msgname == OURS[id].get("name")
     assert (kind.crc_extra, kind.unpacker.size) == _extra(OURS[id])

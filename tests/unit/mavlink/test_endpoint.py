@@ -99,7 +99,7 @@ def test_udp_url_with_options_keeps_each(scheme: str, query: str, flavour: str |
     assert (url.flavour, url.frames) == (flavour, frames)
 
 
-def test_each_scheme_makes_its_endpoint_with_a_description() -> None:
+def test_scheme_makes_its_endpoint_with_a_description() -> None:
     for name, scheme in SCHEMES.items():
         url = parse_endpoint(f"{name}://{'/dev/null:57600' if name == 'serial' else '127.0.0.1:1'}")
         endpoint = make_endpoint(url, Node(), SystemClock())
@@ -109,7 +109,7 @@ def test_each_scheme_makes_its_endpoint_with_a_description() -> None:
         assert scheme.description
 
 
-async def test_closing_what_was_never_opened_does_no_harm() -> None:
+async def test_closing_an_unopened_endpoint_does_nothing() -> None:
     for name in SCHEMES:
         url = parse_endpoint(f"{name}://{'/dev/null:57600' if name == 'serial' else '127.0.0.1:1'}")
         await make_endpoint(url, Node(), SystemClock()).close()
@@ -132,7 +132,7 @@ async def test_closing_what_was_never_opened_does_no_harm() -> None:
         ("tcpin://gateway.local:5760", True),
     ],
 )
-def test_endpoint_is_open_to_the_network_when_it_listens_beyond_loopback(url: str, is_open: bool) -> None:
+def test_endpoint_beyond_loopback_is_open_to_the_network(url: str, is_open: bool) -> None:
     assert is_open_to_network(parse_endpoint(url, FLAVOURS)) is is_open
 
 

@@ -59,7 +59,7 @@ def test_golden_frame() -> None:
     assert (received.message.type, received.message.autopilot, received.message.custom_mode) == (2, 12, 0x00030000)
 
 
-def test_version_1_is_understood_and_passed_on_as_version_2() -> None:
+def test_version_1_is_parsed_and_forwarded_as_version_2() -> None:
     assert crc(HEARTBEAT_1[1:-2] + b"\x32") == int.from_bytes(HEARTBEAT_1[-2:], "little")
     [received] = Parser().receive(HEARTBEAT_1)
     assert (received.sysid, received.compid, received.message.type) == (255, 190, 6)
@@ -70,7 +70,7 @@ def test_version_1_is_understood_and_passed_on_as_version_2() -> None:
     assert once_more.version_2() is once_more.raw
 
 
-def test_version_1_with_extension_fields_as_pymavlink_sends_it() -> None:
+def test_version_1_with_pymavlinks_extension_fields_is_parsed() -> None:
     sender = dialect.MAVLink(None, 9, 8)
     message = dialect.MAVLink_mission_count_message(1, 1, 5, 2)
     raw = message.pack(sender, force_mavlink1=True)
@@ -117,7 +117,7 @@ def test_truncated_or_extended_message_is_read_like_pymavlink(id: int) -> None:
         assert pack(received.message) == pack(wanted)
 
 
-def test_frames_that_got_lost_are_counted_for_each_sender() -> None:
+def test_lost_frames_are_counted_for_each_sender() -> None:
     parser = Parser()
     ping = pack(dialect.MAVLink_ping_message(1, 2, 0, 0))
     for seq, sysid in ((250, 7), (251, 7), (3, 9), (2, 7), (3, 7), (3, 9)):  # 252 to 1, and all but one number of 9's
@@ -144,7 +144,7 @@ def test_trailing_zeros_are_cut_but_for_one_byte() -> None:
         dialect.MAVLink_bad_data(b"", "no message at all"),
     ],
 )
-def test_value_that_does_not_fit_raises_local_error(message: Any) -> None:
+def test_value_out_of_range_raises_local_error(message: Any) -> None:
     with pytest.raises(LocalProtocolError, match="cannot encode"):
         pack(message)
 
@@ -184,7 +184,7 @@ def in_chunks(stream: bytes, source: random.Random, largest: int) -> tuple[Parse
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_any_split_of_a_byte_stream_gives_the_same_frames(seed: int) -> None:
+def test_any_stream_split_gives_the_same_frames(seed: int) -> None:
     source = random.Random(seed)
     stream, sent = mixed_stream(source, 60)
     # What a start mark in the noise makes the parser wait for.
@@ -242,7 +242,7 @@ def test_unknown_incompatibility_flag_is_refused() -> None:
         assert Parser().receive(b"\xfd" + body + crc(body + b"\x32").to_bytes(2, "little")) == []
 
 
-def test_a_signed_frame_is_read_and_passed_on_with_its_signature() -> None:
+def test_signed_frame_is_parsed_and_forwarded_with_signature() -> None:
     sender = dialect.MAVLink(None, 255, 190)
     sender.signing.secret_key = bytes(range(32))
     sender.signing.sign_outgoing = True
@@ -258,7 +258,7 @@ def unknown(sysid: int, compid: int) -> bytes:
     return bytes((0xFD, 3, 0, 0, 5, sysid, compid, 0xFF, 0xFF, 0x0F)) + b"abc" + b"\x12\x34"
 
 
-def test_an_unknown_message_passes_only_from_a_source_that_proved_itself() -> None:
+def test_unknown_message_passes_only_from_a_verified_source() -> None:
     parser = Parser()
     assert parser.receive_datagram(unknown(1, 1)) == []
     parser.receive(HEARTBEAT)

@@ -95,7 +95,7 @@ async def three(host: str) -> AsyncIterator[tuple[Bench, Client, Client, Client]
             await client.close()
 
 
-async def test_everybody_hears_a_broadcast_but_its_sender() -> None:
+async def test_broadcast_reaches_all_channels_except_the_senders() -> None:
     async with three(loopback()) as (d, ten, twenty, thirty):
         ten.send(ping(0, 0, 1))
         await twenty.wait("PING", since=0)
@@ -229,7 +229,7 @@ def test_forwarded_telemetry_gives_way_to_forwarded_answers() -> None:
     assert [raw[4] for raw in written] == [1, 0, 2]
 
 
-async def test_tcpout_comes_back() -> None:
+async def test_tcpout_reconnects() -> None:
     host = loopback()
     accepted: asyncio.Queue[tuple[asyncio.StreamReader, asyncio.StreamWriter]] = asyncio.Queue()
 
@@ -271,7 +271,7 @@ async def test_closing_in_the_moment_of_connecting() -> None:
     server.close()
 
 
-async def test_udpin_learns_its_peers() -> None:
+async def test_udpin_adds_peers_by_their_datagrams() -> None:
     host, elsewhere = loopback(), loopback()
     port = udp_port(host)
     async with bench(f"udpin://{host}:{port}") as d:
@@ -315,7 +315,7 @@ async def test_a_full_endpoint_refuses_and_the_others_stay() -> None:
             await client.close()
 
 
-async def test_a_serial_line_that_comes_later(tmp_path: Path) -> None:
+async def test_serial_line_connected_later_is_opened(tmp_path: Path) -> None:
     device = tmp_path / "ttyUSB0"
     async with bench(f"serial://{device}:57600") as d:
         expected = f"serial://{device}:57600: not connected (No such file or directory), retrying"
@@ -353,7 +353,7 @@ async def test_a_failing_service_costs_no_connection() -> None:
     assert [str(context["exception"]) for context in reported] == ["a mistake of ours"]
 
 
-async def test_a_start_that_fails_leaves_nothing_open() -> None:
+async def test_failed_start_leaves_nothing_open() -> None:
     host = loopback()
     with socket.create_server((host, 5761)):
         node = Node()
@@ -384,9 +384,7 @@ async def test_closing_ends_every_connection_and_frees_the_port() -> None:
 
 @pytest.mark.parametrize(("query", "most"), [("", 40), ("?frames=one", 40), ("?frames=many", 4)])
 @pytest.mark.parametrize("scheme", ["udpout", "udpin"])
-async def test_frames_of_one_iteration_leave_in_order_in_as_many_datagrams_as_configured(
-    scheme: str, query: str, most: int
-) -> None:
+async def test_frames_of_one_iteration_leave_in_configured_datagrams(scheme: str, query: str, most: int) -> None:
     """One frame per datagram, or as many as a reader with 512 bytes can take. Nothing waits for the next iteration."""
     host = loopback()
     loop = asyncio.get_running_loop()

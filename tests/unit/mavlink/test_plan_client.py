@@ -65,7 +65,7 @@ def run(transfer: Upload | Download, plans: Any, **trouble: Any) -> Wire:
     return wire
 
 
-def test_a_plan_goes_up_and_comes_down() -> None:
+def test_plan_is_uploaded_and_downloaded() -> None:
     plans = mission_protocol()
     upload = Upload(builds(items(5)), 1, 1, FENCE)
     run(upload, plans)
@@ -89,7 +89,7 @@ def test_an_empty_plan() -> None:
     assert (download.result, download.items) == (TransferResult(Outcome.DONE), [])
 
 
-def test_a_refusal_has_its_reason() -> None:
+def test_refusal_names_its_reason() -> None:
     plans = mission_protocol()
     upload = Upload(builds((*items(3), an_item(3, 666), an_item(4))), 1, 1, FENCE)
     run(upload, plans)
@@ -139,7 +139,7 @@ def test_silent_vehicle_ends_the_transfer() -> None:
     assert download.result == TransferResult(Outcome.SILENT)
 
 
-def test_a_vehicle_that_falls_silent_within_a_download() -> None:
+def test_download_from_a_vehicle_falling_silent_fails() -> None:
     download = Download(1, 1, FENCE)
     download.start(0.0)
     (request,) = download.receive(dialect.MAVLink_mission_count_message(255, 190, 3, FENCE), 1, 1, 1.0)
@@ -195,14 +195,14 @@ def test_items_in_the_older_form_and_out_of_turn() -> None:
     assert [message.seq for message in download.items] == [0, 1]
 
 
-def test_a_download_that_is_refused() -> None:
+def test_refused_download_names_the_reason() -> None:
     download = Download(1, 1, FENCE)
     download.start(0.0)
     assert download.receive(dialect.MAVLink_mission_ack_message(255, 190, 3, FENCE), 1, 1, 0.1) == []
     assert download.result == TransferResult(Outcome.REFUSED, dialect.MAV_MISSION_UNSUPPORTED)
 
 
-def test_giving_up_is_said() -> None:
+def test_cancelled_transfer_sends_operation_cancelled_once() -> None:
     for transfer in (Upload(builds(items(2)), 1, 1, FENCE), Download(1, 1, FENCE)):
         transfer.start(0.0)
         (ack,) = transfer.cancel()

@@ -32,17 +32,17 @@ def router() -> Router[str, str]:
     for name in ("a", "b", "c"):
         router.add(name)
     router.add_host(OURS, 1, "autopilot")
-    router.spoke(OURS, 1)
+    router.own_sources.add((OURS, 1))
     return router
 
 
-def test_a_message_without_target_is_for_everybody_but_its_sender(router: Router[str, str]) -> None:
+def test_message_without_target_reaches_all_but_its_sender(router: Router[str, str]) -> None:
     route = router.route("a", heartbeat(), 0.0)
     assert (route.hosts, route.forward) == (("autopilot",), ("b", "c"))
     assert router.counters["forwarded"] == 2
 
 
-def test_target_0_is_everybody(router: Router[str, str]) -> None:
+def test_message_with_target_0_reaches_all(router: Router[str, str]) -> None:
     route = router.route("a", command(0, 0), 0.0)
     assert (route.hosts, route.forward) == (("autopilot",), ("b", "c"))
 
@@ -78,7 +78,7 @@ FLEET = {(3, EVERY_COMPONENT): "all of 3", (2, 1): "autopilot 2", (1, 100): "cam
         (42, 1, []),
     ],
 )
-def test_hosts_are_those_that_the_target_means(system: int, component: int, hosts: list[str]) -> None:
+def test_message_reaches_the_hosts_of_its_target(system: int, component: int, hosts: list[str]) -> None:
     router = Router[str, str]()
     router.add("a")
     for address, host in FLEET.items():
@@ -96,7 +96,7 @@ def test_hosts_of_a_message_without_target_are_all() -> None:
     assert router.route("a", received(manual_control), 0.0).hosts == ("autopilot 1", "camera 1")
 
 
-def test_hosts_removed_with_their_system_leave_the_others() -> None:
+def test_removed_system_leaves_the_hosts_of_others() -> None:
     router = Router[str, str]()
     for address, host in FLEET.items():
         router.add_host(*address, host)
@@ -106,7 +106,7 @@ def test_hosts_removed_with_their_system_leave_the_others() -> None:
     assert router.hosts(1, 1) == ()
 
 
-def test_companion_component_receives_messages_for_it(router: Router[str, str]) -> None:
+def test_companion_component_receives_its_messages(router: Router[str, str]) -> None:
     router.route("c", heartbeat(source=(OURS, 191)), 0.0)
     assert router.route("a", command(OURS, 191), 0.0).forward == ("c",)
     assert router.route("a", command(OURS, 1), 0.0).forward == ()
@@ -131,7 +131,7 @@ def test_an_answer_finds_the_way_back(router: Router[str, str]) -> None:
     assert (route.hosts, route.forward) == ((), ("a",))
 
 
-def test_a_closed_channel_takes_its_systems_along(router: Router[str, str]) -> None:
+def test_closed_channel_removes_its_systems(router: Router[str, str]) -> None:
     router.route("b", heartbeat(source=(FOREIGN, 1)), 0.0)
     router.remove("b")
     assert router.heard_on(FOREIGN) == []
@@ -161,7 +161,7 @@ def test_our_own_echo_is_dropped_and_teaches_nothing(router: Router[str, str]) -
     assert router.heard_on(OURS) == []
 
 
-def test_a_frame_that_went_round_is_passed_on_once(router: Router[str, str]) -> None:
+def test_frame_received_twice_is_forwarded_once(router: Router[str, str]) -> None:
     frame = heartbeat(seq=9)
     assert router.route("a", frame, 10.0).forward == ("b", "c")
     assert router.route("b", frame, 10.1).forward == ()
@@ -189,7 +189,7 @@ def test_system_0_is_nobodys_name(router: Router[str, str]) -> None:
     assert router.heard_on(0) == []
 
 
-def test_an_unknown_message_is_passed_on_to_all_and_not_ours(router: Router[str, str]) -> None:
+def test_unknown_message_is_forwarded_and_reaches_no_host(router: Router[str, str]) -> None:
     unknown = ReceivedFrame(None, 0xABCDE, *GCS, b"\xfd\x00\x00\x00\x00\xff\xbe\xde\xbc\x0a\x00\x00")
     route = router.route("a", unknown, 0.0)
     assert (route.hosts, route.forward) == ((), ("b", "c"))

@@ -10,7 +10,7 @@ from support.clock import everybodys
 from anafi_mav.mavlink.stall import STALL, StallWatch
 
 
-async def test_stall_makes_what_is_read_next_old_until_the_sockets_are_drained() -> None:
+async def test_stall_marks_data_old_until_sockets_are_drained() -> None:
     stalls: list[float] = []
     watch = StallWatch(stalls.append)
     watch.start()

@@ -35,7 +35,7 @@ def test_default_interval_applies_before_set_and_after_reset() -> None:
     streams.reset(channel, ATTITUDE)  # twice does no harm
 
 
-def test_a_message_without_default_is_streamed_only_when_asked_for() -> None:
+def test_message_without_default_is_streamed_on_request_only() -> None:
     streams, channel = Streams[Key](DEFAULTS), Key()
     assert streams.interval(channel, UNKNOWN) is None
     assert not streams.due(channel, UNKNOWN, 0.0)
@@ -57,7 +57,7 @@ def test_an_interval_is_a_positive_number(interval: float) -> None:
         Streams[Key](DEFAULTS).set(Key(), ATTITUDE, interval)
 
 
-def test_the_first_message_is_due_at_once_and_the_next_not() -> None:
+def test_first_message_is_due_immediately_the_next_later() -> None:
     streams, channel = Streams[Key](DEFAULTS), Key()
     assert streams.due(channel, SYS_STATUS, 1000.0)
     assert not streams.due(channel, SYS_STATUS, 1000.05)
@@ -123,7 +123,7 @@ def test_due_on_recomputes_each_channel_after_a_change() -> None:
     assert due_on(streams, [], 9.0) == []
 
 
-def test_groups_that_share_a_message_share_its_interval() -> None:
+def test_groups_sharing_a_message_share_its_interval() -> None:
     streams, one = Streams[Key]({ATTITUDE: 1.0, SYS_STATUS: 0.25}), Key()
     channels = [one]
     both, first = (ATTITUDE, SYS_STATUS), (ATTITUDE,)
@@ -143,4 +143,18 @@ def test_groups_are_bounded() -> None:
     channels = [one]
     for number in range(1000):
         streams.due_on(channels, (ATTITUDE, number), float(number))
-    assert len(streams._quiet) <= 256
+    assert all(len(audience.quiet) <= 256 for audience in streams._audiences)
+
+
+def test_lists_of_channels_asked_about_in_turn_share_intervals() -> None:
+    streams, one, other = Streams[Key]({ATTITUDE: 1.0}), Key(), Key()
+    both, first, second = [one, other], [one], [other]
+    assert streams.due_on(both, (ATTITUDE,), 0.0) == [(ATTITUDE, both)]
+    assert streams.due_on(first, (ATTITUDE,), 0.1) == []
+    assert streams.due_on(second, (ATTITUDE,), 0.6) == [(ATTITUDE, [other])]
+    assert streams.due_on(both, (ATTITUDE,), 0.7) == [(ATTITUDE, [one])]
+    for number in range(20):
+        streams.due_on([one], (ATTITUDE,), float(number))
+    assert len(streams._audiences) <= 4
+    streams.channel_closed()
+    assert streams._audiences == []

@@ -43,7 +43,7 @@ def test_there_are_samples_of_each_kind() -> None:
 
 
 @pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.stem)
-def test_a_sample_is_written_as_it_was(path: Path) -> None:
+def test_sample_mission_is_written_as_it_was_read(path: Path) -> None:
     data, losses = files.encode(files.load(path), Format.QGC)
     assert losses == []
     assert json.loads(data) == json.loads(path.read_bytes())
@@ -76,7 +76,7 @@ def same(before: Item, after: Item) -> bool:
 
 @pytest.mark.parametrize("form", FORMS, ids=lambda form: form.name)
 @pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.stem)
-def test_sample_converted_and_back_differs_by_its_losses_only(path: Path, form: Format) -> None:
+def test_converted_sample_differs_by_its_listed_losses_only(path: Path, form: Format) -> None:
     """Each difference has a loss, and each loss is a difference."""
     plan = files.load(path)
     data, losses = files.encode(plan, form)
@@ -194,7 +194,7 @@ def test_a_samples_twin_is_current(path: Path, version: parrot.Version, tmp_path
 
 
 @pytest.mark.parametrize(("path", "version"), TWINS, ids=lambda value: getattr(value, "stem", None))
-def test_a_samples_twin_read_and_written_again_stays_the_same(path: Path, version: parrot.Version) -> None:
+def test_parrot_export_of_a_sample_survives_rewriting(path: Path, version: parrot.Version) -> None:
     """Through Parrot's file, QGroundControl's and Parrot's again, as often as somebody converts it."""
     kept = path.with_name(f"{path.stem}.v{version}.mavlink").read_bytes()
     plan = files.parse(kept, path.name, version)
@@ -205,7 +205,7 @@ def test_a_samples_twin_read_and_written_again_stays_the_same(path: Path, versio
         plan = files.parse(again, path.name, version)
 
 
-def test_a_twin_of_what_a_gateway_flies_is_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_parrot_export_of_gateway_items_does_not_exist(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name, item in GATEWAYS.items():
         out = tmp_path / "out.mavlink"
         assert main(["plan", "convert", str(MISSIONS / f"{name}.plan"), str(out), "--model", "4k"]) == 1
@@ -220,19 +220,19 @@ def test_every_wrong_file_is_expected() -> None:
 
 WRONG_MISSIONS = {
     "servo.plan": "item 2: DO_SET_SERVO: the drone has no actuator that a flight plan could move",
-    "terrain.plan": "item 1: NAV_WAYPOINT: its height is above the terrain, which the drone does not know",
-    "latitude.plan": "item 1: NAV_WAYPOINT: 148.879 is no latitude",
-    "waypoint-nowhere.plan": "item 1: NAV_WAYPOINT: it has no longitude",
-    "negative-hold.plan": "item 1: NAV_WAYPOINT: it waits for -5 s",
-    "no-speed.plan": "item 1: DO_CHANGE_SPEED: it says a speed of 0 m/s",
-    "relative-speed.plan": "item 1: DO_CHANGE_SPEED: it says how much faster, not how fast",
+    "terrain.plan": "item 1: NAV_WAYPOINT: heights above terrain are unsupported",
+    "latitude.plan": "item 1: NAV_WAYPOINT: invalid latitude 148.879",
+    "waypoint-nowhere.plan": "item 1: NAV_WAYPOINT: no longitude",
+    "negative-hold.plan": "item 1: NAV_WAYPOINT: invalid wait of -5 s",
+    "no-speed.plan": "item 1: DO_CHANGE_SPEED: invalid speed of 0 m/s",
+    "relative-speed.plan": "item 1: DO_CHANGE_SPEED: relative speeds are unsupported",
     "circles.plan": "item 1: NAV_LOITER_TURNS: the drone flies straight lines: draw the circle as way points",
-    "time-of-day.plan": "item 2: NAV_DELAY: it waits for a time of day, which the drone cannot",
-    "after-landing.plan": "item 3: a landing stands before it, which ends the plan",
-    "round-and-round.plan": "item 2: it goes round for ever and flies nowhere",
-    "nothing-flies.plan": "item 0: nothing of the mission flies",
-    "waits.plan": "item 1: it waits to be continued, which the drone does not",
-    "jump-too-far.waypoints": "item 2: it jumps to an item that is not there",
+    "time-of-day.plan": "item 2: NAV_DELAY: waiting for a time of day is unsupported",
+    "after-landing.plan": "item 3: follows a landing, which ends the plan",
+    "round-and-round.plan": "item 2: endless loop, no flight",
+    "nothing-flies.plan": "item 0: no item moves the drone",
+    "waits.plan": "item 1: autocontinue 0 is unsupported",
+    "jump-too-far.waypoints": "item 2: jump target does not exist",
     "beyond-fence.plan": "item 1: the way there leaves the fence (inclusion circle 0)",
     "too-high.plan": "item 1: 450 m above take-off is higher than the limit of 150 m",
     "too-fast.plan": "item 1: 40 m/s is more than the 15 that an ANAFI 4K flies",

@@ -57,7 +57,7 @@ def test_the_way_of_a_plan() -> None:
     assert table.summary(Plan()) == "0 items"
 
 
-def test_items_without_words_of_their_own() -> None:
+def test_items_without_own_description_show_their_fields() -> None:
     odd = Plan((Item(4999, 2, (1.5, None, 0.0, 0.0, 7.0, 0.0, 0.0), False), waypoint(0, 0, 5.0, frame=10)))
     first, second = table.rows_of(odd)
     assert first.command == "4999"
@@ -88,7 +88,7 @@ def test_shots_of_a_survey_are_on_its_lanes() -> None:
     assert found.looks == ()
 
 
-def test_shots_of_an_orbit_are_a_video_and_its_target() -> None:
+def test_orbit_shows_a_video_and_its_target() -> None:
     """From the way point before the region of interest; the video ends where it began."""
     found = shots(files.load(MISSIONS / "orbit.plan"))
     assert [kind for kind, _, _ in found.ways] == [ShotKind.VIDEO] * 8
@@ -97,7 +97,7 @@ def test_shots_of_an_orbit_are_a_video_and_its_target() -> None:
     assert found.photos == ()
 
 
-def test_shots_of_an_inspection_are_photos_where_they_are_taken() -> None:
+def test_inspection_shows_photos_at_their_places() -> None:
     plan = files.load(MISSIONS / "inspection.plan")
     found = shots(plan)
     assert found.ways == ()
@@ -166,7 +166,7 @@ def test_picture_shows_direction_climb_return_photos_north_and_scale(tmp_path: P
         assert 'id="scale"' in text
 
 
-def test_pictures_that_cannot_be() -> None:
+def test_impossible_pictures_are_refused() -> None:
     with pytest.raises(PlanError, match=r"pictures end in \.png, \.svg, \.pdf"):
         plot.draw(FLIGHT, "x", Path("x.gif"))
     with pytest.raises(PlanError, match="it has no places: nothing to draw"):

@@ -49,7 +49,7 @@ def test_public_class_name_exists_once() -> None:
     assert {name: places for name, places in repeated.items() if name not in QUALIFIED | BOTH_SIDES} == {}
 
 
-def test_repeated_class_name_is_one_thing_in_sim_and_drone() -> None:
+def test_repeated_class_name_is_one_in_sim_and_drone() -> None:
     classes = public_classes()
     rooms = {name: tuple(sorted(place.split("/")[0] for place in classes[name])) for name in BOTH_SIDES}
     assert rooms == dict.fromkeys(BOTH_SIDES, ("drone", "sim"))

@@ -111,7 +111,7 @@ print(len(names))
     assert int(done.stdout) > 200
 
 
-async def test_run_sim_and_plan_work_in_environment_of_the_package_alone(python: Path, tmp_path: Path) -> None:
+async def test_run_sim_and_plan_need_only_the_package(python: Path, tmp_path: Path) -> None:
     """`run` starts `sim` as a process of its own."""
     address, drone = loopback(), loopback()
     config = tmp_path / "fleet.yaml"

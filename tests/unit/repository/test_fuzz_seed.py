@@ -35,7 +35,7 @@ def run(folder: Path, *arguments: str, **environment: str) -> str:
     return done.stdout
 
 
-def test_seed_of_a_run_is_printed_first_and_with_each_failure(tmp_path: Path) -> None:
+def test_seed_is_printed_first_and_with_each_failure(tmp_path: Path) -> None:
     said = run(tmp_path, "-n", "1")  # in the worker, too
     first, again = re.findall(r"fuzz seed (\d+): --fuzz-seed \1 repeats it", said)
     assert said.startswith(f"fuzz seed {first}")
@@ -43,6 +43,6 @@ def test_seed_of_a_run_is_printed_first_and_with_each_failure(tmp_path: Path) ->
     assert f"assert {first} < 0" in said
 
 
-def test_seed_that_is_given_is_used(tmp_path: Path) -> None:
+def test_given_seed_is_used(tmp_path: Path) -> None:
     assert "assert 4711 < 0" in run(tmp_path, "-n", "0", "--fuzz-seed", "4711", FUZZ_SEED="12")
     assert "assert 12 < 0" in run(tmp_path, "-n", "0", FUZZ_SEED="12")

@@ -18,7 +18,7 @@ CHECKS = [row for row in ROWS if row[1] in ("propellers off", "in free space")]
 ASSUMED = [row for row in ROWS if row not in CHECKS]
 
 
-def test_real_aircraft_page_marks_each_check_and_numbers_all_assumptions() -> None:
+def test_real_aircraft_page_numbers_all_checks_and_assumptions() -> None:
     assert [int(row[0].strip("| ")) for row in CHECKS] == [*range(1, len(CHECKS) + 1)]
     assert len(CHECKS) > 20
     where = [row[1] for row in CHECKS]
@@ -27,7 +27,7 @@ def test_real_aircraft_page_marks_each_check_and_numbers_all_assumptions() -> No
     assert all(len(row) == 4 and all(cell.strip("| ") for cell in row) for row in ROWS)
 
 
-def test_real_aircraft_page_names_quirks_and_parameters_that_exist() -> None:
+def test_real_aircraft_page_names_existing_quirks_and_parameters() -> None:
     named = set(re.findall(r"quirks? ((?:`[a-z0-9-]+`(?:, | and )?)+)", PAGE))
     quirks = {name for group in named for name in re.findall(r"`([a-z0-9-]+)`", group)}
     assert quirks

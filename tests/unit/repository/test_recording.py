@@ -60,7 +60,7 @@ def test_time_within_one_step_is_allowed() -> None:
         ({"seq": 5}, {"seq": 6}, ["fields"]),
     ],
 )
-def test_field_with_time_of_sending_may_differ_by_one_step(
+def test_field_with_time_of_sending_may_differ_one_step(
     old: dict[str, int], new: dict[str, int], expected: list[str]
 ) -> None:
     assert kinds([line(5.0, **old)], [line(5.0, **new)]) == expected
@@ -128,7 +128,7 @@ TABLE = Texts(
         ("Goto refused: no GPS fix", "Goto refused: no GPS fix", []),
     ],
 )
-def test_text_may_change_as_the_table_says(old: str, new: str, expected: list[str]) -> None:
+def test_text_may_change_according_to_the_table(old: str, new: str, expected: list[str]) -> None:
     before, after = [line(1.0, "STATUSTEXT", text=old)], [line(1.0, "STATUSTEXT", text=new)]
     assert kinds(before, after, TABLE) == expected
     assert kinds(before, after) == (["fields"] if old != new else [])
@@ -168,7 +168,7 @@ def test_counter_of_pcmd_is_not_recorded() -> None:
     assert kept("ardrone3.Piloting.PCMD", fields) == {"flag": 1, "roll": 5}
 
 
-def test_header_of_file_transfer_is_recorded_without_its_data() -> None:
+def test_file_transfer_header_is_recorded_without_its_data() -> None:
     payload = bytes([0x34, 0x12, 1, 128, 2, 5, 1, 0, 0, 1, 0, 0]) + b"abXX"
     header = file_transfer(payload)
     assert (header.pop("crc"), header) == (

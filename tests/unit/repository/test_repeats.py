@@ -31,7 +31,7 @@ def test_own_fails_once():
 """
 
 
-def test_failed_test_is_repeated_once_only_if_third_party_and_is_printed(tmp_path: Path) -> None:
+def test_only_third_party_test_is_repeated_once_and_printed(tmp_path: Path) -> None:
     file = tmp_path / "test_sample.py"
     file.write_text(FAILS_ONCE)
     words = ("-m", "pytest", "-p", "support.repeats", "-n", "2", "-q", "-c", os.devnull, str(file))
@@ -50,7 +50,7 @@ def test_failed_test_is_repeated_once_only_if_third_party_and_is_printed(tmp_pat
     assert "2 failed, 1 passed, 2 rerun" in done.stdout
 
 
-def test_third_party_marker_is_used_where_foreign_programs_run_only() -> None:
+def test_third_party_marker_is_used_for_foreign_programs_only() -> None:
     marked = [path for path in TESTS.rglob("test_*.py") if "mark.third_party" in path.read_text(encoding="utf-8")]
     marked.remove(Path(__file__).resolve())
     assert {path.parent.name for path in marked} == {"clients", "interop"}

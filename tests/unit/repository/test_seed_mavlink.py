@@ -24,7 +24,7 @@ def test_every_row_is_there() -> None:
 
 
 @pytest.mark.parametrize("name", REACHED)
-def test_a_row_is_reached_or_waits_for_its_issue(name: str) -> None:
+def test_row_is_reached_or_waits_for_its_issue(name: str) -> None:
     reach = REACHED[name]
     if reach.test:
         file, _, function = reach.test.partition("::")

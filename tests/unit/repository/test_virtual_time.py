@@ -34,7 +34,7 @@ def test_clock_stands_still_while_callbacks_compute(loop: Loop) -> None:
     assert loop.run_until_complete(compute()) == 0.0
 
 
-def test_timer_of_the_world_is_due_before_others_of_the_same_instant(loop: Loop) -> None:
+def test_world_timer_precedes_others_of_the_same_instant(loop: Loop) -> None:
     order: list[str] = []
 
     async def tick(name: str) -> None:
@@ -69,14 +69,14 @@ def test_datagram_arrives_before_time_moves(loop: Loop) -> None:
         assert loop.run_until_complete(exchange()) == 0.0
 
 
-def test_work_for_threads_runs_at_once_in_the_own_thread(loop: Loop) -> None:
+def test_work_for_threads_runs_immediately_in_the_own_thread(loop: Loop) -> None:
     async def work() -> int:
         return await loop.run_in_executor(None, threading.get_ident)
 
     assert loop.run_until_complete(work()) == threading.get_ident()
 
 
-def test_program_that_waits_for_nothing_fails(loop: Loop) -> None:
+def test_program_waiting_for_nothing_fails(loop: Loop) -> None:
     async def forever() -> None:
         await loop.create_future()
 

@@ -109,7 +109,7 @@ def test_a_long_text_is_chunked() -> None:
     assert texts("a" * 50 + "b" * 20) == [(1, 0, b"a" * 50), (1, 1, b"b" * 20)]
 
 
-def test_a_text_of_full_chunks_ends_in_an_empty_one() -> None:
+def test_text_of_full_chunks_ends_in_an_empty_one() -> None:
     assert [chunk for _, _, chunk in texts("a" * 100)] == [b"a" * 50, b"a" * 50, b""]
 
 
@@ -123,7 +123,7 @@ def test_height_is_latched_on_the_ground() -> None:
     assert height.amsl(30.0) == 65.0
 
 
-def test_after_a_landing_elsewhere_the_next_flight_counts_from_there() -> None:
+def test_height_counts_from_the_last_landing_place() -> None:
     """It took off at 45 m and stands 10 m lower: what it says now is -10, and counts from 0 again when it flies."""
     height = HeightReference()
     height.on_ground(45.0, 0.0)
@@ -171,7 +171,7 @@ def test_height_kept_of_another_flight_is_estimated_once(kept: TakeoffRecord | N
     assert (height.takeoff_amsl, height.estimated) == (35.5, False)
 
 
-def test_height_estimate_is_replaced_when_the_flight_is_named_late() -> None:
+def test_height_estimate_is_replaced_after_a_late_flight_id() -> None:
     height = HeightReference()
     height.recall(record("flight 1"))
     assert height.in_flight("", 60.0, 20.0)
@@ -179,14 +179,14 @@ def test_height_estimate_is_replaced_when_the_flight_is_named_late() -> None:
     assert (height.takeoff_amsl, height.estimated) == (35.0, False)
 
 
-def test_height_estimate_that_was_kept_stays_an_estimate() -> None:
+def test_stored_height_estimate_stays_an_estimate() -> None:
     height = HeightReference()
     height.recall(record(estimated=True))
     assert not height.in_flight("flight 1", 60.0, 20.0)
     assert (height.takeoff_amsl, height.estimated) == (35.0, True)
 
 
-def test_height_of_a_seen_takeoff_survives_a_late_flight_id() -> None:
+def test_height_of_seen_takeoff_survives_late_flight_id() -> None:
     """A firmware may still report the id of the flight before when this one has begun."""
     height = HeightReference()
     height.on_ground(35.0, 0.0)
@@ -196,7 +196,7 @@ def test_height_of_a_seen_takeoff_survives_a_late_flight_id() -> None:
     assert (height.takeoff_amsl, height.estimated, height.flight_id) == (35.0, False, "flight 2")
 
 
-def test_height_of_a_landing_without_fix_counts_from_the_drones_own_height() -> None:
+def test_height_after_landing_without_fix_uses_drone_height() -> None:
     height = HeightReference()
     height.on_ground(45.0, 0.0)
     height.take_off()
@@ -217,7 +217,7 @@ def test_height_of_a_landing_without_fix_counts_from_the_drones_own_height() -> 
         {"flight_id": "a", "amsl": 1.0, "estimated": False, "latitude": float("nan"), "longitude": 0.0},
     ],
 )
-def test_takeoff_record_that_is_none_is_not_read(kept: object) -> None:
+def test_invalid_takeoff_record_is_not_read(kept: object) -> None:
     assert TakeoffRecord.read(kept) is None
 
 
@@ -301,7 +301,7 @@ def test_repeated_return_runs_again_unless_another_client_commanded() -> None:
     )
 
 
-def test_repeated_offboard_command_is_executed_again_after_its_end() -> None:
+def test_repeated_offboard_command_after_its_end_is_executed() -> None:
     history = commands.CommandHistory()
     offboard = mode_command(dialect.MAV_CMD_DO_SET_MODE, 1.0, 6.0, 0.0)
     execution = history.begin("a", offboard)
@@ -389,7 +389,7 @@ def test_a_ground_station_is_lost_once_for_each_silence() -> None:
     assert not watch.heard(122.0)
 
 
-def test_silence_before_a_restart_of_the_watch_does_not_count() -> None:
+def test_silence_before_a_watch_restart_does_not_count() -> None:
     watch = GcsWatch()
     watch.restart(50.0)
     assert not watch.expire(100.0, 10.0)

@@ -26,7 +26,7 @@ def comparisons(path: Path) -> Iterator[int]:
                 yield node.lineno
 
 
-def test_flavour_is_compared_with_none_by_name() -> None:
+def test_flavour_is_never_compared_by_name() -> None:
     found = [
         f"{path.relative_to(PACKAGE)}:{line}"
         for path in sorted(PACKAGE.rglob("*.py"))
@@ -42,7 +42,7 @@ def test_comparison_with_a_flavour_is_seen(tmp_path: Path) -> None:
     assert list(comparisons(module)) == [1, 2]
 
 
-def test_flavour_has_the_names_that_its_record_refers_to() -> None:
+def test_flavour_has_the_names_of_its_record() -> None:
     for flavour in FLAVOURS.values():
         assert set(flavour.numbers) == set(FlightMode)
         assert flavour.parameter_names in NAME_TABLES

@@ -57,7 +57,7 @@ async def test_memory_returns_stored_values_after_reopening(tmp_path: Path) -> N
     assert (other.plans, other.settings) == ({}, {})
 
 
-async def test_the_newest_of_many_is_what_is_there(tmp_path: Path) -> None:
+async def test_newest_of_many_saves_is_stored(tmp_path: Path) -> None:
     memory = Memory(tmp_path)
     memory.load(SERIAL)
     saves = []
@@ -147,7 +147,7 @@ async def test_unreadable_memory_file_is_not_replaced(tmp_path: Path) -> None:
     assert (tmp_path / f"{SERIAL}.json").is_dir()
 
 
-async def test_a_folder_that_cannot_be_made(tmp_path: Path) -> None:
+async def test_uncreatable_folder_is_reported(tmp_path: Path) -> None:
     memory = Memory(tmp_path / "state")
     assert memory.load(SERIAL) is None
     (tmp_path / "state").write_text("")  # somebody else's file
@@ -159,7 +159,7 @@ async def test_a_folder_that_cannot_be_made(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("serial", ["", "../../etc/passwd", "a/b", "x" * 65, "a\nb", ".", "é"])
-async def test_a_serial_number_that_is_no_file_name(tmp_path: Path, serial: str) -> None:
+async def test_serial_number_unusable_as_file_name_is_not_stored(tmp_path: Path, serial: str) -> None:
     memory = Memory(tmp_path)
     assert memory.load(serial) is None
     memory.put(1, ITEMS)
@@ -174,7 +174,7 @@ async def test_without_a_folder(tmp_path: Path) -> None:
     assert await memory.save() is None
 
 
-def test_where_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_state_folder_follows_option_and_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("XDG_STATE_HOME", "/var/xdg")
     assert state_folder(None) == Path("/var/xdg/anafi-mav")

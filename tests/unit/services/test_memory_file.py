@@ -26,7 +26,7 @@ async def test_unwritten_value_is_in_memory_after_a_link_loss(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("kept", [True, False])
-async def test_another_drone_has_its_own(tmp_path: Path, kept: bool) -> None:
+async def test_another_drone_has_its_own_settings(tmp_path: Path, kept: bool) -> None:
     memory = Memory(tmp_path if kept else None)
     memory.load(SERIAL)
     memory.settings["fence"] = 1

@@ -14,7 +14,7 @@ from anafi_mav.services.system import System
 from anafi_mav.vehicle.base.subscriptions import in_order
 
 
-def test_handlers_of_several_tables_are_called_in_the_order_of_the_tables() -> None:
+def test_handlers_of_several_tables_keep_table_order() -> None:
     called: list[str] = []
 
     def handler(name: str) -> Callable[[object, float], None]:
@@ -52,9 +52,7 @@ def test_handlers_of_several_tables_are_called_in_the_order_of_the_tables() -> N
     ],
     ids=lambda value: value.__name__ if isinstance(value, type) else "",
 )
-async def test_an_event_reaches_the_vehicle_then_the_services_then_the_messages_on_change(
-    kind: type[Message], owners: str
-) -> None:
+async def test_event_reaches_vehicle_then_services_then_change_messages(kind: type[Message], owners: str) -> None:
     clock = SystemClock()
     system = System(Node(clock=clock), Drone("127.0.42.1"), 1, clock, 0.0, allow_kill=False)
     joined = in_order(system.subscriptions())

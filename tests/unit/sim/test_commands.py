@@ -62,7 +62,7 @@ def any_command(chance: random.Random, command: type[Message]) -> bytes:
 
 
 @pytest.mark.parametrize("model", ["4k", "thermal", "usa", "ai"])
-def test_nothing_stops_it(model: str) -> None:
+def test_random_commands_never_stop_the_simulator(model: str) -> None:
     seed = random.randrange(2**32)
     chance = random.Random(seed)
     print(f"seed {seed}")  # noqa: T201 # shown when it fails

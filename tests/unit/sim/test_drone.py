@@ -82,7 +82,7 @@ async def test_a_second_controller_takes_over_in_flight(real: SimulatedDrone) ->
     await second.close()
 
 
-async def test_telemetry_comes_at_the_aircrafts_rates(real: SimulatedDrone) -> None:
+async def test_telemetry_leaves_at_the_aircrafts_rates(real: SimulatedDrone) -> None:
     session, heard = await join(real)
     await heard.until(lambda messages: [type(m) for m in messages].count(ardrone3.GpsLocationChanged) == 3)
     await session.close()

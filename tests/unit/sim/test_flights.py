@@ -21,7 +21,7 @@ def test_every_flight_is_recorded() -> None:
 
 
 @pytest.mark.parametrize("name", FLIGHTS)
-def test_flight_stays_within_a_tenth_of_a_metre_of_the_record(name: str) -> None:
+def test_flight_stays_within_0_1_m_of_the_record(name: str) -> None:
     flown = FLIGHTS[name].fly()
     assert [row[0] for row in flown] == [row[0] for row in RECORDED[name]]
     apart = [math.dist(now[1:4], then[1:4]) for now, then in zip(flown, RECORDED[name], strict=True)]

@@ -46,7 +46,7 @@ def test_messages_have_parrots_names(tmp_path: Path) -> None:
     assert (lines[2]["name"], lines[2]["args"]) == ("200-1-2", {"payload": "01ff"})
 
 
-async def test_log_without_memory_and_file_is_used_while_an_entry_is_awaited() -> None:
+async def test_awaited_log_without_memory_and_file_is_used() -> None:
     log = Log("d", 0, None)
     assert not log.used
     log.add(1.0, "state", "step", {})

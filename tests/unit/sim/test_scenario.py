@@ -71,7 +71,7 @@ async def test_conditions_hold_together() -> None:
     assert world.drone.faults.storage_full
 
 
-async def test_each_drone_has_its_own_time() -> None:
+async def test_scenario_step_counts_for_each_drone() -> None:
     world = World("steps: [{at: 1, drone: 127.0.42.2, gps: false}, {at: 2, calibration_required: true}]", 2)
     world.run(1.1)
     assert [drone.faults.gps for drone in world.simulator.drones] == [True, False]
@@ -146,13 +146,13 @@ def test_a_bad_file_is_one_line(text: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_a_drone_that_is_not_there() -> None:
+def test_unknown_drone_in_a_scenario_is_refused() -> None:
     scenario = from_text("steps: [{at: 1, drone: 10.0.0.1, gps: false}]", "x")
     with pytest.raises(ConfigError, match=r"steps\[0\].drone: expected the address of a drone \(127.0.42.1\)"):
         Simulator([DroneSpec()], scenarios={"127.0.42.1": scenario})
 
 
-async def test_each_drone_has_its_own_file() -> None:
+async def test_each_drone_uses_its_own_scenario_file() -> None:
     specs = [DroneSpec(address=f"127.0.42.{n}", wind=WindSpec(float(n), 90.0, 0.0)) for n in (1, 2, 3)]
     files = {"127.0.42.2": "steps: [{at: 1, gps: false}]", "127.0.42.3": "steps: [{at: 1, battery: 50}]"}
     scenarios = {address: from_text(text, "x") for address, text in files.items()}
@@ -163,7 +163,7 @@ async def test_each_drone_has_its_own_file() -> None:
     assert [drone.wind.spec.speed for drone in simulator.drones] == [1.0, 2.0, 3.0]
 
 
-def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
+def test_unreadable_scenario_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="cannot read"):
         load(tmp_path / "none.yaml")
     (tmp_path / "big.yaml").write_bytes(b"#" * ((1 << 20) + 1))
@@ -181,7 +181,7 @@ def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
         (["--wind", "80,0"], "--wind: expected m/s from 0 to 40, got 80"),
     ],
 )
-async def test_the_command_line_says_it_in_one_line(tmp_path: Path, options: list[str], line: str) -> None:
+async def test_invalid_scenario_is_one_line_on_the_terminal(tmp_path: Path, options: list[str], line: str) -> None:
     (tmp_path / "bad.yaml").write_text("steps: [{at: 1, gps: maybe}]")
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "anafi_mav", "sim", *options),

@@ -8,7 +8,7 @@ from support.silent_commands import CONTROLLERS, DRONES, reason
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_commands_that_a_drone_does_not_answer(model: str) -> None:
+def test_commands_unanswered_by_a_drone_equal_the_list(model: str) -> None:
     silent = unanswered(model)
     assert {name for name in silent if reason(name, model, DRONES) is None} == set(), "silence without a reason"
     told = {
@@ -20,7 +20,7 @@ def test_commands_that_a_drone_does_not_answer(model: str) -> None:
 
 
 @pytest.mark.parametrize("generation", [3, 4])
-def test_commands_that_a_skycontroller_does_not_answer(generation: int) -> None:
+def test_commands_unanswered_by_a_skycontroller_equal_the_list(generation: int) -> None:
     silent = unanswered_by_controller(generation)
     assert {name for name in silent if reason(name, str(generation), CONTROLLERS) is None} == set()
     told = {

@@ -118,7 +118,7 @@ def flight(speed: float, angle: float) -> MeasuredTrack:
     return track
 
 
-def test_a_flight_that_agrees_and_one_that_does_not() -> None:
+def test_validation_distinguishes_agreeing_and_deviating_flights() -> None:
     good = flight(8.5, 40.0)
     results = by_name(tilt_results("pitch", good.pitch(), good, 8.0))
     assert results["pitch: top speed"].measured == pytest.approx(8.5)
@@ -176,9 +176,7 @@ def test_bad_options(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert "--plots: expected " in refused(capsys, "--model", "4k", "--plots", str(tmp_path / "file"))
 
 
-async def test_all_models_fly_as_the_paper_says_and_are_drawn(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+async def test_all_models_fly_and_are_drawn_like_the_paper(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """In this process and in virtual time: pictures come 30 times a simulated second on any machine."""
     folder = tmp_path / "figures"
     folder.mkdir()
@@ -199,7 +197,7 @@ async def test_all_models_fly_as_the_paper_says_and_are_drawn(
         assert [name for name in ("commanded", *names) if f"<!-- {name} -->" not in figure] == []
 
 
-async def test_flights_on_a_machine_that_stands_still_are_invalid() -> None:
+async def test_validation_flights_on_a_stalled_host_are_invalid() -> None:
     """It stops for longer than the sticks are held, again and again."""
     words = ("-m", "anafi_mav", "sim", "validate", "--model", "4k", "--speed", "10")
     pipe = asyncio.subprocess.PIPE

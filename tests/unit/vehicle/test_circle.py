@@ -66,7 +66,7 @@ def test_where_the_nose_points_east_of_the_centre(direction: int, facing: Facing
 
 
 @pytest.mark.parametrize("direction", [1, -1])
-def test_a_lap_is_counted_the_way_it_is_flown(direction: int) -> None:
+def test_lap_is_counted_in_the_flown_direction(direction: int) -> None:
     lap = Lap(circle(direction, angle=math.pi))
     for step in range(9):
         bearing = direction * step * math.pi / 8

@@ -14,7 +14,7 @@ from anafi_mav.vehicle.follow import FORESIGHT, TRANSITIONS, Event, FollowSettin
 NAN = math.nan
 
 
-def test_every_state_of_following_knows_its_events() -> None:
+def test_every_follow_state_has_its_events() -> None:
     for state in State:
         for event in Event:
             impossible = (state, event) == (State.OFF, Event.SILENCE)
@@ -47,7 +47,7 @@ def test_the_nose_points_to_the_target() -> None:
     assert wanted.yaw == pytest.approx(math.pi / 2)  # the target is to the east
 
 
-def test_the_target_goes_on_for_a_moment_and_then_stands() -> None:
+def test_lost_target_moves_on_briefly_then_stops() -> None:
     follower = following()
     assert follower.target(30.5) == pytest.approx((61.0, 0.0))
     assert follower.target(99.0) == pytest.approx((60.0 + 2.0 * FORESIGHT, 0.0))
@@ -98,7 +98,7 @@ def test_two_positions_at_once_make_no_rocket() -> None:
     assert follower.speed == pytest.approx(20.0)
 
 
-def test_the_drone_does_not_rush_round_a_target_that_turns() -> None:
+def test_drone_does_not_rush_around_a_turning_target() -> None:
     """It turns round: from behind to behind is half a circle, 25 m at 8 m distance and 5 m/s at most."""
     follower = following(tangential_speed=5.0)
     follower.see(60.0, 0.0, None, (-2.0, 0.0), 31.0)

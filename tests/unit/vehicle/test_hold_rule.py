@@ -7,7 +7,7 @@ import pytest
 from anafi_mav.vehicle.hold_rule import ANSWER, APART, MAX_CLIENTS, HoldRule
 
 
-def test_hold_counts_after_five_seconds_without_one_of_its_client() -> None:
+def test_hold_counts_five_seconds_after_the_clients_previous_hold() -> None:
     rule = HoldRule()
     assert rule.arrive("a", 100.0)
     assert not rule.arrive("a", 104.0)
@@ -22,14 +22,14 @@ def test_hold_at_one_hertz_counts_once() -> None:
 
 
 @pytest.mark.parametrize(("after", "cancels"), [(4.9, False), (APART, True), (ANSWER, True), (15.1, False)])
-def test_second_hold_counts_from_5_to_15_s_after_the_offer(after: float, cancels: bool) -> None:
+def test_second_hold_counts_5_to_15_s_after_offer(after: float, cancels: bool) -> None:
     rule = HoldRule()
     rule.offer("a", 50.0)
     assert rule.answers("a", 50.0 + after) is cancels
     assert not rule.answers("b", 50.0 + after)
 
 
-def test_offer_that_was_withdrawn_is_not_answered() -> None:
+def test_withdrawn_offer_is_not_answered() -> None:
     rule = HoldRule()
     rule.offer("a", 50.0)
     rule.withdraw()

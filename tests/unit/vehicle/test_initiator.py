@@ -19,35 +19,35 @@ def returns(who: Initiators, now: float = 100.0, *, own: bool = False, plan: boo
 
 
 @pytest.mark.parametrize("skycontroller", [False, True])
-def test_landing_that_was_commanded_is_the_clients(skycontroller: bool) -> None:
+def test_commanded_landing_is_the_clients(skycontroller: bool) -> None:
     who = Initiators()
     who.land_commanded(99.0)
     assert lands(who, skycontroller=skycontroller) is CLIENT
 
 
-def test_landing_at_the_end_of_a_plan_is_the_clients() -> None:
+def test_landing_ending_a_plan_is_the_clients() -> None:
     assert lands(Initiators(), plan=True, skycontroller=True) is CLIENT
 
 
 @pytest.mark.parametrize(("skycontroller", "expected"), [(False, DRONE), (True, PILOT)])
-def test_landing_that_nothing_explains(skycontroller: bool, expected: Initiator) -> None:
+def test_unexplained_landing_is_the_drones_or_the_pilots(skycontroller: bool, expected: Initiator) -> None:
     assert lands(Initiators(), skycontroller=skycontroller) is expected
 
 
-def test_landing_long_after_the_command_is_not_its() -> None:
+def test_landing_long_after_a_command_is_not_the_clients() -> None:
     who = Initiators()
     who.land_commanded(80.0)
     assert lands(who, skycontroller=True) is PILOT
 
 
-def test_landing_of_the_pilot_keeps_its_initiator_after_a_client_command() -> None:
+def test_landing_of_the_pilot_stays_the_pilots() -> None:
     who = Initiators()
     assert lands(who, skycontroller=True) is PILOT
     who.land_commanded(101.0)
     assert who.landing is PILOT
 
 
-def test_landing_after_a_return_has_the_initiator_of_the_return() -> None:
+def test_landing_after_a_return_keeps_the_returns_initiator() -> None:
     who = Initiators()
     returns(who, own=True)
     assert lands(who) is DRONE  # reported before the return's end
@@ -86,7 +86,7 @@ def test_return(own: bool, plan: bool, sc: bool, commanded: bool, expected: Init
     assert who.returning is expected
 
 
-def test_return_of_a_client_stays_its_own_in_later_phases() -> None:
+def test_return_of_a_client_stays_the_clients() -> None:
     who = Initiators()
     who.return_commanded(99.0)
     returns(who, 100.0, sc=True)

@@ -20,7 +20,7 @@ def rest(until: float, begin: float = 0.0) -> list[tuple[float, float]]:
     return [(begin + step / 10, 0.05) for step in range(round((until - begin) * 10) + 1)]
 
 
-def test_stick_after_half_a_second_of_rest_takes_over_once() -> None:
+def test_stick_after_half_a_second_of_rest_overrides_once() -> None:
     assert taken(*rest(0.5), (0.6, 0.2), (0.7, 0.31), (0.8, 0.9), (0.9, 0.1), (1.0, 0.9)) == [0.7]
 
 
@@ -33,7 +33,7 @@ def test_stick_after_a_shorter_rest_does_not() -> None:
     assert taken(*rest(0.4), (0.5, 0.9)) == []
 
 
-def test_stick_that_is_deflected_from_the_beginning_does_not() -> None:
+def test_stick_deflected_from_the_beginning_does_not_override() -> None:
     assert taken(*[(step / 10, 0.9) for step in range(50)]) == []
 
 
@@ -48,7 +48,7 @@ def test_second_takeover_needs_a_second_rest() -> None:
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_throttle_after_a_takeover_counts_once_it_has_passed_the_middle(side: float) -> None:
+def test_throttle_counts_after_passing_the_middle(side: float) -> None:
     override = JoystickOverride()
     override.take_over(CLIENT, side)
     assert [override.climb(CLIENT, side * share) for share in (1.0, 0.4, -0.2, 0.6)] == [

@@ -11,7 +11,7 @@ from anafi_mav.services.setpoint.stick_messages import RcChannels, manual_sticks
 from anafi_mav.vehicle.manual_flight import TRANSITIONS, Event, State, Sticks
 
 
-def test_every_state_of_the_sticks_knows_its_events() -> None:
+def test_every_stick_state_has_its_events() -> None:
     for state in State:
         for event in Event:
             impossible = (state, event) == (State.IDLE, Event.SILENCE)
@@ -43,7 +43,7 @@ def test_the_axes_of_manual_control(axes: dict[str, int], sticks: Sticks) -> Non
     assert manual_sticks(manual(**axes)) == sticks
 
 
-def test_a_joystick_without_axes_says_nothing() -> None:
+def test_manual_control_without_axes_is_no_input() -> None:
     assert manual_sticks(manual(32767, 32767, 32767, 32767)) is None
 
 
@@ -83,7 +83,7 @@ def test_the_channels(channels: tuple[int, ...], sticks: Sticks) -> None:
     assert after(override(*channels)).sticks == sticks
 
 
-def test_only_the_channels_that_are_set_change() -> None:
+def test_override_changes_only_the_set_channels() -> None:
     first = override(1700, 0xFFFF, 0xFFFF, 0xFFFF)
     assert after(first).sticks == Sticks(right=0.4)
     assert after(first, override(0xFFFF, 1300, 0xFFFF, 0xFFFF)).sticks == Sticks(right=0.4, forward=0.4)

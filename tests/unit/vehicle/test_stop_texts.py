@@ -29,7 +29,7 @@ def aircraft(**state: Any) -> Any:
 
 
 @pytest.mark.parametrize("mode", [mode for mode in FlightMode if mode is not FlightMode.TERMINATED])
-def test_refusals_to_end_a_landing_or_return_fit_one_text(mode: FlightMode) -> None:
+def test_stop_refusals_fit_one_text(mode: FlightMode) -> None:
     assert [text for reason in UNENDABLE if len(text := f"{mode.value} refused: {reason}") > CHUNK] == []
 
 
@@ -60,7 +60,7 @@ def test_aborted_return_names_system_reason_and_battery() -> None:
     assert AbortedReturn(7, ReturnReason.ICING).reports(vehicle) == ["Return aborted by system 7: icing"]
 
 
-def test_aborted_return_is_due_every_15_s_while_the_drone_neither_returns_nor_lands() -> None:
+def test_aborted_return_is_due_every_15_s_while_unresolved() -> None:
     aborted, vehicle = AbortedReturn(1, ReturnReason.LOW_BATTERY), aircraft()
     aborted.report(vehicle, 100.0)
     assert len(vehicle.texts) == 3

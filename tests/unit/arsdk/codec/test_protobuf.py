@@ -178,11 +178,11 @@ def test_unknown_fields_and_other_encodings_are_accepted(text: str, record: Subm
         "8080808080808080808001 00",  # a tag of more than 32 bits
     ],
 )
-def test_bytes_that_are_no_protobuf_are_refused(text: str) -> None:
+def test_invalid_protobuf_bytes_are_refused(text: str) -> None:
     assert protobuf.parse(All, bytes.fromhex(text)) is None
 
 
-def test_every_cut_of_a_message_is_refused_or_a_shorter_message() -> None:
+def test_cut_message_is_refused_or_a_shorter_message() -> None:
     data = b"".join(bytes.fromhex(text) for text, record in VECTORS if isinstance(record, All))
     assert protobuf.parse(All, data) is not None
     for size in range(len(data)):
@@ -364,7 +364,7 @@ def test_random_payloads_never_raise(message: type[ProtobufMessage], data: bytes
 
 
 @given(st.sampled_from(WORTH_BREAKING), st.lists(st.tuples(st.integers(12, 300), st.integers(0, 255)), max_size=5))
-def test_mutated_payloads_never_raise_and_come_back_the_same(
+def test_mutated_payload_decodes_without_error_and_encodes_equal(
     message: ProtobufMessage, changes: list[tuple[int, int]]
 ) -> None:
     data = bytearray(wire.encode(message))

@@ -36,7 +36,7 @@ def test_known_bytes(text: str, message: wire.Message) -> None:
 
 
 @pytest.mark.parametrize(("text", "message"), VECTORS)
-def test_every_shorter_prefix_is_refused_and_a_longer_one_tolerated(text: str, message: wire.Message) -> None:
+def test_shorter_prefix_is_refused_and_longer_one_tolerated(text: str, message: wire.Message) -> None:
     data = bytes.fromhex(text)
     for size in range(len(data)):
         assert wire.decode(data[:size]) is None
@@ -59,7 +59,7 @@ def test_unknown_enum_value_survives_as_integer() -> None:
     assert wire.encode(message) == data
 
 
-def test_text_that_is_no_utf8_is_replaced() -> None:
+def test_invalid_utf8_is_replaced() -> None:
     assert wire.decode(bytes.fromhex("00 03 0200 ff 41 00")) == common.ProductNameChanged("\ufffdA")
 
 

@@ -126,7 +126,7 @@ def test_as_many_commands_are_packed_as_fit(version: int, sizes: tuple[int, ...]
     assert not queue
 
 
-def test_version_3_splits_a_command_that_is_too_long_for_a_frame() -> None:
+def test_version_3_splits_a_command_longer_than_a_frame() -> None:
     # 2 bytes of length + 998 + 1000 + 502 = a command of 2500 bytes; the next command follows in the third frame
     queue = waiting(2500, 8)
     frames = []
@@ -147,7 +147,7 @@ def test_version_3_splits_a_command_that_is_too_long_for_a_frame() -> None:
     assert unpacker.unpack(126, True, payloads[2]) == ([b"\1" * 2500, b"\2" * 8], True)
 
 
-def test_a_command_that_fits_into_the_next_frame_is_not_split() -> None:
+def test_command_fitting_the_next_frame_is_not_split() -> None:
     queue = waiting(600, 600)
     assert [(p.source.token, p.last) for p in pack(3, queue)] == [(1, True)]
     assert [(p.source.token, p.last) for p in pack(3, queue)] == [(2, True)]

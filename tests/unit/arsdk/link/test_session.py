@@ -147,7 +147,7 @@ async def answering(text: bytes | None) -> AsyncIterator[int]:
         await server.wait_closed()
 
 
-async def test_peer_that_is_no_drone_raises_remote_error() -> None:
+async def test_peer_of_another_protocol_raises_remote_error() -> None:
     async with answering(b"220 ftp.example.org ready\r\n\0") as port:
         with pytest.raises(RemoteProtocolError, match="unreadable discovery: b'220 ftp"):
             await connect(HOST, discovery_port=port, on_message=Heard())
@@ -162,7 +162,7 @@ async def test_silent_drone_is_a_lost_link() -> None:
             await connect(HOST, discovery_port=port, on_message=Heard())
 
 
-async def test_a_version_that_was_not_offered_is_the_drones_fault() -> None:
+async def test_version_not_offered_raises_remote_error() -> None:
     reply = handshake.format_reply(handshake.ConnectReply(0, 2233, 0, 3))
     async with flying() as (_, server), answering(reply) as port:
         with pytest.raises(RemoteProtocolError, match="chose protocol version 3, offered were 1 to 2"):
@@ -234,7 +234,7 @@ async def test_the_newest_handshake_wins() -> None:
         await second.close()
 
 
-async def test_a_drone_that_goes_closes_the_session() -> None:
+async def test_drone_disconnecting_closes_the_session() -> None:
     async with flying() as (_, server):
         session = await join(server)
         await server.close()
@@ -251,7 +251,7 @@ async def test_a_closed_udp_port_ends_the_session_at_once() -> None:
         await session.close()
 
 
-async def test_a_mute_drone_is_lost_and_back_when_it_speaks_again() -> None:
+async def test_silent_drone_is_lost_and_resumes_when_heard() -> None:
     async with flying(ping_after=0.05) as (drone, server):
         session = await join(server, ping_after=0.05, silence_limit=0.12)
         await asyncio.sleep(0.3)  # pings keep both ends alive: there is no event to wait for
@@ -340,7 +340,7 @@ async def test_our_own_wrong_arguments_raise() -> None:
         await session.close()
 
 
-async def test_a_busy_session_arms_its_timer_rarely(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_busy_session_rarely_sets_its_timer(monkeypatch: pytest.MonkeyPatch) -> None:
     heard = Heard()
     async with flying() as (drone, server):
         session = await join(server, heard)

@@ -79,7 +79,7 @@ def messages(events: list[Event]) -> list[object]:
         (Role.DEVICE, HOVERING, FrameType.WITHACK, 126),
     ],
 )
-def test_a_message_travels_in_the_queue_of_its_buffer(
+def test_message_travels_in_the_queue_of_its_buffer(
     version: int, role: Role, message: wire.Message, type: FrameType, id: int
 ) -> None:
     transport = Transport(role, version, 0.0)
@@ -90,7 +90,7 @@ def test_a_message_travels_in_the_queue_of_its_buffer(
     assert peer.receive(encode_frame(version, *frame), 0.0) == [ReceivedMessage(message)]
 
 
-def test_low_priority_events_have_a_queue_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_low_priority_events_have_their_own_queue(monkeypatch: pytest.MonkeyPatch) -> None:
     # Parrot's XML knows the buffer, but no message of it uses it.
     monkeypatch.setattr(ardrone3.FlyingStateChanged, "BUFFER", wire.Buffer.LOW_PRIO)
     transport = Transport(Role.DEVICE, 3, 0.0)
@@ -116,7 +116,7 @@ def test_messages_of_one_turn_share_a_frame(version: int) -> None:
 
 
 @pytest.mark.parametrize("version", [1, 2, 3])
-def test_emergency_takes_the_place_of_all_that_was_not_delivered(version: int) -> None:
+def test_emergency_replaces_all_undelivered_commands(version: int) -> None:
     transport = Transport(Role.CONTROLLER, version, 0.0)
     flying = transport.send(tilt(1), 0.0)
     transport.outgoing(0.0)
@@ -186,7 +186,7 @@ def test_sequence_window(type: FrameType, version: int, earlier: list[int], seq:
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_each_queue_counts_for_itself_and_acknowledgements_share_a_counter(version: int) -> None:
+def test_queues_count_separately_and_acknowledgements_share_a_counter(version: int) -> None:
     device = Transport(Role.DEVICE, version, 0.0)
     controller = Transport(Role.CONTROLLER, version, 0.0)
     for turn in range(2):
@@ -278,7 +278,7 @@ def test_version_1_controller_gives_up_after_five_repetitions() -> None:
     assert frames(transport, transport.outgoing(5.0))[0].seq == 1
 
 
-def test_a_version_1_controller_that_does_not_give_up() -> None:
+def test_version_1_controller_with_unlimited_retries_continues() -> None:
     transport = Transport(Role.CONTROLLER, 1, 0.0, gives_up=False)
     token = transport.send(tilt(1), 0.0)
     count, events = sendings(transport, token)
@@ -289,7 +289,7 @@ def test_a_version_1_controller_that_does_not_give_up() -> None:
 
 
 @pytest.mark.parametrize("message", [common.AllStates(), common.AllSettings(), ardrone3.Emergency()])
-def test_version_1_never_gives_up_what_parrot_marks_so(message: wire.Message) -> None:
+def test_version_1_repeats_parrots_marked_messages_without_limit(message: wire.Message) -> None:
     transport = Transport(Role.CONTROLLER, 1, 0.0)
     count, events = sendings(transport, transport.send(message, 0.0))
     assert count > 30
@@ -308,7 +308,7 @@ def test_all_others_repeat_for_ever(role: Role, version: int) -> None:
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_a_cancelled_message_that_waits_is_never_sent(version: int) -> None:
+def test_cancelled_waiting_message_is_never_sent(version: int) -> None:
     transport = Transport(Role.CONTROLLER, version, 0.0)
     transport.cancel(transport.send(tilt(1), 0.0))
     transport.cancel(transport.send(STICKS, 0.0))
@@ -334,7 +334,7 @@ def test_a_cancelled_message_in_flight_is_not_repeated(version: int) -> None:
 
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize("arrived", [True, False])
-def test_a_frame_is_repeated_without_its_cancelled_message(version: int, arrived: bool) -> None:
+def test_frame_is_repeated_without_its_cancelled_message(version: int, arrived: bool) -> None:
     left, right = Transport(Role.CONTROLLER, version, 0.0), Transport(Role.DEVICE, version, 0.0)
     tokens = [left.send(tilt(count), 0.0) for count in range(3)]
     (first,) = left.outgoing(0.0)
@@ -347,7 +347,7 @@ def test_a_frame_is_repeated_without_its_cancelled_message(version: int, arrived
     assert events == [Delivered(tokens[0]), Delivered(tokens[2])]
 
 
-def test_a_split_command_that_was_begun_is_completed() -> None:
+def test_cancelled_split_command_in_progress_is_completed() -> None:
     left, right = Transport(Role.CONTROLLER, 3, 0.0), Transport(Role.DEVICE, 3, 0.0)
     link = FaultyWire(0, Faults(), left, right)
     long = custom(1, bytes(2500))
@@ -360,7 +360,7 @@ def test_a_split_command_that_was_begun_is_completed() -> None:
     assert [event for event in link.heard[0] if isinstance(event, Delivered)] == [Delivered(token), Delivered(last)]
 
 
-def test_the_part_of_a_split_command_in_flight_is_still_repeated() -> None:
+def test_cancelled_part_of_a_split_command_is_repeated() -> None:
     transport = Transport(Role.CONTROLLER, 3, 0.0)
     token = transport.send(custom(1, bytes(2500)), 0.0)
     lost = transport.outgoing(0.0)
@@ -372,14 +372,14 @@ def test_the_part_of_a_split_command_in_flight_is_still_repeated() -> None:
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_a_ping_is_answered_with_its_own_number_and_payload(version: int) -> None:
+def test_ping_is_answered_with_its_number_and_payload(version: int) -> None:
     transport = Transport(Role.DEVICE, version, 0.0)
     ping = encode_frame(version, FrameType.NOACK, 0, 77, b"\1\2\3\4\5\6\7\x08")
     assert transport.receive(ping, 0.0) == []
     assert frames(transport, transport.outgoing(0.0)) == [Frame(FrameType.NOACK, 1, 77, b"\1\2\3\4\5\6\7\x08")]
 
 
-def test_pings_go_out_in_silence_and_three_unanswered_ones_end_the_link() -> None:
+def test_three_unanswered_pings_in_silence_end_the_link() -> None:
     transport = Transport(Role.DEVICE, 3, 100.0, ping_after=2.0)
     pings = []
     events: list[Event] = []
@@ -424,7 +424,7 @@ def test_unreadable_bytes_are_no_sign_of_life() -> None:
     assert transport.deadline() == 1.0
 
 
-def test_nothing_passes_a_link_that_is_down() -> None:
+def test_link_that_is_down_sends_and_receives_nothing() -> None:
     transport = Transport(Role.CONTROLLER, 3, 0.0, silence_limit=1.0)
     transport.send(tilt(1), 0.0)
     transport.outgoing(0.0)
@@ -543,7 +543,7 @@ def test_each_acknowledged_message_arrives_once_and_in_order(version: int, seed:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_cancelled_message_is_not_sent_again_on_a_bad_link(seed: int) -> None:
+def test_cancelled_message_is_not_resent_on_bad_link(seed: int) -> None:
     rng = random.Random(seed)
     controller, device = Transport(Role.CONTROLLER, 3, 0.0, ping_after=60.0), Transport(Role.DEVICE, 3, 0.0)
     link = FaultyWire(seed, BAD_AIR, controller, device)
@@ -651,7 +651,7 @@ def test_fading_link_drops_waiting_messages_and_recovers() -> None:
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_frames_encoded_ahead_are_those_that_would_be_sent_next(version: int) -> None:
+def test_frames_encoded_ahead_equal_the_next_frames_sent(version: int) -> None:
     transport = Transport(Role.CONTROLLER, version, 0.0)
     transport.send(tilt(1.0), 0.0)
     transport.outgoing(0.0)
@@ -664,7 +664,7 @@ def test_frames_encoded_ahead_are_those_that_would_be_sent_next(version: int) ->
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_abandoned_commands_are_undelivered_and_their_numbers_not_used_again(version: int) -> None:
+def test_abandoned_commands_are_undelivered_and_their_numbers_unused(version: int) -> None:
     transport = Transport(Role.CONTROLLER, version, 0.0)
     tokens = [transport.send(tilt(1.0), 0.0)]
     transport.outgoing(0.0)

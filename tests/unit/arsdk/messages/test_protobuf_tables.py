@@ -153,7 +153,9 @@ def compare_enum(ours: type, theirs: Any) -> None:
 
 
 @by_name
-def test_message_is_as_parrot_describes_it(message: type[ProtobufMessage], services: dict[str, Any]) -> None:
+def test_protobuf_message_agrees_with_parrots_description(
+    message: type[ProtobufMessage], services: dict[str, Any]
+) -> None:
     field = described(message, services)
     assert field.containing_oneof.name == "id"
     if field.message_type.full_name == "google.protobuf.Empty":
@@ -168,7 +170,7 @@ def test_no_message_of_these_services_is_missing(services: dict[str, Any]) -> No
     assert len(MESSAGES) > 90
 
 
-def test_olympe_knows_our_services_numbers_and_names_by_the_same() -> None:
+def test_olympe_agrees_on_service_numbers_and_names() -> None:
     script = (
         "import json, os, sys; out = os.dup(1); os.dup2(2, 1)\n"
         "import olympe\n"
@@ -268,7 +270,7 @@ def test_google_writes_and_reads_the_same_bytes(message: type[ProtobufMessage], 
         assert wire.decode(data) == ours
 
 
-def test_services_are_named_as_their_files(services: dict[str, Any]) -> None:
+def test_service_names_equal_their_file_names(services: dict[str, Any]) -> None:
     for proto in services:
         assert ProtobufEnvelope(proto, "").direction is (
             wire.Direction.COMMAND if proto.endswith(".Command") else wire.Direction.EVENT

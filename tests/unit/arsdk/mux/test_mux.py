@@ -60,7 +60,7 @@ FRAMES = st.lists(st.builds(MuxFrame, st.integers(0, 0xFFFFFFFF), st.binary(max_
 
 
 @given(frames=FRAMES, cuts=st.lists(st.integers(0, 2000), max_size=12), noise=st.binary(max_size=10))
-def test_a_stream_is_read_however_it_was_cut(frames: list[MuxFrame], cuts: list[int], noise: bytes) -> None:
+def test_mux_stream_is_decoded_in_any_split(frames: list[MuxFrame], cuts: list[int], noise: bytes) -> None:
     noise = noise.replace(b"M", b"m")
     data = noise + b"".join(encode_frame(*frame) for frame in frames)
     decoder, found, position = Decoder(), [], 0

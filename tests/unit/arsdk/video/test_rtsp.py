@@ -8,6 +8,7 @@ import pytest
 
 from anafi_mav.arsdk.video import rtsp, sdp
 from anafi_mav.arsdk.video.rtsp import (
+    InterleavedData,
     MalformedRtsp,
     MessageReader,
     Response,
@@ -16,6 +17,7 @@ from anafi_mav.arsdk.video.rtsp import (
     RtspTransport,
     Status,
     encode,
+    encode_interleaved,
     format_range,
     format_rtp_info,
     format_session,
@@ -92,6 +94,35 @@ def test_bytes_that_are_no_rtsp_are_answered_and_end_reading(data: bytes, status
     assert reader.feed(DESCRIBE_BYTES) == []
 
 
+def test_interleaved_packets_are_read_between_messages() -> None:
+    stream = b"$\x00\x00\x03abc" + DESCRIBE_BYTES + b"$\x01\x00\x00" + b"$\xff\x00\x01$" + DESCRIBE_BYTES
+    expected = [InterleavedData(0, b"abc"), DESCRIBE, InterleavedData(1, b""), InterleavedData(255, b"$"), DESCRIBE]
+    assert MessageReader(interleaved=True).feed(stream) == expected
+    reader = MessageReader(interleaved=True)
+    assert [event for byte in stream for event in reader.feed(bytes((byte,)))] == expected
+    assert encode_interleaved(1, b"abc") == b"$\x01\x00\x03abc"
+    for channel, size in ((256, 1), (-1, 1), (0, 65536)):
+        with pytest.raises(LocalProtocolError):
+            encode_interleaved(channel, bytes(size))
+
+
+def test_interleaved_transport_by_hand() -> None:
+    line = "RTP/AVP/TCP;unicast;interleaved=2-3"
+    assert format_transport(RtspTransport(lower="TCP", channels=(2, 3))) == line
+    assert parse_transport(line) == [RtspTransport(lower="TCP", channels=(2, 3))]
+    assert parse_transport("RTP/AVP/TCP;interleaved=0")[0].channels == (0, 1)
+    for text in ("256-257", "255", "x", ""):
+        assert parse_transport(f"RTP/AVP/TCP;interleaved={text}")[0].channels is None
+
+
+def test_response_carries_the_reason_it_is_given() -> None:
+    answer = Response(Status.SERVICE_UNAVAILABLE, (("CSeq", "2"),), reason="alpha shows its thermal stream")
+    assert encode(answer).startswith(b"RTSP/1.0 503 alpha shows its thermal stream\r\n")
+    assert encode(Response(Status.SERVICE_UNAVAILABLE)).startswith(b"RTSP/1.0 503 Service Unavailable\r\n")
+    with pytest.raises(LocalProtocolError):
+        encode(Response(Status.SERVICE_UNAVAILABLE, reason="a\r\nb"))
+
+
 def test_noise_never_raises() -> None:
     generator = random.Random(2)
     for _ in range(3000):
@@ -100,6 +131,7 @@ def test_noise_never_raises() -> None:
             broken[generator.randrange(len(broken))] = generator.randrange(256)
         MessageReader().feed(bytes(broken))
         MessageReader().feed(generator.randbytes(60))
+        MessageReader(interleaved=True).feed(b"$" + generator.randbytes(60))
 
 
 def test_a_line_end_in_our_own_lines_raises() -> None:
@@ -117,9 +149,9 @@ def test_transport_by_hand() -> None:
     assert format_transport(answer) == line
     assert parse_transport(line) == [answer]
     offers = parse_transport("RTP/AVP/MUX;unicast;mode=PLAY, RTP/SAVP;unicast, RTP/AVP/TCP;interleaved=0-1")
-    assert [(offer.lower, offer.unicast, offer.others) for offer in offers] == [
-        ("MUX", True, (("mode", "PLAY"),)),
-        ("TCP", False, (("interleaved", "0-1"),)),
+    assert [(offer.lower, offer.unicast, offer.channels, offer.others) for offer in offers] == [
+        ("MUX", True, None, (("mode", "PLAY"),)),
+        ("TCP", False, (0, 1), ()),
     ]
 
 

@@ -25,7 +25,7 @@ async def ready(drone: Drone, type: Type) -> None:
 
 
 @pytest.mark.parametrize("model", ["4k", "ai"])
-async def test_a_figure_from_its_start_to_its_end(model: str) -> None:
+async def test_animation_is_reported_from_start_to_end(model: str) -> None:
     async with connected(model, speed=4.0) as (drone, real):
         with pytest.raises(CommandRejected, match="is not available now"):
             await drone.animations.horizontal_panorama()
@@ -118,7 +118,7 @@ async def test_animations_state_has_the_reported_values(drone: Drone) -> None:
         await drone.animations.candle()
 
 
-async def test_only_values_that_are_given_count(drone: Drone, device: ScriptedDevice) -> None:
+async def test_animation_uses_only_the_given_values(drone: Drone, device: ScriptedDevice) -> None:
     device.script[animation.StartVertigo] = lambda m: [
         animation.VertigoState(AnimationState.RUNNING, 3.0, 2.0, m.finish_action, PlayMode.NORMAL),
         animation.State(Type.VERTIGO, 0),
@@ -139,7 +139,7 @@ async def test_unanswered_animation_start_is_withdrawn(
     await device.until(animation.Cancel)
 
 
-async def test_a_figure_that_makes_no_progress(drone: Drone, device: ScriptedDevice) -> None:
+async def test_animation_without_progress_fails(drone: Drone, device: ScriptedDevice) -> None:
     device.say(animation.State(Type.DRONIE, 10))
     await drone.expect(animation.State)
     with pytest.raises(CommandTimeout):

@@ -61,7 +61,7 @@ async def test_a_plan_is_uploaded_flown_paused_and_stopped(pair: Pair) -> None:
         await drone.flight_plan.get(uid)
 
 
-async def test_a_plan_that_is_none(pair: Pair) -> None:
+async def test_invalid_plan_is_refused(pair: Pair) -> None:
     drone = pair.drone
     uid = await drone.flight_plan.upload(b"nonsense")
     with pytest.raises(CommandRejected, match="mavlink file"):
@@ -139,7 +139,7 @@ async def test_unanswered_plan_start_is_withdrawn(device: ScriptedDevice) -> Non
         await starting
 
 
-async def test_start_at_of_firmware_that_has_the_older_form_only(device: ScriptedDevice) -> None:
+async def test_start_at_of_older_firmware_uses_the_older_form(device: ScriptedDevice) -> None:
     drone = device.drone()
     await drone.connect()
     heard = asyncio.ensure_future(drone.expect(modern.Capabilities))
@@ -169,7 +169,7 @@ async def test_a_drone_without_flight_plans() -> None:
         await drone.close()
 
 
-async def test_a_name_that_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_invalid_plan_name_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     async with connected("4k") as (drone, real):
         for uid in ("", "../x", 5):
             monkeypatch.setattr(real.firmware.plans, "put", lambda data, date, uid=uid: uid)

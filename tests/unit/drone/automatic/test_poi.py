@@ -128,7 +128,7 @@ async def test_the_magnetometer() -> None:
         assert not drone.calibration.state.started
 
 
-async def test_a_magnetometer_that_fails_or_is_not_turned(device: ScriptedDevice, drone: Drone) -> None:
+async def test_magnetometer_calibration_without_turns_fails(device: ScriptedDevice, drone: Drone) -> None:
     device.script[common.MagnetoCalibration] = lambda _: [common.MagnetoCalibrationStartedChanged(1)]
     await drone.calibration.start_magnetometer()
     with pytest.raises(CommandTimeout):

@@ -140,7 +140,7 @@ async def test_both_are_read(crew: Crew) -> None:
     assert crew.drone.counters["unknown message"] == 0
 
 
-async def test_connecting_and_taking_off_leaves_the_sticks_to_the_pilot(crew: Crew) -> None:
+async def test_connecting_and_taking_off_leaves_sticks_to_the_pilot(crew: Crew) -> None:
     await crew.take_off()
     crew.drone.piloting.hover()
     await crew.drone.piloting.return_home()
@@ -151,7 +151,7 @@ async def test_connecting_and_taking_off_leaves_the_sticks_to_the_pilot(crew: Cr
     assert crew.sc.dropped == 0  # no stick position of ours, level or not
 
 
-async def test_a_setpoint_takes_the_source_and_silence_gives_it_back(crew: Crew) -> None:
+async def test_setpoint_acquires_the_source_and_silence_releases_it(crew: Crew) -> None:
     await crew.take_off()
     async with crew.piloting():
         await crew.grabbed(STICKS)
@@ -167,7 +167,7 @@ async def test_a_setpoint_takes_the_source_and_silence_gives_it_back(crew: Crew)
     assert [entry.args["axes"] for entry in crew.told("grab")] == [STICKS, 0]
 
 
-async def test_a_stick_of_the_pilot_takes_the_drone_at_once(crew: Crew) -> None:
+async def test_pilots_stick_acquires_the_drone_immediately(crew: Crew) -> None:
     await crew.take_off()
     async with crew.piloting():
         await crew.sees(lambda: crew.sc.source is Source.CONTROLLER)
@@ -194,7 +194,7 @@ async def test_a_stick_of_the_pilot_takes_the_drone_at_once(crew: Crew) -> None:
         await crew.sees(lambda: crew.sc.source is Source.CONTROLLER)
 
 
-async def test_a_move_holds_the_source_to_its_end(crew: Crew) -> None:
+async def test_move_holds_the_source_until_its_end(crew: Crew) -> None:
     await crew.take_off()
     began = now()
     flight = asyncio.create_task(crew.drone.piloting.move_by(12.0, 0.0, 0.0, 0.0))
@@ -247,7 +247,7 @@ async def test_the_end_of_the_program_gives_everything_back(crew: Crew) -> None:
     assert crew.sc.grabbed_axes == 0
 
 
-async def test_a_controller_that_loses_the_drone_is_a_lost_link(crew: Crew) -> None:
+async def test_controller_losing_its_drone_is_a_lost_link(crew: Crew) -> None:
     crew.sc.radio = False
     reason = await asyncio.wait_for(asyncio.shield(crew.drone.lost), 3.0)
     assert reason == "the Skycontroller lost the drone: searching"
@@ -283,7 +283,7 @@ async def test_grab_of_axes_and_buttons(crew: Crew) -> None:
             await controller.grab(axes, buttons)
 
 
-async def test_its_drones(crew: Crew) -> None:
+async def test_controller_lists_connects_and_forgets_drones(crew: Crew) -> None:
     controller, serial = crew.drone.controller, crew.real.identity.serial
     seen = await controller.discover_drones()
     assert seen[serial].active
@@ -309,7 +309,7 @@ async def test_the_web_server_of_the_drone_is_reached(generation: int) -> None:
         await drone.close()
 
 
-async def test_a_controller_that_speaks_protobuf_alone() -> None:
+async def test_controller_with_protobuf_alone_is_supported() -> None:
     def device_info(uid: str) -> device_manager.DeviceInfo:
         return device_manager.DeviceInfo(uid=uid, model=0x091A, network_id="ANAFI-Ai")
 
@@ -367,7 +367,7 @@ async def test_a_controller_that_speaks_protobuf_alone() -> None:
         assert device.got(drone_manager.DiscoverDrones) == []
 
 
-async def test_without_a_controller_there_is_none() -> None:
+async def test_drone_without_controller_reports_no_controller() -> None:
     async with Simulator([DroneSpec(address=loopback(), http_port=None)], speed=3.0, seed=1) as simulator:
         drone = Drone(simulator.drones[0].address, name="direct")
         await drone.connect()
@@ -477,7 +477,7 @@ def ended(move: Move) -> Message:
     return ardrone3.MoveToChanged(*place, none, 0.0, canceled)
 
 
-async def test_a_controller_that_takes_the_source_back_ends_a_move() -> None:
+async def test_controller_acquiring_the_source_ends_a_move() -> None:
     async with behind() as (drone, device):
         device.script[ardrone3.MoveTo] = under_way
         move = await drone.piloting.move_to(48.0, 2.0, 5.0)
@@ -530,7 +530,7 @@ async def test_the_pilot_is_seen_while_something_is_to_begin(what: str) -> None:
         assert (task.exception() is None) == (what == "following")
 
 
-async def test_a_return_that_never_began_does_not_hold_the_source() -> None:
+async def test_return_without_start_does_not_hold_the_source() -> None:
     async with behind() as (drone, device):
         drone.piloting.pilot(FORWARD)
         await device.until(skyctrl.SetPilotingSource)
@@ -544,7 +544,7 @@ def times_of(device: ScriptedDevice, kind: type[Message]) -> float:
     return device.times(kind)[-1]
 
 
-async def test_axes_after_end_of_move_go_back_within_half_a_second() -> None:
+async def test_axes_return_within_half_a_second_of_a_move() -> None:
     async with behind() as (drone, device):
         device.script[ardrone3.MoveTo] = under_way
         move = await drone.piloting.move_to(48.0, 2.0, 5.0)
@@ -579,7 +579,7 @@ async def test_source_of_an_earlier_connection_is_given_back() -> None:
         assert device.got(mapper.Grab)[-1].axes == 0
 
 
-async def test_stall_of_the_host_ends_what_flies() -> None:
+async def test_host_stall_ends_the_active_flight_task() -> None:
     async with behind() as (drone, device):
         device.script[ardrone3.MoveTo] = under_way
         await drone.piloting.move_to(48.0, 2.0, 5.0)

@@ -39,7 +39,7 @@ async def begun(work: Awaitable[None]) -> asyncio.Future[None]:
     return task
 
 
-async def test_landing_is_ended_by_gaz_until_another_state_is_reported(drone: Drone, device: ScriptedDevice) -> None:
+async def test_gaz_against_landing_lasts_until_another_state_is_reported(drone: Drone, device: ScriptedDevice) -> None:
     await reported(drone, device, FlyingState.LANDING)
     ending = await begun(drone.piloting.end_landing())
     await device.until(ardrone3.PCMD, 4)
@@ -53,7 +53,7 @@ async def test_landing_is_ended_by_gaz_until_another_state_is_reported(drone: Dr
     assert device.got(ardrone3.TakeOff) == device.got(ardrone3.SmartTakeOffLand) == []
 
 
-async def test_gaz_against_a_landing_ends_after_a_second_and_is_centred(drone: Drone, device: ScriptedDevice) -> None:
+async def test_gaz_against_landing_ends_after_a_second_centred(drone: Drone, device: ScriptedDevice) -> None:
     """A firmware that ignores it, or reports nothing: no stick outlives the second."""
     await reported(drone, device, FlyingState.LANDING)
     with pytest.raises(CommandRejected, match="drone still landing"):
@@ -77,9 +77,7 @@ async def test_touchdown_ends_the_gaz_and_nothing_starts_the_motors(drone: Drone
 
 
 @pytest.mark.parametrize("flying", [FlyingState.EMERGENCY_LANDING, FlyingState.EMERGENCY])
-async def test_landing_that_becomes_forced_is_left_alone(
-    drone: Drone, device: ScriptedDevice, flying: FlyingState
-) -> None:
+async def test_landing_becoming_forced_is_left_alone(drone: Drone, device: ScriptedDevice, flying: FlyingState) -> None:
     await reported(drone, device, FlyingState.LANDING)
     ending = await begun(drone.piloting.end_landing())
     await device.until(ardrone3.PCMD, 2)
@@ -102,7 +100,7 @@ async def test_cancelled_end_of_a_landing_centres_the_sticks(drone: Drone, devic
 
 
 @pytest.mark.parametrize("modern", [False, True])
-async def test_take_off_command_against_a_landing_is_of_the_model(
+async def test_takeoff_command_against_a_landing_depends_on_the_model(
     drone: Drone, device: ScriptedDevice, modern: bool
 ) -> None:
     drone.piloting.is_modern = lambda: modern
@@ -118,7 +116,7 @@ async def test_take_off_command_against_a_landing_is_of_the_model(
         assert UP not in gaz(device)
 
 
-async def test_motors_that_start_after_a_lost_race_are_stopped(drone: Drone, device: ScriptedDevice) -> None:
+async def test_motors_started_after_a_late_takeoff_are_stopped(drone: Drone, device: ScriptedDevice) -> None:
     """The TakeOff reached a drone that had just landed, and is executed late."""
     await reported(drone, device, FlyingState.LANDING)
     ending = await begun(drone.piloting.end_landing(take_off=True))
@@ -133,7 +131,7 @@ async def test_motors_that_start_after_a_lost_race_are_stopped(drone: Drone, dev
     await device.until(ardrone3.Landing, 2)
 
 
-async def test_motors_that_start_are_stopped_when_reported_together_with_touchdown(
+async def test_motors_reported_started_together_with_touchdown_are_stopped(
     drone: Drone, device: ScriptedDevice
 ) -> None:
     """A link that was interrupted delivers both states in one event-loop iteration (soak, seed 2168)."""
@@ -162,7 +160,7 @@ async def test_touchdown_after_an_ended_landing_does_not_stop_motors(drone: Dron
 
 
 @pytest.mark.parametrize("modern", [False, True])
-async def test_take_off_command_against_a_landing_is_withdrawn_with_it(
+async def test_takeoff_command_against_a_withdrawn_landing_is_withdrawn(
     drone: Drone, device: ScriptedDevice, modern: bool
 ) -> None:
     """A newer command replaces it while the drone receives nothing: it must not arrive later, on the ground."""
@@ -183,7 +181,7 @@ async def test_take_off_command_against_a_landing_is_withdrawn_with_it(
     await device.until(ardrone3.Landing)
 
 
-async def test_a_wanted_take_off_after_a_lost_race_is_not_stopped(drone: Drone, device: ScriptedDevice) -> None:
+async def test_requested_takeoff_after_a_lost_race_is_not_stopped(drone: Drone, device: ScriptedDevice) -> None:
     await reported(drone, device, FlyingState.LANDING)
     ending = await begun(drone.piloting.end_landing(take_off=True))
     await device.until(ardrone3.TakeOff)
@@ -243,7 +241,7 @@ async def test_land_after_gaz_is_sent_although_landing_is_reported(drone: Drone,
     await device.quiet(ardrone3.PCMD)
 
 
-async def test_land_that_was_withdrawn_and_begins_is_settled(drone: Drone, device: ScriptedDevice) -> None:
+async def test_withdrawn_land_that_begins_is_settled(drone: Drone, device: ScriptedDevice) -> None:
     await reported(drone, device, FlyingState.HOVERING)
     landing = await begun(drone.piloting.land())
     await device.until(ardrone3.Landing, 1)
@@ -269,7 +267,7 @@ async def test_stop_motors_sends_both_and_returns_when_landed(drone: Drone, devi
     assert device.got(ardrone3.Emergency) == []
 
 
-async def test_stop_motors_by_force_cuts_motors_that_ramp_on(drone: Drone, device: ScriptedDevice) -> None:
+async def test_forced_motor_stop_cuts_motors_still_ramping(drone: Drone, device: ScriptedDevice) -> None:
     device.script[ardrone3.Emergency] = lambda _: [state(FlyingState.EMERGENCY)]
     await reported(drone, device, FlyingState.MOTOR_RAMPING)
     await drone.piloting.stop_motors(force=True)

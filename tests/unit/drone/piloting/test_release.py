@@ -19,9 +19,7 @@ async def flying(drone: Drone, device: ScriptedDevice) -> None:
     await heard
 
 
-async def test_return_home_is_preceded_by_flag_zero_when_sticks_were_silent(
-    drone: Drone, device: ScriptedDevice
-) -> None:
+async def test_return_home_after_silent_sticks_sends_flag_zero_first(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     device.script[rth.ReturnToHome] = lambda _: [rth.State(RthState.PENDING, StateReason.USER_REQUEST)]
     await drone.piloting.return_home()
@@ -29,7 +27,7 @@ async def test_return_home_is_preceded_by_flag_zero_when_sticks_were_silent(
     assert [(p.flag, p.roll, p.pitch, p.yaw, p.gaz) for p in device.got(ardrone3.PCMD)] == 3 * [(0, 0, 0, 0, 0)]
 
 
-async def test_return_home_sends_no_pcmd_while_the_pilot_has_the_source(drone: Drone, device: ScriptedDevice) -> None:
+async def test_return_home_with_pilot_in_control_sends_no_pcmd(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     drone.piloting.pilot_has_source = lambda: True
     device.script[rth.ReturnToHome] = lambda _: [rth.State(RthState.PENDING, StateReason.USER_REQUEST)]

@@ -102,7 +102,7 @@ Verb = Callable[[Drone], Awaitable[Any]]
 
 
 @pytest.mark.parametrize(("verb", "start", "stop"), BEGINNINGS)
-async def test_hover_calls_off_what_has_not_begun(
+async def test_hover_cancels_commands_before_they_begin(
     drone: Drone, device: ScriptedDevice, verb: Verb, start: type[Message], stop: type[Message]
 ) -> None:
     await flies(drone, device)
@@ -132,7 +132,7 @@ async def test_undelivered_start_is_not_sent_after_hover(
 
 @pytest.mark.parametrize(("verb", "start", "stop"), BEGINNINGS)
 @pytest.mark.parametrize("how", ["hover", "cancel"])
-async def test_a_stop_is_confirmed_when_the_drone_has_the_order(
+async def test_stop_is_confirmed_when_the_drone_has_the_command(
     drone: Drone, device: ScriptedDevice, verb: Verb, start: type[Message], stop: type[Message], how: str
 ) -> None:
     await flies(drone, device)
@@ -185,7 +185,7 @@ async def test_stop_before_the_start_is_confirmed_still_stops(
 
 @pytest.mark.parametrize(("verb", "start", "stop"), BEGINNINGS)
 @pytest.mark.parametrize("newer", ["move_to", "move_by", "return_home", "land"])
-async def test_a_newer_intention_calls_off_what_has_not_begun(
+async def test_newer_command_cancels_the_older_before_it_begins(
     drone: Drone, device: ScriptedDevice, verb: Verb, start: type[Message], stop: type[Message], newer: str
 ) -> None:
     await flies(drone, device)
@@ -263,7 +263,7 @@ async def test_hover_repeats_the_stop_when_follow_me_continues(drone: Drone, dev
 # -- flight plans
 
 
-async def test_plan_that_begins_after_hover_is_stopped(drone: Drone, device: ScriptedDevice) -> None:
+async def test_plan_starting_after_hover_is_stopped(drone: Drone, device: ScriptedDevice) -> None:
     """A drone reads the whole file before it says anything."""
     await flies(drone, device)
     starting = asyncio.ensure_future(drone.flight_plan.start("abc"))
@@ -296,7 +296,7 @@ async def test_plan_of_another_controller_is_not_stopped(drone: Drone, device: S
     assert device.got(common.Stop) == []
 
 
-async def test_another_plan_that_plays_confirms_no_start(drone: Drone, device: ScriptedDevice) -> None:
+async def test_another_playing_plan_does_not_confirm_a_start(drone: Drone, device: ScriptedDevice) -> None:
     await flies(drone, device)
     await reported(drone, device, plan(PlayingState.PLAYING, "first"))
     device.script[common.Start] = lambda _: [plan(PlayingState.PLAYING, "first")]
@@ -368,7 +368,7 @@ WISHES: list[Any] = [
     ],
     ids=["returns", "is about to return", "emergency landing", "landing"],
 )
-async def test_nothing_gets_in_the_way_of_its_own_will(
+async def test_verb_during_the_drones_own_action_is_refused(
     drone: Drone, device: ScriptedDevice, verb: Verb, event: Message
 ) -> None:
     await flies(drone, device)
@@ -415,9 +415,7 @@ async def test_abort_of_the_drones_own_return_is_not_withdrawn(drone: Drone, dev
     await stopping
 
 
-async def test_return_is_not_confirmed_by_a_return_whose_second_abort_is_sent(
-    drone: Drone, device: ScriptedDevice
-) -> None:
+async def test_return_with_second_abort_sent_is_not_confirmed(drone: Drone, device: ScriptedDevice) -> None:
     await flies(drone, device)
     device.script[rth.ReturnToHome] = lambda _: [rth.State(RthState.IN_PROGRESS, StateReason.USER_REQUEST)]
     device.script[rth.Abort] = lambda _: [rth.State(RthState.AVAILABLE, StateReason.STOPPED)]
@@ -443,7 +441,7 @@ async def test_return_is_not_confirmed_by_a_return_whose_second_abort_is_sent(
     ]
 
 
-async def test_move_that_ends_in_a_return_does_not_end_the_return(drone: Drone, device: ScriptedDevice) -> None:
+async def test_move_ending_in_a_return_does_not_end_it(drone: Drone, device: ScriptedDevice) -> None:
     """The pilot at a Skycontroller pressed his button: nothing of ours is sent into his return."""
     await flies(drone, device)
     moving = asyncio.ensure_future(drone.piloting.move_by(50.0, 0.0, 0.0, 0.0))
@@ -466,7 +464,7 @@ async def test_landing_ends_a_hand_launch(drone: Drone, device: ScriptedDevice) 
     assert [m.state for m in device.got(ardrone3.UserTakeOff)] == [0]
 
 
-async def test_a_drone_that_is_thrown_at_that_moment_lands(drone: Drone, device: ScriptedDevice) -> None:
+async def test_drone_thrown_during_a_stop_lands(drone: Drone, device: ScriptedDevice) -> None:
     await flies(drone, device, FlyingState.USERTAKEOFF)
     device.script[ardrone3.UserTakeOff] = lambda _: [ardrone3.FlyingStateChanged(FlyingState.TAKINGOFF)]
     device.script[ardrone3.Landing] = lambda _: [ardrone3.FlyingStateChanged(FlyingState.LANDING)]
@@ -474,7 +472,7 @@ async def test_a_drone_that_is_thrown_at_that_moment_lands(drone: Drone, device:
 
 
 @pytest.mark.parametrize("verb", ["land", "cancel_hand_launch"])
-async def test_a_hand_launch_on_its_way_is_caught(drone: Drone, device: ScriptedDevice, verb: str) -> None:
+async def test_hand_launch_in_progress_is_stopped(drone: Drone, device: ScriptedDevice, verb: str) -> None:
     """Motors that start in a hand after "disarmed" are the worst."""
     deaf(device)
     launching = asyncio.ensure_future(drone.piloting.hand_launch())
@@ -522,7 +520,7 @@ async def test_motors_do_not_start_during_a_calibration(drone: Drone, device: Sc
     assert drone.takeoff_blockers() == []
 
 
-async def test_no_calibration_of_what_flies_or_is_about_to(drone: Drone, device: ScriptedDevice) -> None:
+async def test_calibration_in_flight_or_before_takeoff_is_refused(drone: Drone, device: ScriptedDevice) -> None:
     rising = asyncio.ensure_future(drone.piloting.take_off())
     await device.until(ardrone3.TakeOff)
     with pytest.raises(CommandRejected, match="about to take off"):
@@ -534,7 +532,7 @@ async def test_no_calibration_of_what_flies_or_is_about_to(drone: Drone, device:
     assert device.got(common.MagnetoCalibration) == []
 
 
-async def test_emergency_overtakes_and_nothing_follows_it(drone: Drone, device: ScriptedDevice) -> None:
+async def test_emergency_overtakes_other_commands_and_ends_them(drone: Drone, device: ScriptedDevice) -> None:
     deaf(device)
     tilt = asyncio.ensure_future(drone.piloting.set_max_tilt(20.0))
     await asyncio.sleep(0.05)  # in flight: what comes now waits behind it
@@ -578,7 +576,7 @@ async def test_cancelled_reboot_is_withdrawn(drone: Drone, device: ScriptedDevic
     assert device.got(common.Reboot) == []
 
 
-async def test_no_reboot_of_what_falls_or_is_about_to_fly(drone: Drone, device: ScriptedDevice) -> None:
+async def test_reboot_in_a_fall_or_before_takeoff_is_refused(drone: Drone, device: ScriptedDevice) -> None:
     rising = asyncio.ensure_future(drone.piloting.take_off())
     await device.until(ardrone3.TakeOff)
     with pytest.raises(CommandRejected, match="about to take off"):
@@ -594,7 +592,7 @@ async def test_no_reboot_of_what_falls_or_is_about_to_fly(drone: Drone, device: 
 # -- moves
 
 
-async def test_zero_move_of_hover_confirms_none_of_two_newer_moves(drone: Drone, device: ScriptedDevice) -> None:
+async def test_zero_move_of_hover_confirms_no_newer_move(drone: Drone, device: ScriptedDevice) -> None:
     await flies(drone, device)
     given_up = asyncio.ensure_future(drone.piloting.move_by(9.0, 0.0, 0.0, 0.0))
     await device.until(ardrone3.MoveBy)

@@ -42,7 +42,7 @@ def test_percent_follows_the_limits_of_the_drone() -> None:
 
 
 @pytest.mark.parametrize("field", ["roll_deg", "pitch_deg", "yaw_rate_dps", "climb_mps"])
-def test_a_setpoint_that_is_no_number_is_our_own_mistake(field: str) -> None:
+def test_setpoint_with_nan_raises(field: str) -> None:
     with pytest.raises(LocalProtocolError):
         percent(PilotingCommand(**{field: math.nan}), LIMITS)
 
@@ -66,7 +66,7 @@ def test_nothing_is_sent_before_the_first_command() -> None:
     assert StickSchedule().due(10.0) is None
 
 
-def test_a_setpoint_leaves_at_once_and_is_repeated_at_20_hz() -> None:
+def test_setpoint_leaves_immediately_and_repeats_at_20_hz() -> None:
     sticks = StickSchedule()
     sticks.command(Percent(10, -20, 30, -40), 100.0)
     assert sticks.deadline == 100.0
@@ -86,7 +86,7 @@ def test_a_newer_setpoint_does_not_wait_for_the_rhythm() -> None:
     assert sticks.deadline == pytest.approx(1.06)
 
 
-def test_setpoints_that_come_too_often_wait_and_the_newest_wins() -> None:
+def test_setpoints_faster_than_20_hz_send_the_newest() -> None:
     sticks = StickSchedule()
     for now, roll in ((1.0, 10), (1.005, 11)):  # two may follow each other at once
         sticks.command(Percent(roll, 0, 0, 0), now)
@@ -100,7 +100,7 @@ def test_setpoints_that_come_too_often_wait_and_the_newest_wins() -> None:
     assert pcmd.roll == 30
 
 
-def test_the_same_said_again_leaves_with_the_repetition() -> None:
+def test_unchanged_setpoint_leaves_with_the_next_repetition() -> None:
     """A joystick that is held still is streamed fifty times a second; the drone hears it twenty times."""
     sticks = StickSchedule()
     sent = []
@@ -116,7 +116,7 @@ def test_the_same_said_again_leaves_with_the_repetition() -> None:
     assert {p.roll for t, p in run(sticks, 4.49, 4.6)} == {0}
 
 
-def test_a_setpoint_that_is_not_renewed_becomes_centred_sticks() -> None:
+def test_expired_setpoint_centres_the_sticks() -> None:
     sticks = StickSchedule()
     sticks.command(Percent(10, 0, 0, 0), 0.0)
     sent = run(sticks, 0.0, 60.0)
@@ -150,7 +150,7 @@ FLAGS = [
 
 
 @pytest.mark.parametrize(("position", "flag"), FLAGS)
-def test_pcmd_flag_is_one_only_while_roll_or_pitch_is_deflected(position: Percent, flag: int) -> None:
+def test_pcmd_flag_is_one_while_roll_or_pitch_deflected(position: Percent, flag: int) -> None:
     sticks = StickSchedule()
     sticks.command(position, 1.0)
     pcmd = sticks.due(1.0)
@@ -168,7 +168,7 @@ def test_a_command_ends_the_centring_and_stop_ends_all() -> None:
     assert sticks.due(11.0) is None
 
 
-def test_a_late_call_keeps_the_grid_but_missed_ones_are_not_made_up_for() -> None:
+def test_late_timer_keeps_the_grid_and_skips_missed_periods() -> None:
     sticks = StickSchedule()
     sticks.command(CENTRED, 0.0)
     sticks.due(0.0)

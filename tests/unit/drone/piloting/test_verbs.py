@@ -64,7 +64,7 @@ def zeros(device: ScriptedDevice) -> list[ardrone3.PCMD]:
 # -- the connection
 
 
-async def test_message_log_has_each_command_that_is_sent(
+async def test_message_log_contains_each_sent_command(
     drone: Drone, device: ScriptedDevice, caplog: pytest.LogCaptureFixture
 ) -> None:
     """With `-vv` the log is a trace of both directions, which a report from a real aircraft needs."""
@@ -75,7 +75,7 @@ async def test_message_log_has_each_command_that_is_sent(
     assert any("MoveToChanged(" in record.getMessage() for record in caplog.records)
 
 
-async def test_connect_requests_all_states_and_waits_for_them(device: ScriptedDevice) -> None:
+async def test_connect_requests_all_states_and_awaits_them(device: ScriptedDevice) -> None:
     drone = device.drone()
     assert not drone.connected
     seen: list[str] = []
@@ -99,7 +99,7 @@ async def test_connect_requests_all_states_and_waits_for_them(device: ScriptedDe
     assert not drone.connected
 
 
-async def test_the_date_is_local_time_with_its_offset(device: ScriptedDevice) -> None:
+async def test_date_is_local_time_with_its_offset(device: ScriptedDevice) -> None:
     class Clock:
         def monotonic(self) -> float:
             return 0.0
@@ -212,7 +212,7 @@ async def test_unknown_model_is_named_by_its_number() -> None:
         await drone.close()
 
 
-async def test_expect_takes_the_next_one_that_fits(drone: Drone, device: ScriptedDevice) -> None:
+async def test_expect_accepts_the_next_matching_message(drone: Drone, device: ScriptedDevice) -> None:
     wait = asyncio.ensure_future(drone.expect(common.BatteryStateChanged, lambda m: m.percent < 50))
     await asyncio.sleep(0)
     device.say(common.BatteryStateChanged(60), common.BatteryStateChanged(40), common.BatteryStateChanged(30))
@@ -257,7 +257,7 @@ async def test_take_off_waits_through_the_ramping_for_takingoff(drone: Drone, de
         ([ardrone3.AlertStateChanged(ardrone3.AlertState.CRITICAL_BATTERY)], "alert critical battery"),
     ],
 )
-async def test_a_silent_refusal_to_take_off_gets_the_reason_reported(
+async def test_silently_refused_takeoff_names_the_reported_reason(
     drone: Drone, device: ScriptedDevice, events: list[Message], reason: str
 ) -> None:
     await reported(drone, device, *events)
@@ -271,7 +271,7 @@ async def test_a_silent_refusal_without_a_reason_is_a_timeout(drone: Drone, devi
         await drone.piloting.take_off(timeout=SHORT)
 
 
-async def test_motors_that_stop_again_are_a_refused_take_off(drone: Drone, device: ScriptedDevice) -> None:
+async def test_motors_stopping_again_are_a_refused_takeoff(drone: Drone, device: ScriptedDevice) -> None:
     device.script[ardrone3.TakeOff] = lambda _: [
         ardrone3.FlyingStateChanged(FlyingState.MOTOR_RAMPING),
         ardrone3.MotorErrorStateChanged(1, ardrone3.MotorError.ERROR_MOTOR_STALLED),
@@ -339,7 +339,7 @@ async def test_emergency(drone: Drone, device: ScriptedDevice) -> None:
 # -- relative moves
 
 
-async def test_move_by_returns_what_was_flown_at_its_end(drone: Drone, device: ScriptedDevice) -> None:
+async def test_move_by_returns_the_flown_distance(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     flight = asyncio.ensure_future(drone.piloting.move_by(1.0, -2.0, 0.5, math.pi / 2))
     command = await device.until(ardrone3.MoveBy)
@@ -380,7 +380,7 @@ async def test_a_newer_move_by_interrupts_the_older(drone: Drone, device: Script
     assert (await newer).right == 5.0
 
 
-async def test_end_of_a_cancelled_move_by_does_not_end_the_next(drone: Drone, device: ScriptedDevice) -> None:
+async def test_end_of_a_cancelled_move_by_leaves_the_next(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     first = asyncio.ensure_future(drone.piloting.move_by(10.0, 0.0, 0.0, 0.0))
     await device.until(ardrone3.MoveBy)
@@ -398,7 +398,7 @@ async def test_end_of_a_cancelled_move_by_does_not_end_the_next(drone: Drone, de
     assert (await second).right == 5.0
 
 
-async def test_move_by_that_times_out_is_stopped(drone: Drone, device: ScriptedDevice) -> None:
+async def test_timed_out_move_by_is_stopped(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     with pytest.raises(CommandTimeout):
         await drone.piloting.move_by(10.0, 0.0, 0.0, 0.0, timeout=SHORT)
@@ -411,7 +411,7 @@ async def test_move_by_that_times_out_is_stopped(drone: Drone, device: ScriptedD
     assert await device.until(ardrone3.MoveBy, 4) == ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0)
 
 
-async def test_moves_that_are_no_numbers_are_our_own_mistake(drone: Drone, device: ScriptedDevice) -> None:
+async def test_moves_with_nan_raise(drone: Drone, device: ScriptedDevice) -> None:
     with pytest.raises(LocalProtocolError):
         await drone.piloting.move_by(math.nan, 0.0, 0.0, 0.0)
     with pytest.raises(LocalProtocolError):
@@ -426,7 +426,7 @@ async def test_moves_that_are_no_numbers_are_our_own_mistake(drone: Drone, devic
 # -- absolute moves
 
 
-async def test_move_to_returns_under_way_and_its_result_is_the_end(drone: Drone, device: ScriptedDevice) -> None:
+async def test_move_to_returns_under_way_and_result_at_end(drone: Drone, device: ScriptedDevice) -> None:
     device.script[ardrone3.MoveTo] = lambda command: [running(command)]
     journey = await drone.piloting.move_to(48.8789, 2.3677, 15.0)
     assert device.got(ardrone3.MoveTo) == [ardrone3.MoveTo(48.8789, 2.3677, 15.0, OrientationMode.NONE, 0.0)]
@@ -447,7 +447,7 @@ async def test_move_to_with_a_heading_turns_on_the_way(
     assert (command.orientation_mode, command.heading) == (OrientationMode.HEADING_DURING, sent)
 
 
-async def test_move_to_with_one_speed_uses_the_drones_other_limits(drone: Drone, device: ScriptedDevice) -> None:
+async def test_move_to_with_one_speed_uses_drone_limits(drone: Drone, device: ScriptedDevice) -> None:
     device.script[move.ExtendedMoveTo] = lambda c: [
         ardrone3.MoveToChanged(
             c.latitude, c.longitude, c.altitude, OrientationMode(c.orientation_mode), c.heading, MoveToStatus.RUNNING
@@ -459,7 +459,7 @@ async def test_move_to_with_one_speed_uses_the_drones_other_limits(drone: Drone,
     ]
 
 
-async def test_legacy_return_state_counts_until_the_newer_one_is_received(device: ScriptedDevice) -> None:
+async def test_legacy_return_state_counts_until_rth_state_is_received(device: ScriptedDevice) -> None:
     """A firmware that sends NavigateHomeStateChanged alone; icing has another number there."""
     legacy = ardrone3.NavigateHomeStateChanged
     states = [one for one in STATES if not isinstance(one, rth.State)]
@@ -487,20 +487,20 @@ def rounded(command: ardrone3.MoveTo, status: MoveToStatus, metres: float) -> ar
     )  # fmt: skip
 
 
-async def test_move_to_with_a_rounded_echo_is_under_way_and_ends(drone: Drone, device: ScriptedDevice) -> None:
+async def test_move_to_with_rounded_echo_is_under_way(drone: Drone, device: ScriptedDevice) -> None:
     device.script[ardrone3.MoveTo] = lambda command: [rounded(command, MoveToStatus.RUNNING, 0.8)]
     journey = await drone.piloting.move_to(48.8789, 2.3677, 15.0, timeout=SHORT)
     device.say(rounded(device.got(ardrone3.MoveTo)[0], MoveToStatus.DONE, 0.8))
     assert await asyncio.wait_for(journey.result(), 3.0) is MoveEnd.DONE
 
 
-async def test_move_to_with_an_echo_of_another_place_is_not_under_way(drone: Drone, device: ScriptedDevice) -> None:
+async def test_move_to_with_wrong_echo_is_not_under_way(drone: Drone, device: ScriptedDevice) -> None:
     device.script[ardrone3.MoveTo] = lambda command: [rounded(command, MoveToStatus.RUNNING, 1.2)]
     with pytest.raises(CommandTimeout):
         await drone.piloting.move_to(48.8789, 2.3677, 15.0, timeout=SHORT)
 
 
-async def test_move_to_takes_no_rounded_echo_while_another_is_unheard(drone: Drone, device: ScriptedDevice) -> None:
+async def test_rounded_echo_with_another_unanswered_move_to_is_ignored(drone: Drone, device: ScriptedDevice) -> None:
     """The late RUNNING of a move that was cancelled, half a metre from the new one, starts nothing."""
     await flying(drone, device)
     first = asyncio.ensure_future(drone.piloting.move_to(48.8789, 2.3677, 15.0))
@@ -535,7 +535,7 @@ async def test_a_newer_move_to_replaces_the_older(drone: Drone, device: Scripted
     assert await newer.result() is MoveEnd.DONE
 
 
-async def test_a_refused_newer_move_to_leaves_the_older_one_ours(drone: Drone, device: ScriptedDevice) -> None:
+async def test_refused_newer_move_to_keeps_the_older_active(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     device.script[ardrone3.MoveTo] = lambda command: [running(command)]
     older = await drone.piloting.move_to(48.0, 2.0, 15.0)
@@ -550,7 +550,7 @@ async def test_a_refused_newer_move_to_leaves_the_older_one_ours(drone: Drone, d
     assert await asyncio.wait_for(older.result(), 3.0) is MoveEnd.CANCELED
 
 
-async def test_an_older_move_to_may_arrive_while_the_newer_waits(drone: Drone, device: ScriptedDevice) -> None:
+async def test_older_move_to_may_arrive_before_the_newer_begins(drone: Drone, device: ScriptedDevice) -> None:
     device.script[ardrone3.MoveTo] = lambda command: [running(command)]
     older = await drone.piloting.move_to(48.0, 2.0, 15.0)
     device.script[ardrone3.MoveTo] = lambda command: [running(command, MoveToStatus.DONE), running(command)]
@@ -559,9 +559,7 @@ async def test_an_older_move_to_may_arrive_while_the_newer_waits(drone: Drone, d
     assert drone.moves_started == (newer,)
 
 
-async def test_move_to_replaced_before_its_answer_is_rejected_and_withdrawn(
-    drone: Drone, device: ScriptedDevice
-) -> None:
+async def test_move_to_replaced_before_its_answer_is_withdrawn(drone: Drone, device: ScriptedDevice) -> None:
     older = asyncio.ensure_future(drone.piloting.move_to(48.0, 2.0, 15.0))
     await device.until(ardrone3.MoveTo)
     device.script[ardrone3.MoveTo] = lambda command: [running(command)]
@@ -572,9 +570,7 @@ async def test_move_to_replaced_before_its_answer_is_rejected_and_withdrawn(
     assert device.got(ardrone3.CancelMoveTo) == []
 
 
-async def test_canceled_event_of_a_move_does_not_end_the_next_to_the_same_place(
-    drone: Drone, device: ScriptedDevice
-) -> None:
+async def test_canceled_event_leaves_next_move_to_same_place(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     device.script[ardrone3.MoveTo] = lambda command: [running(command)]
     first = await drone.piloting.move_to(48.0, 2.0, 15.0)
@@ -587,7 +583,7 @@ async def test_canceled_event_of_a_move_does_not_end_the_next_to_the_same_place(
     assert await second.result() is MoveEnd.DONE
 
 
-async def test_late_event_of_an_aborted_move_is_not_of_the_next_move(drone: Drone, device: ScriptedDevice) -> None:
+async def test_late_event_of_aborted_move_leaves_the_next(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     first = asyncio.ensure_future(drone.piloting.move_to(48.0, 2.0, 15.0))
     await device.until(ardrone3.MoveTo)
@@ -624,7 +620,7 @@ async def test_moves_are_distinguished_at_any_height(
     assert [move.altitude for move in device.got(ardrone3.MoveTo)] == pytest.approx([height, again], rel=1e-12)
 
 
-async def test_move_to_that_times_out_is_cancelled(drone: Drone, device: ScriptedDevice) -> None:
+async def test_timed_out_move_to_is_cancelled(drone: Drone, device: ScriptedDevice) -> None:
     with pytest.raises(CommandTimeout):
         await drone.piloting.move_to(48.0, 2.0, 15.0, timeout=SHORT)
     await device.until(ardrone3.CancelMoveTo)
@@ -638,7 +634,7 @@ async def test_landing_ends_a_move_to(drone: Drone, device: ScriptedDevice) -> N
     assert await asyncio.wait_for(journey.result(), 3.0) is MoveEnd.CANCELED
 
 
-async def test_a_cancelled_wait_for_the_result_leaves_the_move_alone(drone: Drone, device: ScriptedDevice) -> None:
+async def test_cancelled_wait_for_the_result_keeps_the_move(drone: Drone, device: ScriptedDevice) -> None:
     device.script[ardrone3.MoveTo] = lambda command: [running(command)]
     journey = await drone.piloting.move_to(48.0, 2.0, 15.0)
     with pytest.raises(asyncio.TimeoutError):
@@ -706,7 +702,7 @@ async def test_return_during_its_cancellation_is_commanded_again(drone: Drone, d
     assert await again is not None
 
 
-async def test_a_return_that_may_have_been_delivered_is_aborted(drone: Drone, device: ScriptedDevice) -> None:
+async def test_return_possibly_delivered_is_aborted(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     home = asyncio.ensure_future(drone.piloting.return_home())
     await device.until(rth.ReturnToHome)
@@ -722,7 +718,7 @@ async def test_a_return_that_may_have_been_delivered_is_aborted(drone: Drone, de
 # -- sticks and hover
 
 
-async def test_pilot_sends_percent_of_the_drones_own_limits_at_20_hz(drone: Drone, device: ScriptedDevice) -> None:
+async def test_pilot_sends_percent_of_drone_limits_at_20_hz(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     for renewed in (5, 10, 15, 21):
         drone.piloting.pilot(PilotingCommand(roll_deg=5.0, pitch_deg=2.0, yaw_rate_dps=-10.0, climb_mps=1.5))
@@ -735,7 +731,7 @@ async def test_pilot_sends_percent_of_the_drones_own_limits_at_20_hz(drone: Dron
     assert device.got(ardrone3.PCMD)[-1].roll == 0
 
 
-async def test_sticks_that_are_not_repeated_centre_after_half_a_second(drone: Drone, device: ScriptedDevice) -> None:
+async def test_unrepeated_sticks_centre_after_half_a_second(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     drone.piloting.pilot(PilotingCommand(roll_deg=5.0))
     await device.until(ardrone3.PCMD, 50)
@@ -790,7 +786,7 @@ async def test_hover_with_nothing_running_sends_sticks_only(drone: Drone, device
     assert {type(message) for _, message in device.received} == {ardrone3.PCMD}
 
 
-async def test_hover_cancels_what_we_started(drone: Drone, device: ScriptedDevice) -> None:
+async def test_hover_cancels_the_verbs_of_this_controller(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     device.script[ardrone3.MoveTo] = lambda command: [running(command)]
     device.script[rth.ReturnToHome] = lambda _: [rth.State(RthState.IN_PROGRESS, StateReason.USER_REQUEST)]
@@ -825,9 +821,7 @@ async def test_hover_cancels_what_we_started(drone: Drone, device: ScriptedDevic
     assert device.got(rth.Abort) == []
 
 
-async def test_hover_during_our_move_by_cancels_the_move_to_of_another_controller(
-    drone: Drone, device: ScriptedDevice
-) -> None:
+async def test_hover_during_move_by_cancels_another_controllers_move_to(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     await reported(drone, device, running(ardrone3.MoveTo(48.0, 2.0, 15.0, OrientationMode.NONE, 0.0)))
     relative = asyncio.ensure_future(drone.piloting.move_by(1.0, 0.0, 0.0, 0.0))
@@ -839,7 +833,7 @@ async def test_hover_during_our_move_by_cancels_the_move_to_of_another_controlle
     assert device.got(ardrone3.MoveBy)[-1] == ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0)
 
 
-async def test_hover_ends_the_following_of_a_target_and_an_animation(drone: Drone, device: ScriptedDevice) -> None:
+async def test_hover_ends_follow_me_and_animation(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     await reported(drone, device, following(follow_me.Mode.GEOGRAPHIC))
     await reported(drone, device, animation.State(animation.Type.SPIRAL, 10))
@@ -856,7 +850,7 @@ async def test_hover_ends_the_following_of_a_target_and_an_animation(drone: Dron
 
 
 @pytest.mark.parametrize(("mode", "stops"), [(follow_me.Mode.RELATIVE, 1), (follow_me.Mode.LOOK_AT, 0)])
-async def test_a_setpoint_takes_over_from_what_flies_by_itself(
+async def test_setpoint_replaces_the_active_automatic_flight(
     drone: Drone, device: ScriptedDevice, mode: follow_me.Mode, stops: int
 ) -> None:
     await flying(drone, device)
@@ -868,7 +862,7 @@ async def test_a_setpoint_takes_over_from_what_flies_by_itself(
     assert (len(device.got(follow_me.Stop)), len(device.got(animation.Cancel))) == (stops, 1)
 
 
-async def test_hover_rejects_a_verb_that_still_waits(drone: Drone, device: ScriptedDevice) -> None:
+async def test_hover_rejects_a_waiting_verb(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     waits = [
         asyncio.ensure_future(drone.piloting.move_to(48.0, 2.0, 15.0)),
@@ -884,7 +878,7 @@ async def test_hover_rejects_a_verb_that_still_waits(drone: Drone, device: Scrip
 
 
 @pytest.mark.parametrize("reason", [StateReason.LOW_BATTERY, StateReason.CONNECTION_LOST])
-async def test_hover_leaves_a_return_that_the_drone_began(
+async def test_hover_leaves_a_return_begun_by_the_drone(
     drone: Drone, device: ScriptedDevice, reason: StateReason
 ) -> None:
     await flying(drone, device)
@@ -899,7 +893,7 @@ async def test_hover_leaves_a_return_that_the_drone_began(
     assert device.received == []
 
 
-async def test_return_taken_over_by_the_battery_is_the_drones_own(drone: Drone, device: ScriptedDevice) -> None:
+async def test_return_continued_for_the_battery_is_the_drones_own(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     device.script[rth.ReturnToHome] = lambda _: [rth.State(RthState.IN_PROGRESS, StateReason.USER_REQUEST)]
     home = await drone.piloting.return_home()
@@ -922,7 +916,7 @@ async def test_a_setpoint_takes_over_from_a_move_of_ours(drone: Drone, device: S
     assert drone.moves_started == ()
 
 
-async def test_release_of_sticks_that_were_not_held_sends_nothing(drone: Drone, device: ScriptedDevice) -> None:
+async def test_release_of_unheld_sticks_sends_nothing(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     device.script[ardrone3.MoveTo] = lambda command: [running(command)]
     journey = await drone.piloting.move_to(48.0, 2.0, 15.0)
@@ -941,7 +935,7 @@ async def test_a_move_ends_the_zeros_of_hover(drone: Drone, device: ScriptedDevi
     await device.quiet(ardrone3.PCMD)
 
 
-async def test_stop_waits_for_the_end_of_what_was_running(drone: Drone, device: ScriptedDevice) -> None:
+async def test_stop_awaits_the_end_of_the_active_verb(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     await asyncio.wait_for(drone.piloting.stop(), 1.0)  # nothing is running
     device.script[ardrone3.MoveTo] = lambda command: [running(command)]
@@ -969,7 +963,7 @@ async def test_stop_waits_for_the_end_of_a_return(drone: Drone, device: Scripted
     await asyncio.wait_for(stopped, 3.0)
 
 
-async def test_stop_says_when_the_drone_does_not_confirm(drone: Drone, device: ScriptedDevice) -> None:
+async def test_stop_without_confirmation_raises(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     device.script[ardrone3.MoveTo] = lambda command: [running(command)]
     await drone.piloting.move_to(48.0, 2.0, 15.0)
@@ -981,7 +975,7 @@ async def test_stop_says_when_the_drone_does_not_confirm(drone: Drone, device: S
 
 
 @pytest.mark.parametrize(("asked", "confirmed"), [(20.0, 20.0), (90.0, 40.0), (0.0, 1.0)])
-async def test_a_setting_returns_what_the_drone_made_of_it(
+async def test_setting_returns_the_value_reported_by_the_drone(
     drone: Drone, device: ScriptedDevice, asked: float, confirmed: float
 ) -> None:
     device.script[ardrone3.MaxTilt] = lambda command: [
@@ -991,7 +985,7 @@ async def test_a_setting_returns_what_the_drone_made_of_it(
     assert drone.piloting.state.max_tilt == Range(confirmed, 1.0, 40.0)
 
 
-async def test_two_settings_at_once_get_their_own_answers(drone: Drone, device: ScriptedDevice) -> None:
+async def test_concurrent_settings_get_their_own_answers(drone: Drone, device: ScriptedDevice) -> None:
     device.script[rth.SetMinAltitude] = lambda command: [rth.MinAltitude(command.altitude, 20.0, 100.0)]
     assert await asyncio.gather(drone.piloting.set_min_altitude(30.0), drone.piloting.set_min_altitude(40.0)) == [
         30.0,
@@ -999,7 +993,7 @@ async def test_two_settings_at_once_get_their_own_answers(drone: Drone, device: 
     ]
 
 
-async def test_a_setting_that_the_drone_never_reported_does_not_exist(drone: Drone, device: ScriptedDevice) -> None:
+async def test_setting_never_reported_is_unsupported(drone: Drone, device: ScriptedDevice) -> None:
     for verb in (drone.piloting.set_max_altitude, drone.piloting.set_max_distance):
         with pytest.raises(NotSupported):
             await verb(100.0)

@@ -78,7 +78,7 @@ def test_a_plan_of_qgroundcontrol() -> None:
     assert losses == []
 
 
-def test_a_block_whose_items_changed_is_written_item_by_item() -> None:
+def test_block_with_changed_items_is_written_item_by_item() -> None:
     plan = qgc_plan.read(encoded(document(survey(1))), "x")
     changed = replace(plan, items=(plan.items[0], action(mav_enums.MAV_CMD_NAV_DELAY, 5.0), *plan.items[1:]))
     data, losses = qgc_plan.write(changed)
@@ -90,7 +90,7 @@ def test_a_block_whose_items_changed_is_written_item_by_item() -> None:
     assert again.blocks == ()
 
 
-def test_numbers_in_a_block_follow_its_place() -> None:
+def test_numbers_in_a_block_follow_its_position() -> None:
     """An item more in front of a survey: it is a survey still."""
     plan = qgc_plan.read(encoded(document(survey(1))), "x")
     (block,) = plan.blocks
@@ -198,7 +198,7 @@ WRONG: dict[str, tuple[Any, str]] = {
 
 
 @pytest.mark.parametrize(("data", "words"), WRONG.values(), ids=WRONG)
-def test_wrong_files_are_one_line_with_file_item_and_reason(data: bytes, words: str) -> None:
+def test_invalid_file_is_one_line_with_item_and_reason(data: bytes, words: str) -> None:
     with pytest.raises(PlanError) as info:
         files.parse(data, "bad.plan")
     text = str(info.value)
@@ -211,7 +211,7 @@ def test_wrong_files_are_one_line_with_file_item_and_reason(data: bytes, words: 
 # WPL 110.
 
 
-def test_waypoints_as_pymavlink_writes_and_reads_them(tmp_path: Path) -> None:
+def test_waypoints_agree_with_pymavlinks_reader_and_writer(tmp_path: Path) -> None:
     theirs = mavwp.MAVWPLoader()
     ours, losses = waypoints.write(FLIGHT)
     (tmp_path / "ours.txt").write_bytes(ours)
@@ -236,7 +236,7 @@ def test_waypoints_as_pymavlink_writes_and_reads_them(tmp_path: Path) -> None:
     }
 
 
-def test_fences_and_rally_points_as_mavproxy_keeps_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_fences_and_rally_points_agree_with_mavproxys_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MAVLINK20", "1")
     monkeypatch.setattr(mavutil, "mavlink", common)
     fence = Plan(zones=(*FLIGHT.zones, FenceCircle(True, None, 90.0, 2)), breach_return=FLIGHT.breach_return)
@@ -264,7 +264,7 @@ def test_a_file_without_home() -> None:
 
 
 @pytest.mark.parametrize("version", [1, 2])
-def test_parrots_file_as_the_simulated_drone_reads_it(version: parrot.Version) -> None:
+def test_parrot_file_is_accepted_by_the_simulated_drone(version: parrot.Version) -> None:
     data, losses = parrot.write(FLIGHT, version)
     assert data.startswith(b"QGC WPL 120\n0\t0\t3\t22\t")
     items = plan_file.read(data, version)
@@ -321,7 +321,7 @@ def test_formats_of_photos_in_version_1() -> None:
     assert starts == [["5.0", "10.0", "12.0"], ["0.0", "1.0", "12.0"], ["0.0", "0.0", "14.0"], ["2.0", "3.0", "0.0"]]
 
 
-def test_parrot_format_reports_what_it_cannot_hold() -> None:
+def test_parrot_format_reports_its_losses() -> None:
     plan = Plan(
         (
             waypoint(0, 0, 20.0, frame=10),
@@ -357,7 +357,7 @@ def test_file_format_is_recognised_by_content(tmp_path: Path) -> None:
         assert [entry.name for entry in tmp_path.iterdir()] == ["anything"]
 
 
-def test_files_that_are_not_there_or_not_to_be_written(tmp_path: Path) -> None:
+def test_missing_and_unwritable_files_are_reported(tmp_path: Path) -> None:
     with pytest.raises(PlanError, match=r"^none\.plan: No such file or directory$"):
         files.load(tmp_path / "none.plan")
     with pytest.raises(PlanError, match="Is a directory"):

@@ -22,8 +22,8 @@ def test_reference_of_a_turn_is_relative_unless_0(reference: float | None, relat
 
 
 @pytest.mark.parametrize("reference", [-1.0, 0.5, 256.0])
-def test_reference_that_is_no_byte_is_refused(reference: float) -> None:
+def test_invalid_reference_byte_is_refused(reference: float) -> None:
     item = Item(TURN, 2, (2.0, 22.0, 1.0, reference, None, None, None))
     (fault,) = examine((item,), 2).faults
-    assert "neither relative nor absolute" in fault.reason
+    assert "invalid reference" in fault.reason
     assert fault.param == 4

@@ -44,18 +44,18 @@ def test_a_flight_by_hand() -> None:
     assert findings.seconds == pytest.approx(5.0 + 20.0 / 3.0 + 27.8 + 10.0 + 2.0 + 27.8 + 20.0, abs=0.1)
 
 
-def test_the_planners_speed_counts_where_the_mission_has_none() -> None:
+def test_planner_speed_counts_without_a_mission_speed() -> None:
     slow, fast = found(UP, waypoint(10, 0), BACK), found(UP, waypoint(10, 0), BACK, hover_speed=10.0)
     assert slow.seconds is not None
     assert fast.seconds is not None
     assert slow.seconds - fast.seconds == pytest.approx(2 * 111.2 * (1 / 5.0 - 1 / 10.0), abs=0.1)
 
 
-def test_check_of_items_that_cannot_be_flown_names_each() -> None:
+def test_check_names_each_item_that_cannot_fly() -> None:
     findings = found(UP, action(mav_enums.MAV_CMD_DO_SET_SERVO, 1.0), waypoint(1, 0, frame=10))
     assert told(findings) == [
         "item 1: DO_SET_SERVO: the drone has no actuator that a flight plan could move",
-        "item 2: NAV_WAYPOINT: its height is above the terrain, which the drone does not know",
+        "item 2: NAV_WAYPOINT: heights above terrain are unsupported",
     ]
     assert findings.errors
     assert (findings.distance, findings.seconds) == (None, None)
@@ -77,12 +77,11 @@ def test_heights() -> None:
     ]
 
 
-def test_without_a_home_heights_above_the_sea_are_not_known() -> None:
+def test_check_without_home_has_no_amsl_heights() -> None:
     findings = found(UP, waypoint(1, 0, 60.0, frame=GLOBAL), BACK, home=None)
     assert told(findings) == []
     assert told(findings, FindingSeverity.WARNING) == [
-        "item 1: its height is above mean sea level, and that of the take-off point is not known: "
-        "its path cannot be checked"
+        "item 1: height above mean sea level, but that of the take-off point is unknown: its path cannot be checked"
     ]
 
 
@@ -156,7 +155,7 @@ def test_how_an_ai_begins() -> None:
     assert told(high) == ["item 0: 30 m above take-off is higher than the limit of 25 m"]
 
 
-def test_check_names_items_that_the_gateway_flies() -> None:
+def test_check_names_items_flown_by_the_gateway() -> None:
     findings = found(UP, action(mav_enums.MAV_CMD_SET_CAMERA_ZOOM, 2.0, 50.0), waypoint(1, 0), BACK)
     assert told(findings, FindingSeverity.WARNING) == [
         "item 1: flown by the gateway: SET_CAMERA_ZOOM: the gateway zooms: a flight plan cannot"

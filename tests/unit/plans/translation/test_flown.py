@@ -113,7 +113,7 @@ def test_a_survey() -> None:
 
 
 @pytest.mark.parametrize("model", ["4k", "ai"])
-def test_an_inspection_between_whose_files_the_gateway_zooms(model: str) -> None:
+def test_gateway_zooms_between_the_files_of_an_inspection(model: str) -> None:
     flown = Flown("inspection", model)
     check(flown)
     where = 0
@@ -129,7 +129,7 @@ def test_an_inspection_between_whose_files_the_gateway_zooms(model: str) -> None
     flown.bench.run_until(lambda: flown.bench.state is FlyingState.LANDED)
 
 
-def test_an_orbit_looks_at_its_middle() -> None:
+def test_orbit_looks_at_its_centre() -> None:
     """50 m north of home; the camera is on it at each way point, and the video runs from the first to the last."""
     flown = Flown("orbit", "thermal")
     check(flown)
@@ -142,7 +142,7 @@ def test_an_orbit_looks_at_its_middle() -> None:
     assert results == [camera.RecordingResult.STARTED, camera.RecordingResult.STOPPED]
 
 
-def test_a_structure_scan_looks_to_its_right() -> None:
+def test_structure_scan_looks_to_its_right() -> None:
     """Clockwise around the structure: on the way east it looks south."""
     flown = Flown("structure", "usa")
     check(flown)

@@ -109,7 +109,7 @@ def test_a_flight_of_version_2() -> None:
     ]
 
 
-def test_a_take_off_at_a_place_goes_up_and_then_over() -> None:
+def test_takeoff_at_a_place_climbs_before_moving() -> None:
     found = lines(
         translate(
             [take_off(15.0, LAT, LON + 1e-4, heading=45.0), action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)], 2, GROUND
@@ -121,14 +121,14 @@ def test_a_take_off_at_a_place_goes_up_and_then_over() -> None:
     ]
 
 
-def test_a_take_off_in_the_air_climbs_and_never_sinks() -> None:
+def test_takeoff_in_the_air_climbs_and_never_descends() -> None:
     assert lines(translate([take_off(15.0), waypoint(1, 0)], 2, AIR))[0] == f"3 16 0.0 1.0 nan nan {LAT} {LON} 15.0"
     flight = translate([take_off(5.0), waypoint(1, 0)], 2, AIR)
     assert len(lines(flight)) == 1
     assert flight.parts[0].done == ((0, 1),)  # nothing was to be done for the take-off
 
 
-def test_in_the_air_a_take_off_alone_is_nothing_to_do() -> None:
+def test_lone_takeoff_in_the_air_does_nothing() -> None:
     flight = translate([take_off(5.0)], 2, AIR)
     assert (flight.parts, flight.done, flight.rest) == ((), (0,), None)
 
@@ -139,17 +139,17 @@ def test_mission_without_takeoff_gets_one_in_front() -> None:
     assert [line.split()[1] for line in lines(flight)] == ["22", "16", "178", "16"]
     assert lines(flight)[1] == f"3 16 0.0 1.0 0.0 30.0 {LAT} {LON} 20.0"  # straight up
     assert flight.parts[0].done == ((), (), (0,), (1,))
-    assert flight.notes == (Loss("no item takes off: the drone rises straight to 20 m above take-off first", 1),)
+    assert flight.notes == (Loss("no take-off item: the drone climbs to 20 m above take-off first", 1),)
     assert examine(items, 1).approximations == flight.notes
     in_the_air = translate(items, 1, AIR)
     assert [line.split()[1] for line in lines(in_the_air)] == ["178", "16"]
     assert in_the_air.notes == ()
 
 
-def test_a_way_point_below_the_take_off_is_not_sunk_to_first() -> None:
+def test_waypoint_below_the_takeoff_height_needs_no_descent_first() -> None:
     flight = translate([waypoint(1, 0, -5.0)], 1, GROUND)
     assert [line.split()[1] for line in lines(flight)] == ["22", "16"]
-    assert flight.notes == (Loss("no item takes off", 0),)
+    assert flight.notes == (Loss("no take-off item", 0),)
 
 
 def test_on_the_ground_there_is_nothing_to_land() -> None:
@@ -157,11 +157,11 @@ def test_on_the_ground_there_is_nothing_to_land() -> None:
     assert [line.split()[1] for line in lines(translate([action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)], 1, AIR))] == [
         "20"
     ]
-    with pytest.raises(PlanError, match="nowhere to fly to"):
+    with pytest.raises(PlanError, match="no place to fly to"):
         translate([action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)], 1, GROUND)
 
 
-def test_landing_at_a_place_goes_over_it_first() -> None:
+def test_landing_at_a_place_flies_there_first() -> None:
     land = Item(mav_enums.MAV_CMD_NAV_LAND, RELATIVE, (0.0, 0.0, 0.0, None, LAT, LON, 0.0))
     assert lines(translate([waypoint(1, 0, 20.0), land], 2, AIR))[1:] == [
         f"3 16 0.0 1.0 nan nan {LAT} {LON} 20.0",
@@ -169,17 +169,17 @@ def test_landing_at_a_place_goes_over_it_first() -> None:
     ]
 
 
-def test_heights_above_the_sea_count_from_the_take_off_point() -> None:
+def test_amsl_heights_count_from_the_takeoff_point() -> None:
     items = [waypoint(1, 0, 60.5, frame=GLOBAL)]
     assert examine(items, 1).faults == ()
     assert lines(translate(items, 1, AIR))[0].endswith(" 25.5")
-    with pytest.raises(PlanError, match="that of the take-off point is not known"):
+    with pytest.raises(PlanError, match="that of the take-off point is unknown"):
         translate(items, 1, replace(AIR, takeoff_amsl=None))
     terrain = examine([waypoint(1, 0, 60.5, frame=TERRAIN)], 1).faults
     assert [(fault.item, fault.kind) for fault in terrain] == [(0, FaultKind.FRAME)]
 
 
-def test_values_that_an_item_leaves_out_stay() -> None:
+def test_omitted_values_of_an_item_stay() -> None:
     here = Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (5.0, 0.0, 0.0, None, None, None, None))
     there = Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0, 0.0, 0.0, None, LAT + 1e-4, LON, None))
     zeros = Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0,) * 7)
@@ -213,8 +213,8 @@ def test_a_jump_without_end_is_flown_file_after_file() -> None:
     ]
     report = examine(items, 2)
     assert report.faults == ()
-    assert report.approximations == (Loss("it is never reached", 4),)
-    assert report.stepped == (Loss(f"flown in files of {MAX_LINES} lines: the jump goes on for so long", 3),)
+    assert report.approximations == (Loss("never reached", 4),)
+    assert report.stepped == (Loss(f"flown in files of {MAX_LINES} lines because of the jump", 3),)
     flight = translate(items, 2, AIR)
     assert [len(lines(flight))] == [MAX_LINES]
     assert flight.rest is not None
@@ -234,7 +234,7 @@ def test_long_mission_becomes_files_in_sequence() -> None:
     report = examine(items, 2)
     assert [(loss.item, loss.what[:9]) for loss in report.approximations] == [
         (MAX_LINES + 1, "the drone"),
-        (MAX_LINES + 4, "it is nev"),
+        (MAX_LINES + 4, "never rea"),
     ]
     assert [loss.item for loss in report.stepped] == [MAX_LINES + 2, None]
     done: list[int] = []
@@ -248,7 +248,7 @@ def test_long_mission_becomes_files_in_sequence() -> None:
     assert done == list(range(MAX_LINES + 4))
 
 
-def test_a_loop_in_a_loop_counts_for_the_whole_mission() -> None:
+def test_nested_loop_counts_for_the_whole_mission() -> None:
     """As in PX4 and ArduPilot: the inner jump is used up in the first round of the outer one."""
     items = [waypoint(1, 0), action(DO_JUMP, 0.0, 2.0), waypoint(2, 0), action(DO_JUMP, 0.0, 1.0)]
     (leg,) = translate(items, 1, AIR).parts
@@ -292,14 +292,14 @@ def test_begin_in_the_middle() -> None:
     assert found[2].endswith(f"{LAT} {LON} 30.0")
     assert flight.parts[0].origins == (3, 3, 3, 3, 4)
     assert flight.parts[0].done == ((), (), (), (3,), (4,))
-    with pytest.raises(PlanError, match="it has 5 items"):
+    with pytest.raises(PlanError, match="the mission has 5 items"):
         translate(items, 1, AIR, 5)
 
 
 WRONG = {
     "unknown": (
         [waypoint(0, 1), action(mav_enums.MAV_CMD_DO_VTOL_TRANSITION)],
-        TranslationFault(1, "DO_VTOL_TRANSITION: no flight plan has it", FaultKind.COMMAND),
+        TranslationFault(1, "DO_VTOL_TRANSITION: unsupported in flight plans", FaultKind.COMMAND),
     ),
     "circle": (
         [Item(mav_enums.MAV_CMD_NAV_LOITER_TURNS, RELATIVE, (1.0, 0.0, 5.0, 0.0, LAT, LON, 9.0))],
@@ -309,65 +309,65 @@ WRONG = {
     ),
     "latitude": (
         [Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0, 0.0, 0.0, 0.0, 91.0, LON, 9.0))],
-        TranslationFault(0, "NAV_WAYPOINT: 91 is no latitude", FaultKind.PARAM, 5),
+        TranslationFault(0, "NAV_WAYPOINT: invalid latitude 91", FaultKind.PARAM, 5),
     ),
     "longitude": (
         [Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0, 0.0, 0.0, 0.0, LAT, None, 9.0))],
-        TranslationFault(0, "NAV_WAYPOINT: it has no longitude", FaultKind.PARAM, 6),
+        TranslationFault(0, "NAV_WAYPOINT: no longitude", FaultKind.PARAM, 6),
     ),
-    "infinite": ([waypoint(0, 1, float("inf"))], TranslationFault(0, "inf is no number", FaultKind.PARAM, 7)),
+    "infinite": ([waypoint(0, 1, float("inf"))], TranslationFault(0, "param7 is not a number", FaultKind.PARAM, 7)),
     "frame": (
         [waypoint(0, 1, frame=1)],
-        TranslationFault(0, "NAV_WAYPOINT: frame 1 is none of a place on earth", FaultKind.FRAME),
+        TranslationFault(0, "NAV_WAYPOINT: frame 1 is not global", FaultKind.FRAME),
     ),
     "waits": (
         [replace(waypoint(0, 1), autocontinue=False)],
-        TranslationFault(0, "it waits to be continued, which the drone does not", FaultKind.COMMAND),
+        TranslationFault(0, "autocontinue 0 is unsupported", FaultKind.COMMAND),
     ),
     "speed": (
         [waypoint(0, 1), action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 0.0)],
-        TranslationFault(1, "DO_CHANGE_SPEED: it says a speed of 0 m/s", FaultKind.PARAM, 2),
+        TranslationFault(1, "DO_CHANGE_SPEED: invalid speed of 0 m/s", FaultKind.PARAM, 2),
     ),
     "climbing": (
         [waypoint(0, 1), action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 2.0, 1.0)],
         TranslationFault(
             1,
-            "DO_CHANGE_SPEED: a flight plan has a speed over ground only, not one for climbing and sinking",
+            "DO_CHANGE_SPEED: climb and descent speeds cannot be set",
             FaultKind.PARAM,
             1,
         ),
     ),
     "clock": (
         [waypoint(0, 1), action(mav_enums.MAV_CMD_NAV_DELAY, -1.0, 12.0, 0.0, 0.0)],
-        TranslationFault(1, "NAV_DELAY: it waits for a time of day, which the drone cannot", FaultKind.PARAM, 1),
+        TranslationFault(1, "NAV_DELAY: waiting for a time of day is unsupported", FaultKind.PARAM, 1),
     ),
     "jump": (
         [waypoint(0, 1), action(DO_JUMP, 7.0, 1.0)],
-        TranslationFault(1, "it jumps to an item that is not there", FaultKind.PARAM, 1),
+        TranslationFault(1, "jump target does not exist", FaultKind.PARAM, 1),
     ),
     "jumps": (
         [waypoint(0, 1), action(DO_JUMP, 0.0, -2.0)],
-        TranslationFault(1, "it jumps -2 times", FaultKind.PARAM, 2),
+        TranslationFault(1, "invalid jump count -2", FaultKind.PARAM, 2),
     ),
     "too many jumps": (
         [waypoint(0, 1), *[action(DO_JUMP, 0.0, 40000.0)] * 2],
-        TranslationFault(2, "the mission jumps more than 65535 times", FaultKind.PARAM, 2),
+        TranslationFault(2, "more than 65535 jumps in the mission", FaultKind.PARAM, 2),
     ),
     "for ever": (
         [waypoint(0, 1), action(mav_enums.MAV_CMD_NAV_DELAY, 0.0), action(DO_JUMP, 1.0, -1.0)],
-        TranslationFault(2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
+        TranslationFault(2, "endless loop, no flight", FaultKind.PLAN),
     ),
     "for ever at one place": (
         [waypoint(0, 1), action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 4.0), action(DO_JUMP, 1.0, -1.0)],
-        TranslationFault(2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
+        TranslationFault(2, "endless loop, no flight", FaultKind.PLAN),
     ),
     "for ever at one way point": (
         [take_off(8.0), waypoint(0, 1), action(DO_JUMP, 1.0, -1.0)],
-        TranslationFault(2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
+        TranslationFault(2, "endless loop, no flight", FaultKind.PLAN),
     ),
     "for ever with way points that are as wide as the way between them": (
         [waypoint(0, 1, 20.0, 0.0, 40.0), waypoint(0, 4, 20.0, 0.0, 40.0), action(DO_JUMP, 0.0, -1.0)],
-        TranslationFault(2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
+        TranslationFault(2, "endless loop, no flight", FaultKind.PLAN),
     ),
     "for ever after more than is written at once": (
         [
@@ -376,7 +376,7 @@ WRONG = {
             action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 4.0),
             action(DO_JUMP, 2.0 * MAX_LINES + 1.0, -1.0),
         ],
-        TranslationFault(2 * MAX_LINES + 2, "it goes round for ever and flies nowhere", FaultKind.PLAN),
+        TranslationFault(2 * MAX_LINES + 2, "endless loop, no flight", FaultKind.PLAN),
     ),
     "for ever when the count is used up": (
         [
@@ -385,11 +385,11 @@ WRONG = {
             action(DO_JUMP, 0.0, 3.0),
             action(DO_JUMP, 1.0, -1.0),
         ],
-        TranslationFault(3, "it goes round for ever and flies nowhere", FaultKind.PLAN),
+        TranslationFault(3, "endless loop, no flight", FaultKind.PLAN),
     ),
     "very often": (
         [take_off(8.0), waypoint(0, 1), action(mav_enums.MAV_CMD_DO_LAND_START), action(DO_JUMP, 2.0, 65535.0)],
-        TranslationFault(3, "it goes round and round and flies nowhere", FaultKind.PLAN),
+        TranslationFault(3, "loop without flight", FaultKind.PLAN),
     ),
     "very often with a region": (
         [
@@ -398,15 +398,15 @@ WRONG = {
             action(mav_enums.MAV_CMD_DO_SET_ROI_NONE),
             action(DO_JUMP, 1.0, 2000.0),
         ],
-        TranslationFault(3, "it goes round and round and flies nowhere", FaultKind.PLAN),
+        TranslationFault(3, "loop without flight", FaultKind.PLAN),
     ),
     "after the landing": (
         [waypoint(0, 1), action(mav_enums.MAV_CMD_NAV_LAND), action(mav_enums.MAV_CMD_DO_LAND_START)],
-        TranslationFault(2, "a landing stands before it, which ends the plan", FaultKind.PLAN),
+        TranslationFault(2, "follows a landing, which ends the plan", FaultKind.PLAN),
     ),
     "nothing flies": (
         [action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 4.0)],
-        TranslationFault(0, "nothing of the mission flies", FaultKind.PLAN),
+        TranslationFault(0, "no item moves the drone", FaultKind.PLAN),
     ),
 }
 
@@ -445,15 +445,15 @@ BUSY = {
 
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("what", [*IDLE, *BUSY])
-def test_loops_without_end_in_which_something_or_nothing_is_flown(what: str, version: Version) -> None:
+def test_endless_loop_is_refused_only_without_flight(what: str, version: Version) -> None:
     """A photo is nothing: that the drone waits until it is taken, nobody says."""
     items = [take_off(8.0), *{**IDLE, **BUSY}[what]]
     report = examine([*items, action(DO_JUMP, 1.0, -1.0)], version)
-    idle = TranslationFault(len(items), "it goes round for ever and flies nowhere", FaultKind.PLAN)
+    idle = TranslationFault(len(items), "endless loop, no flight", FaultKind.PLAN)
     assert report.faults == ((idle,) if what in IDLE else ())
 
 
-def test_a_few_photos_of_one_place_are_a_loop_with_an_end() -> None:
+def test_few_photos_at_one_place_are_a_finite_loop() -> None:
     flight = translate(
         [waypoint(0, 1), action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0), action(DO_JUMP, 1.0, 300.0)],
         2,
@@ -462,7 +462,7 @@ def test_a_few_photos_of_one_place_are_a_loop_with_an_end() -> None:
     assert len([line for line in lines(flight) if line.startswith("2 2000 ")]) == 301
 
 
-def test_a_loop_of_many_items_that_need_no_line() -> None:
+def test_loop_of_lineless_items_is_cut_by_item_count() -> None:
     """It is cut by the items that are come by, not by its lines: 2000 of them were ten million items."""
     items = [
         waypoint(0, 1),
@@ -483,9 +483,7 @@ def test_a_loop_of_many_items_that_need_no_line() -> None:
 
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize(("items", "fault"), WRONG.values(), ids=WRONG)
-def test_mission_item_that_cannot_be_translated_is_refused(
-    items: list[Item], fault: TranslationFault, version: Version
-) -> None:
+def test_untranslatable_mission_item_is_refused(items: list[Item], fault: TranslationFault, version: Version) -> None:
     assert examine(items, version).faults == (fault,)
     with pytest.raises(PlanError):
         translate(items, version, AIR)
@@ -498,7 +496,7 @@ def test_an_empty_mission() -> None:
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_the_simulated_drone_reads_what_is_written(version: Version) -> None:
+def test_simulated_drone_reads_the_translated_file(version: Version) -> None:
     items = [
         take_off(15.0),
         waypoint(1, 0, 20.0, 3.0),
@@ -551,7 +549,7 @@ PARROT = (16, 20, 21, 22, 93, 112, 178, 195, 197, 201, 205, 206, 214, 2000, 2001
 """Its flight plan page."""
 
 
-def test_the_table_knows_what_is_put_into_plans() -> None:
+def test_command_table_covers_the_planners_commands() -> None:
     assert set(QGROUNDCONTROL) | set(PARROT) | {531, 1001} <= set(TABLE)
     assert all(TABLE[command].verdict is not Fidelity.REFUSED for command in PARROT)
     for row in TABLE.values():
@@ -560,7 +558,7 @@ def test_the_table_knows_what_is_put_into_plans() -> None:
 
 
 @pytest.mark.parametrize("command", [row.command for row in TABLE.values() if row.verdict is Fidelity.REFUSED])
-def test_command_that_the_table_refuses_is_refused(command: int) -> None:
+def test_command_refused_by_the_table_is_refused(command: int) -> None:
     (fault,) = examine([waypoint(0, 1), action(command)], 2).faults
     assert (fault.item, fault.kind) == (1, FaultKind.COMMAND)
     assert fault.reason == f"{TABLE[command].name}: {TABLE[command].why}"
@@ -630,14 +628,14 @@ def test_any_mission_is_refused_or_flown_whole(seed: int, version: Version, flyi
     try:
         flight = translate(items, version, start)
     except PlanError as error:  # a return or a landing before all that flies
-        assert (start.flying, error.problem) == (False, "on the ground it has nowhere to fly to")  # noqa: PT017
+        assert (start.flying, error.problem) == (False, "no place to fly to from the ground")  # noqa: PT017
         return
     done = [
         item for part in flight.parts for item in chain(*part.done if isinstance(part, FlightPlanFile) else [part.done])
     ]
     assert bool(flight.parts) is not bool(flight.done)
     done += flight.done
-    never = {loss.item for loss in report.approximations if loss.what == "it is never reached"}
+    never = {loss.item for loss in report.approximations if loss.what == "never reached"}
     assert not never & set(done)
     if flight.rest is None:
         assert never | set(done) == set(range(len(items)))
@@ -661,7 +659,7 @@ def test_any_mission_is_refused_or_flown_whole(seed: int, version: Version, flyi
     assert start.flying or commands[0] is plan_file.PlanCommand.TAKEOFF
 
 
-def test_the_missions_of_the_property_test_are_flown_often_enough() -> None:
+def test_missions_of_the_property_test_mostly_fly() -> None:
     """Else it would show nothing."""
     flown = [seed for seed in range(300) if not examine(mission(seed), 1).faults]
     assert len(flown) > 30

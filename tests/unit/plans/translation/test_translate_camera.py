@@ -133,7 +133,7 @@ def test_a_survey_as_qgroundcontrol_writes_it(version: Version) -> None:
         action(mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 0.0, 0.0, 1.0),
     ]
     assert examine(items, version).approximations == (
-        Loss("no item takes off: the drone rises straight to 20 m above take-off first", 2),
+        Loss("no take-off item: the drone climbs to 20 m above take-off first", 2),
     )
     found = read(items, version)
     assert [int(item.command) for item in found] == [205, 16, 50001, 2000, 16, 2001, 50001, 2000]
@@ -354,7 +354,7 @@ def test_beginning_in_the_middle_begins_what_runs_there() -> None:
 def test_camera_mode_without_effect_is_reported() -> None:
     items = [action(mav_enums.MAV_CMD_SET_CAMERA_MODE, 0.0, 1.0), GO]
     assert examine(items, 2).approximations[-1] == Loss(
-        "the camera's mode changes only with a photo or video, and none comes after it", 0
+        "the camera mode changes only with a photo or video, and none follows", 0
     )
 
 
@@ -415,7 +415,7 @@ def test_old_names_of_a_photo() -> None:
 WRONG = {
     "no interval": (
         [action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 0.0)],
-        "it does not say how often",
+        "no interval",
         FaultKind.PARAM,
         2,
     ),
@@ -433,30 +433,30 @@ WRONG = {
     ),
     "camera": (
         [action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 101.0, 0.0, 1.0)],
-        "the flight plan's camera is component 100, not this (101)",
+        "only the main camera, component 100, is supported (101)",
         FaultKind.PARAM,
         1,
     ),
     "both": (
         [action(mav_enums.MAV_CMD_VIDEO_START_CAPTURE), action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0)],
-        "a photo while the video runs: the camera does one of the two",
+        "photo during a video: the camera does one at a time",
         FaultKind.PLAN,
         None,
     ),
     "both again": (
         [action(mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 10.0), action(mav_enums.MAV_CMD_VIDEO_START_CAPTURE)],
-        "photos are being taken, and the camera does one of the two",
+        "video during photos: the camera does one at a time",
         FaultKind.PLAN,
         None,
     ),
-    "no place": ([roi(None, None)], "it has no place", FaultKind.PARAM, 5),
+    "no place": ([roi(None, None)], "no place", FaultKind.PARAM, 5),
     "a target": (
         [roi(command=mav_enums.MAV_CMD_DO_SET_ROI, mode=4.0)],
-        "only a place can be looked at, no way point and no target",
+        "only a place can be a region of interest",
         FaultKind.PARAM,
         1,
     ),
-    "a region": ([action(50000, 2.0, 3.0)], "it looks at a region that is not there", FaultKind.PARAM, 2),
+    "a region": ([action(50000, 2.0, 3.0)], "unknown region of interest", FaultKind.PARAM, 2),
     "north": (
         [action(mav_enums.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 0.0, 90.0, None, None, 16.0)],
         "the camera",
@@ -465,18 +465,23 @@ WRONG = {
     ),
     "rate": (
         [action(mav_enums.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 0.0, 0.0, 5.0)],
-        "a flight plan aims at an angle, it does not turn with a speed (5)",
+        "gimbal rates are unsupported (5)",
         FaultKind.PARAM,
         3,
     ),
     "zoom": (
         [action(mav_enums.MAV_CMD_SET_CAMERA_ZOOM, 1.0, 5.0)],
-        "only a zoom range in percent can be flown",
+        "only a zoom range in percent is supported",
         FaultKind.PARAM,
         1,
     ),
-    "tilt": ([action(mav_enums.MAV_CMD_DO_MOUNT_CONTROL, -120.0)], "the camera tilts from", FaultKind.PARAM, 1),
-    "nothing": ([action(mav_enums.MAV_CMD_PANORAMA_CREATE, 0.0, 0.0)], "its angles are nothing", FaultKind.PARAM, 1),
+    "tilt": (
+        [action(mav_enums.MAV_CMD_DO_MOUNT_CONTROL, -120.0)],
+        "pitch of -120 deg, the camera has",
+        FaultKind.PARAM,
+        1,
+    ),
+    "nothing": ([action(mav_enums.MAV_CMD_PANORAMA_CREATE, 0.0, 0.0)], "no angles", FaultKind.PARAM, 1),
     "servo": (
         [action(mav_enums.MAV_CMD_DO_SET_SERVO, 5.0, 1500.0)],
         "the drone has no actuator that a flight plan could move",
@@ -511,7 +516,7 @@ def test_video_restarted_by_a_jump_during_photos_is_refused() -> None:
     ]
     (fault,) = examine(items, 1).faults
     assert (fault.item, fault.kind) == (1, FaultKind.PLAN)
-    with pytest.raises(PlanError, match="photos are being taken"):
+    with pytest.raises(PlanError, match="video during photos"):
         translate(items, 1, AIR)
 
 

@@ -32,6 +32,10 @@ ROWS: dict[str, tuple[bool, Altitude, object, ProgressPolicy]] = {
     "DO_CANCEL_MAG_CAL": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
     "DO_CHANGE_ALTITUDE": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
     "DO_CHANGE_SPEED": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "DO_GIMBAL_MANAGER_CONFIGURE": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "DO_GIMBAL_MANAGER_PITCHYAW": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "DO_MOUNT_CONFIGURE": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "DO_MOUNT_CONTROL": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
     "DO_FENCE_ENABLE": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
     "DO_FLIGHTTERMINATION": (False, Altitude.UNUSED, Effect.STOP, ProgressPolicy.PROMPT),
     "DO_ORBIT": (True, Altitude.AMSL, Effect.CHANGE, ProgressPolicy.PROMPT),
@@ -43,6 +47,8 @@ ROWS: dict[str, tuple[bool, Altitude, object, ProgressPolicy]] = {
     "DO_SET_ROI": (True, Altitude.BY_FRAME, Effect.CHANGE, ProgressPolicy.PROMPT),
     "DO_SET_ROI_LOCATION": (True, Altitude.AMSL, Effect.CHANGE, ProgressPolicy.PROMPT),
     "DO_SET_ROI_NONE": (False, Altitude.UNUSED, Effect.STOP, ProgressPolicy.PROMPT),
+    "DO_SET_ROI_SYSID": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "DO_SET_ROI_WPNEXT_OFFSET": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
     "DO_SET_STANDARD_MODE": (False, Altitude.UNUSED, effect_of_mode, ProgressPolicy.PROMPT),
     "DO_START_MAG_CAL": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
     "GIMBAL_REQUEST_AXIS_CALIBRATION": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
@@ -69,7 +75,7 @@ def rows() -> Mapping[str, Action]:
     return {dialect.enums["MAV_CMD"][id].name.removeprefix("MAV_CMD_"): action for id, action in found.items()}
 
 
-def test_rows_of_a_system_say_what_each_command_is(rows: Mapping[str, Action]) -> None:
+def test_command_rows_of_a_system_equal_the_list(rows: Mapping[str, Action]) -> None:
     said = {
         name: (
             row.location,
@@ -139,7 +145,7 @@ def test_effect_decides_repetition_and_cancellation(effect: Effect, stops: bool,
     ("flavour", "progress"),
     [(PX4, ProgressPolicy.FINAL_ONLY), (STANDARD, ProgressPolicy.FINAL_ONLY), (ARDUPILOT, None)],
 )
-def test_progress_of_a_restart_is_not_sent_to_ardupilot_clients(
+def test_restart_sends_no_progress_to_ardupilot_clients(
     rows: Mapping[str, Action], flavour: Flavour, progress: ProgressPolicy | None
 ) -> None:
     row = rows["PREFLIGHT_REBOOT_SHUTDOWN"]
@@ -188,23 +194,23 @@ class _Refused(Service):
         (dialect.MAV_CMD_REQUEST_MESSAGE, PLAIN, r"\[512\] are both queries and actions"),
     ],
 )
-async def test_row_that_contradicts_another_or_mavlink_is_refused(
+async def test_row_contradicting_another_or_mavlink_is_refused(
     monkeypatch: pytest.MonkeyPatch, id: int, row: Action, reason: str
 ) -> None:
     wrong = type("Wrong", (_Refused,), {"rows": {id: row}})
-    monkeypatch.setattr(system, "SERVICES", (*system.SERVICES, wrong))
+    monkeypatch.setattr(system, "AUTOPILOT_SERVICES", (*system.AUTOPILOT_SERVICES, wrong))
     with pytest.raises(ValueError, match=reason):
         await make_system()
 
 
 async def test_query_with_a_location_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     wrong = type("Wrong", (_Refused,), {"rows": {}, "asked": (dialect.MAV_CMD_NAV_LOITER_UNLIM,)})
-    monkeypatch.setattr(system, "SERVICES", (*system.SERVICES, wrong))
+    monkeypatch.setattr(system, "AUTOPILOT_SERVICES", (*system.AUTOPILOT_SERVICES, wrong))
     with pytest.raises(ValueError, match="MAV_CMD 17: MAVLink says True of its location"):
         await make_system()
 
 
-def test_height_of_a_command_whose_row_has_none_raises() -> None:
+def test_height_of_a_command_without_altitude_raises() -> None:
     definition = Definition(location=True, altitude=Altitude.UNUSED, effect=Effect.CHANGE)
     vehicle: Any = None
     with pytest.raises(ValueError, match="its row says that it has no height"):

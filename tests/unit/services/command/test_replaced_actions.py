@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 
 from anafi_mav.services.command.command_service import CommandService
+from anafi_mav.services.commands import ActionGroup
 
 
 @pytest.mark.parametrize("newer", ["order", "stream", "gateway"])
-async def test_replaced_action_learns_whether_an_order_has_ended_it(newer: str) -> None:
+async def test_replaced_action_reads_if_a_command_ended_it(newer: str) -> None:
     host: Any = SimpleNamespace(spawn=asyncio.ensure_future)
     service = CommandService(host)
     began, learned = asyncio.Event(), []
@@ -36,3 +37,25 @@ async def test_replaced_action_learns_whether_an_order_has_ended_it(newer: str) 
     else:
         await service.run("client", replace(), is_order=newer == "order")
     assert learned == [newer == "order", False]
+
+
+async def test_action_ends_older_ones_of_its_resource_alone() -> None:
+    host: Any = SimpleNamespace(spawn=asyncio.ensure_future)
+    service = CommandService(host)
+
+    async def endless() -> None:
+        await asyncio.Event().wait()
+
+    photo = service.run("one", endless(), group=ActionGroup.PHOTO)
+    zoom = service.run("one", endless(), group=ActionGroup.ZOOM)
+    flight = service.run("two", endless())
+    await asyncio.sleep(0)
+
+    async def newer(group: ActionGroup) -> None:
+        await asyncio.wait(service.end_others(group))
+
+    await service.run("three", newer(ActionGroup.PHOTO), group=ActionGroup.PHOTO)
+    assert [task.cancelled() for task in (photo, zoom, flight)] == [True, False, False]
+    await service.run("three", newer(ActionGroup.FLIGHT))
+    assert [task.cancelled() for task in (photo, zoom, flight)] == [True, False, True]
+    zoom.cancel()

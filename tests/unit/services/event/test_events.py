@@ -29,7 +29,7 @@ def sequences(log: EventLog, first: int, last: int) -> list[int]:
     ]
 
 
-def test_events_come_again() -> None:
+def test_requested_events_are_sent_again() -> None:
     log = filled(5)
     assert log.sequence == 5
     assert sequences(log, 2, 4) == [2, 3, 4]
@@ -37,7 +37,7 @@ def test_events_come_again() -> None:
     assert sequences(log, 5, 7) == [5, -6, -7]
 
 
-def test_request_for_a_discarded_event_is_answered_by_an_error() -> None:
+def test_discarded_event_request_is_answered_by_an_error() -> None:
     """The error tells where to go on."""
     log = filled(KEPT + 10)
     assert sequences(log, 10, 11) == [-10, 11]

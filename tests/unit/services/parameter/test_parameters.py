@@ -58,7 +58,7 @@ def test_the_float_field(value: float, kind: ParamType, bytewise: bool, bits: in
 
 
 @pytest.mark.parametrize("value", [0, 1, -1, 4001, 2**31 - 1, -(2**31)])
-def test_bytewise_integers_come_back(value: int) -> None:
+def test_bytewise_integer_decodes_to_the_same_value(value: int) -> None:
     (field,) = struct.unpack("<f", struct.pack("<i", value))
     assert carried(field, ParamType.INT32, bytewise=True) == value
 
@@ -72,7 +72,7 @@ def test_bytewise_integers_come_back(value: int) -> None:
         (2.5, ParamType.REAL32, 2.5),
     ],
 )
-def test_cast_values_come_back(field: float, kind: ParamType, value: float) -> None:
+def test_cast_value_decodes_to_the_same_value(field: float, kind: ParamType, value: float) -> None:
     assert carried(field, kind, bytewise=False) == value
 
 
@@ -167,13 +167,13 @@ def battery_parameters(model: str, state: BatteryState) -> dict[str, float]:
     return {one.name: one.value(host) for one in SETUP_PX4 if one.name.startswith("BAT1_")}
 
 
-def test_battery_parameters_are_those_that_the_battery_reports() -> None:
+def test_battery_parameters_follow_the_battery_report() -> None:
     reported = BatteryState(cell_count=4, cell_min_mv=3300, cell_max_mv=4400)
     values = battery_parameters("ai", reported)
     assert (values["BAT1_N_CELLS"], values["BAT1_V_EMPTY"], values["BAT1_V_CHARGED"]) == (4, 3.3, 4.4)
 
 
-def test_battery_parameters_without_a_report_are_the_models_or_unknown() -> None:
+def test_battery_parameters_without_report_are_model_values_or_unknown() -> None:
     values = battery_parameters("4k", BatteryState())
     assert (values["BAT1_N_CELLS"], values["BAT1_V_EMPTY"], values["BAT1_V_CHARGED"]) == (2, -1, -1)
     assert battery_parameters("later", BatteryState())["BAT1_N_CELLS"] == -1

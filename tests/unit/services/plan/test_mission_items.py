@@ -15,7 +15,7 @@ from anafi_mav.services.plan.mission_items import as_carried, from_wire, to_wire
 from anafi_mav.vehicle.fence.plan_items import UNSET, PlanItem, has_place
 
 
-def test_a_place_is_degrees_times_1e7_and_nothing_is_not_zero() -> None:
+def test_place_is_in_deg_e7_and_unset_is_nan() -> None:
     wire = to_wire(
         Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0, 2.5, 0.0, None, 48.87890004, -2.3677, 20.1), False)
     )
@@ -74,7 +74,7 @@ def test_a_flight_as_carried() -> None:
 
 @settings(max_examples=200, deadline=None)
 @given(plans())
-def test_any_item_comes_back_and_then_stays(plan: Plan) -> None:
+def test_item_survives_repeated_conversion(plan: Plan) -> None:
     for item in plan.items:
         try:
             carried = as_carried(item)

@@ -76,7 +76,7 @@ def test_received_items_are_not_requested_again() -> None:
     assert again(plans, 1) == [4]
 
 
-def test_a_partial_list_is_asked_for_within_its_bounds() -> None:
+def test_partial_list_is_requested_within_its_bounds() -> None:
     plans, client = mission_protocol(), peer(255, 230, ARDUPILOT)
     plans.transfers[FENCE].put(items(9))
     effects = plans.receive(dialect.MAVLink_mission_write_partial_list_message(1, 1, 4, 7, FENCE), client, 0.0)
@@ -97,7 +97,7 @@ def upload(loss: float, seed: int, delay: tuple[float, float], number: int = 500
 
 
 @pytest.mark.parametrize(("loss", "least"), [(0.15, 40), (0.25, 37)])
-def test_its_patience_lasts(loss: float, least: int) -> None:
+def test_upload_survives_heavy_loss(loss: float, least: int) -> None:
     """Of 40 uploads of 500 items. tests/bench/lossy_uploads.py says 99.94 % and 97.7 %; without the items that are
     asked for once more it would be 94 % and 37 %, and 76 % and 4 % if every repetition came after 0.25 s."""
     ends = [upload(loss, seed, (0.005, 0.02)) for seed in range(40)]
@@ -105,14 +105,14 @@ def test_its_patience_lasts(loss: float, least: int) -> None:
 
 
 @pytest.mark.parametrize("delay", [0.05, 0.15, 0.25, 0.35, 0.45])
-def test_a_slow_link_costs_it_nothing(delay: float) -> None:
+def test_slow_link_without_loss_completes_the_upload(delay: float) -> None:
     """Up to 0.9 s there and back; where nothing is lost it never comes near its limit."""
     client = upload(0.0, 1, (delay, delay), number=50)
     assert (client.result, client.why) == (0, "")
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_link_on_which_messages_overtake_each_other(seed: int) -> None:
+def test_upload_with_reordered_messages_completes(seed: int) -> None:
     """A request that has overtaken the one before it is not heard; the items before are what it hears again."""
     client = upload(0.0, seed, (0.005, 0.1), number=50)
     assert (client.result, client.why) == (0, "")

@@ -19,7 +19,7 @@ ITEMS = [
 ]
 
 
-def test_file_has_the_layout_that_mavproxy_reads() -> None:
+def test_plan_file_has_mavproxys_layout() -> None:
     """Its own reader: header of five numbers, then payloads of MISSION_ITEM_INT by pymavlink's unpacker."""
     content = pack_plan(ITEMS, MISSION)
     assert struct.unpack_from("<HHHHH", content) == (0x763D, 0, 0, 0, 3)
@@ -34,7 +34,7 @@ def test_file_has_the_layout_that_mavproxy_reads() -> None:
 
 
 @pytest.mark.parametrize("kind", PATHS)
-def test_file_that_is_read_back_holds_the_same_list(kind: int) -> None:
+def test_written_plan_file_reads_back_equal(kind: int) -> None:
     assert unpack_plan(pack_plan(ITEMS, kind), kind) == ITEMS
     assert unpack_plan(pack_plan([], kind), kind) == []
 
@@ -53,7 +53,7 @@ def test_file_that_is_read_back_holds_the_same_list(kind: int) -> None:
         (struct.pack("<HHHHH", MAGIC, 0, 0, 0, 1) + pack_plan(ITEMS, MISSION)[-38:], "item 0 has number 2"),
     ],
 )
-def test_file_that_is_not_whole_is_refused(content: bytes, reason: str) -> None:
+def test_incomplete_plan_file_is_refused(content: bytes, reason: str) -> None:
     found = unpack_plan(content, MISSION)
     assert isinstance(found, PlanFault)
     assert reason in found.reason

@@ -64,7 +64,7 @@ def read_back(plans: MissionProtocol, kind: int, flavour: Flavour) -> list[Any]:
     return [reply for message in asked for reply in replies(plans.receive(message, who, 1.0))]
 
 
-def test_autocontinue_0_of_an_ardupilot_client_is_1_for_every_client() -> None:
+def test_autocontinue_0_of_ardupilot_client_becomes_1() -> None:
     protocol = plans()
     ack, _ = upload(protocol, [HOME, waypoint(1000, 0), waypoint(2000, 0), waypoint(3000, 1)], MISSION, ARDUPILOT)
     assert ack.type == ACCEPTED
@@ -81,7 +81,7 @@ def test_autocontinue_0_of_other_clients_stays_a_stop(flavour: Flavour) -> None:
     assert [item.autocontinue for item in stops] == [0, 1]
     fault = MissionKind(lambda: HOME, lambda: 2).examine(stops, flavour)
     assert fault is not None
-    assert "it waits to be continued" in fault.reason
+    assert "autocontinue 0 is unsupported" in fault.reason
 
 
 @pytest.mark.parametrize("flavour", [PX4, ARDUPILOT])
@@ -93,7 +93,7 @@ def test_autocontinue_0_of_other_clients_stays_a_stop(flavour: Flavour) -> None:
         dialect.MAV_CMD_NAV_FENCE_HOME_CIRCLE_INCLUSION,
     ],
 )
-def test_fence_circle_of_radius_0_is_left_out_with_a_warning(command: int, flavour: Flavour) -> None:
+def test_fence_circle_of_radius_0_is_dropped_with_warning(command: int, flavour: Flavour) -> None:
     protocol = plans()
     good = circle(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, 80.0)
     ack, said = upload(protocol, [good, circle(command, 0.0), circle(command, -0.0)], FENCE, flavour)

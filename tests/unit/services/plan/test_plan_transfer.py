@@ -198,7 +198,7 @@ def test_the_form_of_requests(flavour: Flavour, compid: int, forms: list[str]) -
     assert {message.seq for message in seen} == {0}
 
 
-def test_the_form_that_was_answered_is_kept() -> None:
+def test_answered_request_form_is_kept() -> None:
     """dronekit on a PX4 endpoint: only its first item costs a second request."""
     plans, client = mission_protocol(), peer(255, 0)
     plans.receive(count(3), client, 0.0)
@@ -208,7 +208,7 @@ def test_the_form_that_was_answered_is_kept() -> None:
     assert (request.get_type(), request.seq) == ("MISSION_REQUEST", 1)
 
 
-def test_repeated_within_250_ms_until_it_gives_up() -> None:
+def test_request_repeats_within_250_ms_until_abort() -> None:
     plans = mission_protocol()
     plans.transfers[FENCE].put(items(1))
     plans.receive(count(5), ME, 10.0)
@@ -224,7 +224,7 @@ def test_repeated_within_250_ms_until_it_gives_up() -> None:
     assert plans.transfers[FENCE].items == items(1)
 
 
-def test_copies_and_strays_are_ignored_and_the_expected_item_is_requested_again() -> None:
+def test_duplicate_items_are_ignored_and_the_expected_one_requested() -> None:
     plans = mission_protocol()
     plans.receive(count(4), ME, 0.0)
     plans.receive(item(0), ME, 0.0)
@@ -267,7 +267,7 @@ def test_capacity() -> None:
     assert request.seq == 0
 
 
-def test_a_kind_that_takes_nothing() -> None:
+def test_closed_kind_refuses_every_upload() -> None:
     class Closed(Kind):
         refusal = PlanFault(UNSUPPORTED, "not yet")
 
@@ -282,7 +282,7 @@ def test_a_kind_that_takes_nothing() -> None:
     ]
 
 
-def test_plan_refused_while_it_is_stored() -> None:
+def test_plan_refused_during_storing_is_reported() -> None:
     plans = mission_protocol()
     uploaded(plans, 2)
     plans.receive(count(1), ME, 1.0)
@@ -315,7 +315,7 @@ def test_the_client_cancels(result: int) -> None:
     assert plans.transfers[FENCE].items == items(2)
 
 
-def test_the_channel_of_the_client_is_gone() -> None:
+def test_closed_channel_ends_its_clients_transfers() -> None:
     plans = mission_protocol()
     plans.transfers[FENCE].put(items(2))
     plans.receive(count(3), ME, 0.0)
@@ -482,7 +482,7 @@ def test_messages_during_storing_wait() -> None:
     assert uploaded_rest(plans, 0, 2) == items(2)
 
 
-def test_list_request_during_storing_is_answered_with_the_new_plan() -> None:
+def test_list_request_during_storing_gets_the_new_plan() -> None:
     """dronekit asks as soon as it has sent its last item."""
     plans = mission_protocol()
     plans.receive(count(1), ME, 0.0)
@@ -493,7 +493,7 @@ def test_list_request_during_storing_is_answered_with_the_new_plan() -> None:
     assert (total.get_type(), total.count) == ("MISSION_COUNT", 1)
 
 
-def test_waiting_client_that_cancels_is_not_asked_for_items() -> None:
+def test_waiting_client_that_cancels_receives_no_requests() -> None:
     plans = mission_protocol()
     commit = commit_of(plans.receive(clear(), ME, 0.0))
     assert plans.receive(count(2), OTHER, 0.0) == []
@@ -541,7 +541,7 @@ def test_partial_write(first: int, last: int, changed: set[int], total: int) -> 
 
 
 @pytest.mark.parametrize(("first", "last"), [(5, 5), (2, 1), (0, 6), (-1, 0), (-3, -1), (3, 5)])
-def test_partial_write_of_what_is_not_there(first: int, last: int) -> None:
+def test_partial_write_of_missing_items_is_refused(first: int, last: int) -> None:
     plans = mission_protocol()
     plans.transfers[FENCE].put(items(4))
     (final,) = replies(plans.receive(partial(first, last), AP, 0.0))
@@ -574,7 +574,7 @@ class WithHome(Kind):
         return items[1:] if flavour.zero_home else items
 
 
-def test_a_list_that_clients_of_one_flavour_see_otherwise() -> None:
+def test_list_with_home_item_is_shifted_for_one_flavour() -> None:
     plans = MissionProtocol([WithHome()])
     effects = plans.receive(count(3), AP, 0.0)
     for seq, number in enumerate((-1, 0, 1)):
@@ -612,7 +612,7 @@ def test_the_acknowledgement_is_repeated_after_losses() -> None:
 
 
 @pytest.mark.parametrize("next_message", [count(2), ask_list(), ask(0), clear(), ack(ACCEPTED)])
-def test_no_repetition_meets_what_the_client_does_next(next_message: Any) -> None:
+def test_no_repetition_follows_the_clients_next_message(next_message: Any) -> None:
     plans = mission_protocol()
     plans.receive(count(1), ME, 0.0)
     plans.expire(REQUEST_EVERY)
@@ -632,7 +632,7 @@ def test_the_last_item_again_is_acknowledged_again() -> None:
 
 
 @pytest.mark.parametrize("at_fault", ["item", "plan", "plan, found in a thread"])
-def test_a_refusal_that_was_lost_is_the_answer_again(at_fault: str) -> None:
+def test_repeated_upload_gets_the_lost_refusal_again(at_fault: str) -> None:
     """Same result and no second text, also with the link as it is repeated; another upload has nothing of it."""
     plans = mission_protocol()
     uploaded(plans, 1)
@@ -777,7 +777,7 @@ def some_message(draw: Any) -> Any:
 
 @settings(max_examples=100, deadline=None)
 @given(st.data())
-def test_nothing_that_is_sent_raises_or_gets_stuck(data: st.DataObject) -> None:
+def test_random_messages_neither_raise_nor_block_the_protocol(data: st.DataObject) -> None:
     """A list only ever changes by a commit that was stored, every answer goes to who asked, and when all fall silent
     the desk comes to rest."""
     plans, now = mission_protocol(), 0.0
@@ -825,7 +825,7 @@ def test_nothing_that_is_sent_raises_or_gets_stuck(data: st.DataObject) -> None:
 # Items.
 
 
-def test_a_float_item_becomes_the_integers_that_give_the_float_back() -> None:
+def test_float_item_becomes_integers_giving_the_float_back() -> None:
     """48.8789 in single precision is 48.87889862060547; the nearest 1e-7 degrees to it are 488788986."""
     message = dialect.MAVLink_mission_item_message(1, 1, 0, 3, 5100, 0, 1, 0, 0, 0, 0, 48.87889862060547, 2.3677, 10, 2)
     taken = item_of(message)
@@ -847,7 +847,7 @@ def test_numbers_without_a_place_are_not_scaled() -> None:
 
 
 @pytest.mark.parametrize("value", [math.inf, -math.inf, 1e30, 215.0])
-def test_a_float_that_is_no_integer(value: float) -> None:
+def test_unconvertible_float_is_refused(value: float) -> None:
     bad = item_of(dialect.MAVLink_mission_item_message(1, 1, 0, 3, 16, 0, 1, 0, 0, 0, 0, 1.0, value, 0, 0))
     assert isinstance(bad, PlanFault)
     assert bad.result == dialect.MAV_MISSION_INVALID_PARAM6_Y

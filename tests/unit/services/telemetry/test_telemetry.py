@@ -33,7 +33,7 @@ from anafi_mav.services.telemetry.update_tracker import UpdateTracker
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.vehicle import Landed
 
-NOW = Times(1_234_567_890)
+NOW = Times(1_234_567_890, 1_234_567, 1_234)
 
 
 def bundled(tracker: UpdateTracker, sources: str, at: float) -> tuple[int, ...]:
@@ -113,7 +113,8 @@ def test_groups_of_ardupilot_have_what_we_stream() -> None:
 async def test_default_intervals_are_those_of_the_rows() -> None:
     clock = SystemClock()
     system = System(Node(clock=clock), Drone("127.0.42.1"), 1, clock, 0.0, allow_kill=False)
-    rows = {id: row for service in system.services for id, row in service.streams().items()}
+    autopilot = system.components[0]
+    rows = {id: row for service in autopilot.services for id, row in service.streams().items()}
     assert all(id in dialect.mavlink_map for id in rows)
     assert {dialect.mavlink_map[id].msgname: row.every for id, row in rows.items() if row.every is not None} == {
         "ATTITUDE": 0.1,
@@ -123,6 +124,8 @@ async def test_default_intervals_are_those_of_the_rows() -> None:
         "ALTITUDE": 0.2,
         "VFR_HUD": 0.2,
         "DISTANCE_SENSOR": 0.2,
+        "GIMBAL_DEVICE_ATTITUDE_STATUS": 0.1,
+        "MOUNT_ORIENTATION": 0.2,
         "GPS_RAW_INT": 0.5,
         "EXTENDED_SYS_STATE": 0.5,
         "ATTITUDE_TARGET": 0.5,
@@ -133,6 +136,7 @@ async def test_default_intervals_are_those_of_the_rows() -> None:
         "BATTERY_STATUS": 1.0,
         "MISSION_CURRENT": 1.0,
         "FENCE_STATUS": 1.0,
+        "GIMBAL_MANAGER_STATUS": 1.0,
         "RC_CHANNELS": 1.0,
         "RADIO_STATUS": 1.0,
         "SYSTEM_TIME": 1.0,
@@ -143,8 +147,8 @@ async def test_default_intervals_are_those_of_the_rows() -> None:
         "AVAILABLE_MODES_MONITOR": 10.0,
     }
     # On a full channel gives way what the next one of its kind replaces, and no answer, parameter, item or text.
-    assert system.telemetry == {*rows, dialect.MAVLINK_MSG_ID_HEARTBEAT}
-    assert system.telemetry.isdisjoint({77, 22, 44, 47, 253, 110})
+    assert autopilot.telemetry == {*rows, dialect.MAVLINK_MSG_ID_HEARTBEAT}
+    assert autopilot.telemetry.isdisjoint({77, 22, 44, 47, 253, 110})
 
 
 def test_a_flight_is_armed_takes_off_and_lands() -> None:

@@ -81,7 +81,7 @@ def test_available_animations_are_reported_on_change() -> None:
     assert available(bench) == set()
 
 
-def test_an_ai_says_what_a_figure_lacks() -> None:
+def test_ai_reports_missing_inputs_of_an_animation() -> None:
     bench = Bench("ai")
 
     def missing() -> dict[Type, int]:
@@ -130,7 +130,7 @@ def test_a_horizontal_panorama_turns_on_the_spot(bench: Bench) -> None:
     assert (pose.north, pose.east, pose.up) == pytest.approx((0.0, 0.0, 10.0), abs=0.3)
 
 
-def test_values_that_are_not_provided_are_the_drones_own(bench: Bench) -> None:
+def test_omitted_animation_values_are_the_drones_defaults(bench: Bench) -> None:
     bench.send(
         animation.StartDronie(1 << animation.DronieConfigParam.DISTANCE, 99.0, 12.0, PlayMode.ONCE_THEN_MIRRORED)
     )
@@ -147,7 +147,7 @@ def test_a_dronie_goes_back_and_up(bench: Bench) -> None:
     assert pose.yaw == pytest.approx(0.0, abs=0.05)
 
 
-def test_a_mirrored_figure_comes_back(bench: Bench) -> None:
+def test_mirrored_animation_returns(bench: Bench) -> None:
     high = 0.0
     bench.send(animation.StartTwistUp(ALL, 2.0, 8.0, math.pi, 1.0, PlayMode.ONCE_THEN_MIRRORED))
     while bench.firmware.animations.running:
@@ -294,7 +294,7 @@ def test_photos_of_a_panorama_are_reported_like_photos(bench: Bench) -> None:
     assert states(said)[-1] == (Type.NONE, 0)
 
 
-def test_a_full_card_takes_no_panorama_but_the_drone_turns(bench: Bench) -> None:
+def test_full_card_prevents_panorama_photos_not_the_turn(bench: Bench) -> None:
     bench.faults.storage_full = True
     bench.run(0.1)
     perform(bench, animation.StartHorizontal180PhotoPanorama())
@@ -305,7 +305,7 @@ def test_a_full_card_takes_no_panorama_but_the_drone_turns(bench: Bench) -> None
 # -- ends
 
 
-def test_cancel_stops_it_and_says_so(bench: Bench) -> None:
+def test_cancel_stops_and_reports_the_animation(bench: Bench) -> None:
     bench.send(animation.StartDronie(ALL, 5.0, 100.0, PlayMode.NORMAL))
     bench.run(4.0)
     (canceling,) = bench.send(animation.Cancel())
@@ -323,7 +323,7 @@ def test_cancel_with_nothing_running_is_answered(bench: Bench) -> None:
     assert bench.send(animation.Cancel()) == [animation.State(Type.NONE, 0)]
 
 
-def test_another_figure_takes_its_place(bench: Bench) -> None:
+def test_another_animation_replaces_the_running_one(bench: Bench) -> None:
     bench.send(animation.StartDronie(ALL, 5.0, 100.0, PlayMode.NORMAL))
     bench.run(1.0)
     said = bench.send(animation.StartHorizontalPanorama(0, 0.0, 0.0))
@@ -361,7 +361,7 @@ def test_animation_ends_by_each_of_these(bench: Bench, command: Message) -> None
         bench.run_until(lambda: bench.state is FlyingState.LANDED)
 
 
-def test_a_lost_link_ends_it(bench: Bench) -> None:
+def test_animation_ends_with_the_link(bench: Bench) -> None:
     bench.send(animation.StartDronie(ALL, 5.0, 100.0, PlayMode.NORMAL))
     bench.run(2.0)
     bench.firmware.link_lost()

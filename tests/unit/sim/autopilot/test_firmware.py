@@ -120,7 +120,7 @@ def test_no_take_off_without_a_calibrated_magnetometer(
     assert bench.states() == []
 
 
-def test_a_calibration_allows_it_again(bench: Bench) -> None:
+def test_calibration_allows_takeoff_again(bench: Bench) -> None:
     bench.faults.magneto_required = True
     bench.run(0.1)
     bench.send(common.MagnetoCalibration(1))
@@ -185,7 +185,7 @@ def test_voltage_follows_the_charge(bench: Bench) -> None:
     assert bench.firmware.battery.millivolts == 7400  # under load
 
 
-def test_an_empty_battery_brings_it_down(bench: Bench) -> None:
+def test_empty_battery_lands_the_drone(bench: Bench) -> None:
     bench.take_off()
     bench.send(ardrone3.MoveBy(20.0, 0.0, -5.0, 0.0))
     bench.run(2.0)
@@ -235,7 +235,7 @@ def test_unknown_message_is_not_answered(bench: Bench) -> None:
     assert bench.events == []
 
 
-def test_all_states_and_settings_name_each_event_once_per_key(bench: Bench) -> None:
+def test_states_and_settings_report_each_key_once(bench: Bench) -> None:
     """A state that is reported twice would be two answers; lists have a last item."""
     for report in (all_states(bench.firmware), all_settings(bench.firmware)):
         packed = [(event.ID, event) for event in report]

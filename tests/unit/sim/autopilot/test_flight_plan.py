@@ -49,7 +49,7 @@ def test_the_sample_of_parrots_pages() -> None:
 
 @pytest.mark.parametrize("version", [1, 2])
 @pytest.mark.parametrize("command", list(PlanCommand))
-def test_every_command_in_its_version(command: PlanCommand, version: int) -> None:
+def test_each_plan_command_is_read_in_its_version(command: PlanCommand, version: int) -> None:
     data = text(line(command, 1.0, at=(1.0, 1.0, 5.0)))
     if version == 1 and command in (195, 197, 206, 214):
         with pytest.raises(PlanFileError):
@@ -75,7 +75,7 @@ def test_every_command_in_its_version(command: PlanCommand, version: int) -> Non
         (text(*[line(93)] * (MAX_ITEMS + 1)), f"{MAX_ITEMS + 1} items"),
     ],
 )
-def test_a_file_that_is_none(data: bytes, reason: str) -> None:
+def test_invalid_plan_file_is_refused(data: bytes, reason: str) -> None:
     with pytest.raises(PlanFileError) as caught:
         read(data, 1)
     assert str(caught.value) == reason
@@ -135,7 +135,7 @@ def test_a_plan_from_the_ground_to_the_ground() -> None:
     assert bench.states() == [S.MOTOR_RAMPING, S.TAKINGOFF, S.HOVERING, S.FLYING, S.LANDING, S.LANDED]
 
 
-def test_version_1_needs_no_take_off_item_and_version_2_does() -> None:
+def test_takeoff_item_is_optional_in_version_1_only() -> None:
     flight = Flight(line(16, 0, 2, at=(10.0, 0.0, 5.0)))
     flight.play()
     assert flight.bench.pose.north == pytest.approx(10.0, abs=2.0)
@@ -173,7 +173,7 @@ def test_a_delay_lasts() -> None:
     flight.bench.rest()
 
 
-def test_a_return_ends_it() -> None:
+def test_return_item_ends_the_plan() -> None:
     flight = Flight(line(16, 0, 2, at=(30.0, 0.0, 10.0)), line(20), line(16, at=(0.0, 50.0, 10.0)), flying=True)
     flight.play()
     bench = flight.bench
@@ -232,7 +232,7 @@ def test_flight_plan_is_ended_by_landing_emergency_and_return(
     assert flight.states[-1] is PlayingState.STOPPED
 
 
-def test_a_lost_fix_ends_it() -> None:
+def test_lost_fix_ends_the_plan() -> None:
     flight = Flight(line(93, 30), flying=True)
     flight.start()
     flight.bench.faults.gps = False
@@ -409,7 +409,7 @@ def test_not_without_gps_or_calibration() -> None:
 
 
 @pytest.mark.parametrize("part", Part)
-def test_not_with_a_part_that_a_test_has_broken(part: Part) -> None:
+def test_plan_with_failed_component_is_refused(part: Part) -> None:
     flight = Flight(line(93, 1))
     flight.bench.faults.refuse_plan = frozenset({part})
     flight.bench.run(0.1)
@@ -424,7 +424,7 @@ def test_not_with_a_part_that_a_test_has_broken(part: Part) -> None:
 # -- without a controller
 
 
-def test_plan_ends_at_link_loss_unless_it_may_continue() -> None:
+def test_plan_ends_at_link_loss_unless_allowed() -> None:
     flight = Flight(line(93, 5), flying=True)
     bench = flight.bench
     flight.start()
@@ -485,7 +485,7 @@ def test_start_at_an_item_under_another_name() -> None:
     assert bench.send(flight_plan.ClearRecoveryInfo()) == [flight_plan.RecoveryInfo("", "", 0, 0, "")]
 
 
-def test_plan_stopped_at_its_start_reports_no_run_time() -> None:
+def test_plan_stopped_at_start_reports_no_run_time() -> None:
     """Start and Landing may arrive between two steps of the simulation; the running time is unsigned."""
     flight = Flight(line(22), line(93, 50), model="ai", flying=True)
     bench = flight.bench

@@ -95,7 +95,7 @@ def test_follow_me_reports_inputs_to_improve(bench: Bench) -> None:
     assert bench.of(follow_me.ModeInfo)[-1].improvements >> Input.TARGET_BAROMETER_OK & 1
 
 
-def test_the_controllers_place_is_valid_while_it_is_fresh_and_accurate(bench: Bench) -> None:
+def test_controller_position_is_valid_while_recent_and_accurate(bench: Bench) -> None:
     walk = Walk(bench, 15.0, 0.0)
     walk.tell()
     bench.run(3.5)
@@ -103,7 +103,7 @@ def test_the_controllers_place_is_valid_while_it_is_fresh_and_accurate(bench: Be
     assert [told.is_valid for told in bench.of(controller_info.ValidityFromDrone)] == [1, 0]
 
 
-def test_look_at_turns_nose_and_camera_and_leaves_the_flying_to_the_sticks(bench: Bench) -> None:
+def test_look_at_turns_the_drone_and_leaves_sticks_free(bench: Bench) -> None:
     walk = Walk(bench, 0.0, 10.0)
     walk.walk(0.4)
     (answer,) = bench.send(follow_me.Start(Mode.LOOK_AT))
@@ -140,7 +140,7 @@ def test_follow_me_keeps_its_place_beside_a_walker(bench: Bench, mode: Mode) -> 
     assert bench.pose.yaw == pytest.approx(math.atan2(-east, -north), abs=0.2)
 
 
-def test_a_vector_that_is_asked_for(bench: Bench) -> None:
+def test_follow_me_flies_to_the_requested_vector(bench: Bench) -> None:
     walk = Walk(bench, 10.0, 0.0)
     walk.walk(0.4)
     bench.send(follow_me.Start(Mode.GEOGRAPHIC))
@@ -156,7 +156,7 @@ def test_a_vector_that_is_asked_for(bench: Bench) -> None:
     assert (pose.north, pose.east, pose.up) == pytest.approx(expected, abs=0.5)
 
 
-def test_a_target_that_is_only_seen_stands_on_the_ground(bench: Bench) -> None:
+def test_target_seen_only_is_assumed_on_the_ground(bench: Bench) -> None:
     bench.send(follow_me.SetTargetIsController(0))
     for _ in range(50):
         (north, east) = (10.0 - bench.pose.north, 0.0 - bench.pose.east)
@@ -198,7 +198,7 @@ def test_a_lost_target_stops_the_drone(bench: Bench) -> None:
     assert state(bench) == (Mode.GEOGRAPHIC, Behavior.FOLLOW)
 
 
-def test_follow_me_on_the_ground_or_by_leash_is_refused() -> None:
+def test_follow_me_on_ground_or_leash_is_refused() -> None:
     bench = Bench()
     (answer,) = bench.send(follow_me.Start(Mode.LOOK_AT))
     assert answer == follow_me.State(Mode.NONE, Behavior.IDLE, follow_me.Animation.NONE, 0)
@@ -233,7 +233,7 @@ def test_follow_me_ends_by_each_of_these(bench: Bench, command: Message) -> None
         assert abs(bench.pose.vn) < 0.3 or isinstance(command, rth.ReturnToHome)
 
 
-def test_a_lost_link_ends_it(bench: Bench) -> None:
+def test_follow_me_ends_with_the_link(bench: Bench) -> None:
     walk = Walk(bench, 10.0, 0.0)
     walk.walk(0.4)
     bench.send(follow_me.Start(Mode.GEOGRAPHIC))

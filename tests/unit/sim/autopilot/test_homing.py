@@ -59,7 +59,7 @@ def homes_of_report(bench: Bench) -> tuple[float, float, float]:
     return event.latitude, event.longitude, event.altitude
 
 
-def test_a_take_off_without_gps_has_no_home_until_there_is_a_fix() -> None:
+def test_takeoff_without_gps_gets_home_with_first_fix() -> None:
     bench = Bench()
     bench.faults.gps = False
     bench.run(0.1)
@@ -77,7 +77,7 @@ def test_a_take_off_without_gps_has_no_home_until_there_is_a_fix() -> None:
     assert returns(bench)[-1] == (RthState.AVAILABLE, StateReason.ENABLED)
 
 
-def test_a_custom_home_counts_when_it_is_preferred(bench: Bench) -> None:
+def test_preferred_custom_home_is_used(bench: Bench) -> None:
     wanted = (*geo.destination(HOME[0], HOME[1], 0.0, 40.0), 0.0)
     bench.send(rth.SetCustomLocation(*wanted))
     assert bench.of(rth.CustomLocation)[-1] == rth.CustomLocation(*wanted)
@@ -109,7 +109,7 @@ def test_the_pilot_as_home(bench: Bench) -> None:
     assert homes(bench)[-1][:2] == pilot
 
 
-def test_a_lost_fix_is_no_home_type_and_no_return(bench: Bench) -> None:
+def test_lost_fix_prevents_home_and_return(bench: Bench) -> None:
     bench.faults.gps = False
     bench.run(0.1)
     assert bench.of(rth.HomeType)[-1].type is RthHomeType.NONE
@@ -157,7 +157,7 @@ def test_climb_cruise_descend_hover(bench: Bench) -> None:
     assert [(int(event.state), int(event.reason)) for event in twin] == [(1, 0), (0, 3)]
 
 
-def test_from_above_it_does_not_go_down_first(bench: Bench) -> None:
+def test_return_from_above_does_not_descend_first(bench: Bench) -> None:
     bench.climb(40.0)
     bench.send(rth.ReturnToHome())
     bench.run_until(lambda: bench.pose.north < 3.0)
@@ -197,7 +197,7 @@ def test_abort(bench: Bench) -> None:
     assert bench.pose.up == pytest.approx(height, abs=0.1)
 
 
-def test_a_return_takes_over_from_a_move_and_refuses_the_next(bench: Bench) -> None:
+def test_return_replaces_a_move_and_refuses_the_next(bench: Bench) -> None:
     bench.send(ardrone3.MoveBy(20.0, 0.0, 0.0, 0.0))
     bench.run(2.0)
     bench.send(rth.ReturnToHome())
@@ -236,7 +236,7 @@ def test_not_from_the_ground() -> None:
 # -- the link
 
 
-def test_a_lost_link_brings_it_home_after_the_delay(bench: Bench) -> None:
+def test_lost_link_starts_a_return_after_the_delay(bench: Bench) -> None:
     bench.send(rth.SetDelay(5))
     bench.send(ardrone3.MoveTo(*geo.destination(HOME[0], HOME[1], 90.0, 0.0), 5.0, ardrone3.OrientationMode.NONE, 0.0))
     bench.run(2.0)
@@ -248,7 +248,7 @@ def test_a_lost_link_brings_it_home_after_the_delay(bench: Bench) -> None:
     bench.run_until(lambda: finished(bench), 120.0)
 
 
-def test_a_link_that_comes_back_in_time(bench: Bench) -> None:
+def test_link_restored_in_time_prevents_the_return(bench: Bench) -> None:
     bench.send(rth.SetDelay(5))
     bench.firmware.link_lost()
     bench.run(4.5)

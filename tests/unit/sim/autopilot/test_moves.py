@@ -122,7 +122,7 @@ def test_sticks_do_not_touch_a_move_by(bench: Bench) -> None:
     ("asked", "slow"),
     [((20.0, 0.0, 0.0, 0.0, 2.0, 1.0, 30.0), 10.0), ((0.0, 0.0, -10.0, 0.0, 2.0, 1.0, 30.0), 10.0)],
 )
-def test_extended_move_by_keeps_to_its_speeds(bench: Bench, asked: tuple[float, ...], slow: float) -> None:
+def test_extended_move_by_keeps_its_speeds(bench: Bench, asked: tuple[float, ...], slow: float) -> None:
     bench.send(move.ExtendedMoveBy(*asked))
     took = bench.run_until(lambda: bool(ends(bench)))
     assert slow < took < slow + 5.0
@@ -142,7 +142,7 @@ def test_extended_move_by_keeps_to_its_speeds(bench: Bench, asked: tuple[float, 
         (INF, 0.0, 0.0, 0.0, 2.0, 1.0, 30.0),
     ],
 )
-def test_a_move_by_that_cannot_be(bench: Bench, asked: tuple[float, ...]) -> None:
+def test_invalid_move_by_is_refused(bench: Bench, asked: tuple[float, ...]) -> None:
     bench.send(move.ExtendedMoveBy(*asked))
     assert ends(bench) == [MoveByError.UNKNOWN]
     bench.run(0.5)
@@ -162,7 +162,7 @@ def test_moves_on_the_ground() -> None:
 # -- moveTo
 
 
-def test_move_to_repeats_its_command(bench: Bench) -> None:
+def test_move_to_echoes_its_command(bench: Bench) -> None:
     command = move_to(12.0, 9.0, 6.0, OrientationMode.HEADING_DURING, 45.0)
     (running,) = bench.send(command)
     assert running == ardrone3.MoveToChanged(
@@ -210,7 +210,7 @@ def test_a_refused_move_to_leaves_the_older_one(bench: Bench) -> None:
     assert statuses(bench) == [MoveToStatus.RUNNING, MoveToStatus.ERROR, MoveToStatus.DONE]
 
 
-def test_move_by_and_move_to_take_over_from_each_other(bench: Bench) -> None:
+def test_move_by_and_move_to_replace_each_other(bench: Bench) -> None:
     bench.send(ardrone3.MoveBy(50.0, 0.0, 0.0, 0.0))
     bench.run(1.0)
     bench.send(move_to(60.0, 0.0, 5.0))
@@ -235,7 +235,7 @@ def test_cancel_move_to(bench: Bench) -> None:
     assert bench.send(ardrone3.CancelMoveTo()) == []  # it is for moveTo alone
 
 
-def test_sticks_do_not_stop_a_move_to_but_turn_it(bench: Bench) -> None:
+def test_sticks_turn_a_move_to_without_stopping_it(bench: Bench) -> None:
     bench.send(move_to(20.0, 0.0, 5.0))
     bench.sticks(1.0, roll=-100, pitch=-100, gaz=100, yaw=100)
     assert bench.pose.yaw > math.radians(20.0)  # 40 degrees/s, less the delays
@@ -252,7 +252,7 @@ def test_with_an_orientation_not_even_yaw_counts(bench: Bench, mode: Orientation
     assert abs(bench.pose.yaw) < 0.05
 
 
-def test_extended_move_to_keeps_to_its_speeds(bench: Bench) -> None:
+def test_extended_move_to_keeps_its_speeds(bench: Bench) -> None:
     bench.send(move.ExtendedMoveTo(*place(30.0, 0.0), 5.0, move.OrientationMode.NONE, 0.0, 3.0, 1.0, 30.0))
     fastest = 0.0
     while MoveToStatus.DONE not in statuses(bench):
@@ -270,7 +270,7 @@ def test_extended_move_to_keeps_to_its_speeds(bench: Bench) -> None:
         (*place(10.0, 0.0), 150.1),  # above the ceiling
     ],
 )
-def test_a_move_to_that_cannot_be(bench: Bench, asked: tuple[float, float, float]) -> None:
+def test_invalid_move_to_is_refused(bench: Bench, asked: tuple[float, float, float]) -> None:
     bench.send(ardrone3.MoveTo(*asked, OrientationMode.NONE, 0.0))
     assert statuses(bench) == [MoveToStatus.ERROR]
 
@@ -280,7 +280,7 @@ def test_extended_move_to_without_speed(bench: Bench) -> None:
     assert statuses(bench) == [MoveToStatus.ERROR]
 
 
-def test_the_fence_refuses_only_when_it_is_on(bench: Bench) -> None:
+def test_geofence_refuses_only_when_enabled(bench: Bench) -> None:
     bench.send(move_to(120.0, 0.0, 5.0))  # MaxDistance is 100 m
     assert statuses(bench) == [MoveToStatus.RUNNING]
     bench.send(ardrone3.NoFlyOverMaxDistance(1))
@@ -288,7 +288,7 @@ def test_the_fence_refuses_only_when_it_is_on(bench: Bench) -> None:
     assert statuses(bench) == [MoveToStatus.RUNNING, MoveToStatus.ERROR]
 
 
-def test_a_lost_fix_ends_a_move_to_and_not_a_move_by(bench: Bench) -> None:
+def test_lost_fix_ends_move_to_but_not_move_by(bench: Bench) -> None:
     bench.send(move_to(60.0, 0.0, 5.0))
     bench.run(1.0)
     bench.faults.gps = False
@@ -341,7 +341,7 @@ def test_flag_zero_ignores_roll_and_pitch(bench: Bench) -> None:
     assert bench.pose.yaw > math.radians(20.0)
 
 
-def test_sticks_that_fall_silent_are_released(bench: Bench) -> None:
+def test_silent_sticks_are_released(bench: Bench) -> None:
     bench.sticks(2.0, pitch=100)
     last = bench.now - 0.05
     released = bench.run_until(lambda: bench.motion.stick_push[0, 0] == 0.0)
@@ -364,7 +364,7 @@ def test_sticks_beyond_a_hundred_are_a_hundred(bench: Bench) -> None:
     assert math.degrees(bench.pose.pitch) == pytest.approx(-10.0, abs=0.2)
 
 
-def test_sticks_count_neither_on_the_ground_nor_in_a_take_off() -> None:
+def test_sticks_on_ground_or_during_takeoff_do_nothing() -> None:
     bench = Bench()
     bench.sticks(1.0, gaz=100, pitch=100)
     assert bench.pose.up == 0.0

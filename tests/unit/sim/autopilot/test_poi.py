@@ -58,7 +58,7 @@ def test_how_a_point_is_seen() -> None:
     assert seen.yaw_rate(0.0, 1.0) == 1.0
 
 
-def test_from_a_hover_it_runs_at_once(bench: Bench) -> None:
+def test_poi_from_a_hover_runs_immediately(bench: Bench) -> None:
     wanted = at(0.0, 20.0, 10.0 - 20.0)
     answer = bench.send(wanted)
     place = (wanted.latitude, wanted.longitude, wanted.altitude, PoiMode.LOCKED_GIMBAL)
@@ -94,7 +94,7 @@ def test_the_nose_follows_while_the_pilot_flies_round(bench: Bench) -> None:
     assert distance > 10.0
 
 
-def test_in_flight_it_waits_for_the_hover(bench: Bench) -> None:
+def test_poi_in_flight_waits_for_the_hover(bench: Bench) -> None:
     bench.sticks(2.0, pitch=100)
     bench.send(at(20.0, 0.0, 0.0))
     assert statuses(bench) == [PoiStatus.PENDING]
@@ -103,7 +103,7 @@ def test_in_flight_it_waits_for_the_hover(bench: Bench) -> None:
     assert statuses(bench) == [PoiStatus.PENDING, PoiStatus.RUNNING]
 
 
-def test_poi_that_waits_for_calm_sticks_ends_after_ten_seconds(bench: Bench) -> None:
+def test_poi_waiting_for_centred_sticks_ends_after_ten_seconds(bench: Bench) -> None:
     bench.sticks(1.0, pitch=20)
     bench.send(at(20.0, 0.0, 0.0))
     bench.sticks(9.5, pitch=20)
@@ -134,7 +134,7 @@ def test_locked_once_and_exit(bench: Bench) -> None:
     assert math.degrees(bench.pose.yaw) == pytest.approx(90.0, abs=3.0)
 
 
-def test_the_old_command_and_its_event(bench: Bench) -> None:
+def test_legacy_poi_command_has_its_legacy_event(bench: Bench) -> None:
     place = (*geo.destination(*HOME[:2], 20.0, 0.0), 3.0)
     answer = bench.send(ardrone3.StartPilotedPOI(*place))
     assert answer[-1] == ardrone3.PilotedPOI(*place, PoiStatus.RUNNING)
@@ -166,5 +166,5 @@ def test_poi_ends_when_another_flight_begins(
 
 
 @pytest.mark.parametrize("place", [(91.0, 0.0, 1.0), (0.0, 181.0, 1.0), (48.0, 2.0, math.nan), (math.nan, 2.0, 1.0)])
-def test_a_place_that_is_none(bench: Bench, place: tuple[float, float, float]) -> None:
+def test_invalid_poi_place_is_ignored(bench: Bench, place: tuple[float, float, float]) -> None:
     assert bench.send(ardrone3.StartPilotedPOIV2(*place, PoiMode.LOCKED_GIMBAL)) == []

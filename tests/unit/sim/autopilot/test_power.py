@@ -84,7 +84,7 @@ def test_is_home_in_reach(charge: float, reachability: RthHomeReachability, capa
     assert looked.tick(0.5, charge, at(400.0), (0.0, 0.0), flying=True, returning=False) == []
 
 
-def test_nothing_is_known_on_the_ground_and_without_a_home() -> None:
+def test_reachability_on_ground_or_without_home_is_unknown() -> None:
     looked = endurance()
     assert looked.tick(0.0, 100.0, at(400.0), None, flying=True, returning=False) == []
     said = looked.tick(1.0, 100.0, at(400.0), (0.0, 0.0), flying=True, returning=False)
@@ -194,7 +194,7 @@ def test_a_return_may_be_switched_off(bench: Bench) -> None:
     assert bench.of(rth.RthAutoTrigger) == []
 
 
-def test_a_landing_is_announced_and_comes(bench: Bench) -> None:
+def test_announced_landing_happens(bench: Bench) -> None:
     bench.send(rth.SetAutoTriggerMode(RthAutoTriggerMode.OFF))
     bench.faults.battery = 5
     bench.run_until(lambda: bool(bench.of(ardrone3.ForcedLandingAutoTrigger)))  # it is looked at once a second
@@ -231,7 +231,7 @@ def test_no_return_without_gps(bench: Bench) -> None:
 # -- motors, vibration, and who carries it
 
 
-def test_a_motor_that_fails_brings_it_down(bench: Bench) -> None:
+def test_failed_motor_lands_the_drone(bench: Bench) -> None:
     bench.faults.motors = 0b0100
     bench.faults.motor_error = MotorError.ERROR_MOSFET
     bench.run(0.1)
@@ -292,7 +292,7 @@ def test_motion_state_of_a_carried_drone_is_moving() -> None:
 
 
 @pytest.mark.parametrize("command", [ardrone3.TakeOff(), ardrone3.UserTakeOff(1)])
-def test_a_take_off_that_is_refused(command: ardrone3.TakeOff | ardrone3.UserTakeOff) -> None:
+def test_refused_takeoff_leaves_the_drone_landed(command: ardrone3.TakeOff | ardrone3.UserTakeOff) -> None:
     bench = Bench()
     bench.faults.refuse_take_off = frozenset({TakeoffChecklistType.UPDATE_ONGOING})
     bench.run(0.1)
@@ -303,7 +303,7 @@ def test_a_take_off_that_is_refused(command: ardrone3.TakeOff | ardrone3.UserTak
     assert bench.states() == []
 
 
-def test_home_is_as_far_as_it_is(bench: Bench) -> None:
+def test_home_offset_follows_the_preferred_home(bench: Bench) -> None:
     assert bench.firmware.homing.home_offset == pytest.approx((0.0, 0.0), abs=1e-3)
     bench.send(rth.SetCustomLocation(*geo.destination(*HOME[:2], 30.0, 40.0), 0.0))
     bench.send(rth.SetPreferredHomeType(rth.RthHomeType.CUSTOM))

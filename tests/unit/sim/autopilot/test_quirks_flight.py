@@ -42,7 +42,7 @@ def test_landing_is_ended_by_take_off_and_gaz(model: str, message: ardrone3.Mess
     assert bench.pose.up > 3.0
 
 
-def test_landing_of_a_4k_is_not_ended_by_smart_take_off_land() -> None:
+def test_landing_of_4k_continues_after_smart_takeoff_land() -> None:
     bench = landing("4k")
     bench.send(ardrone3.SmartTakeOffLand())
     assert bench.state is FlyingState.LANDING
@@ -52,7 +52,7 @@ def test_landing_of_a_4k_is_not_ended_by_smart_take_off_land() -> None:
     ("quirk", "message"),
     [(Quirk.LANDING_IGNORES_TAKEOFF, ardrone3.TakeOff()), (Quirk.LANDING_IGNORES_GAZ, GAZ)],
 )
-def test_landing_with_its_quirk_goes_on(quirk: Quirk, message: ardrone3.Message) -> None:
+def test_landing_with_its_quirk_continues(quirk: Quirk, message: ardrone3.Message) -> None:
     bench = landing("4k", quirk)
     bench.send(message)
     assert bench.state is FlyingState.LANDING
@@ -67,7 +67,7 @@ def test_late_takeoff_quirk_starts_motors_after_landing() -> None:
 
 
 @pytest.mark.parametrize("message", [ardrone3.Landing(), ardrone3.UserTakeOff(0)])
-def test_ramping_motors_are_stopped_by_landing_unless_the_quirk_is_on(message: ardrone3.Message) -> None:
+def test_ramping_motors_stop_by_landing_unless_quirk(message: ardrone3.Message) -> None:
     for quirks, state in ((frozenset[Quirk](), None), (frozenset({Quirk.RAMPING_IGNORES_LANDING}), True)):
         bench = Bench()
         bench.faults.quirks = quirks

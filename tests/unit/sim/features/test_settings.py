@@ -86,7 +86,7 @@ def test_a_name_has_a_limit(bench: Bench) -> None:
     assert bench.send(common.ProductName("x" * 1000)) == [common.ProductNameChanged("x" * 64)]
 
 
-def test_reset_reports_each_setting_and_then_its_end(bench: Bench) -> None:
+def test_reset_reports_each_setting_then_its_end(bench: Bench) -> None:
     bench.send(ardrone3.MaxTilt(35.0))
     answer = bench.send(common.Reset())
     assert ardrone3.MaxTiltChanged(10.0, 1.0, 40.0) in answer

@@ -9,7 +9,7 @@ from anafi_mav.arsdk.messages import wifi
 from anafi_mav.arsdk.messages.proto import connectivity
 
 
-def test_a_scan_lists_the_neighbours_of_the_bands_asked_for() -> None:
+def test_scan_lists_neighbours_of_the_requested_bands() -> None:
     bench = Bench()
     both = bench.send(wifi.Scan(0b11))
     assert [item.list_flags for item in both if isinstance(item, wifi.ScannedItem)] == [1, 2]
@@ -21,7 +21,7 @@ def test_a_scan_lists_the_neighbours_of_the_bands_asked_for() -> None:
     assert nothing.list_flags == 4
 
 
-def test_the_channels_that_are_allowed() -> None:
+def test_authorized_channels_of_both_bands_are_listed() -> None:
     channels = Bench().send(wifi.UpdateAuthorizedChannels())
     found = {(item.band, item.channel) for item in channels if isinstance(item, wifi.AuthorizedChannel)}
     assert (wifi.Band._2_4_GHZ, 6) in found

@@ -65,7 +65,7 @@ def test_each_direction_has_its_own_faults() -> None:
     assert sky.numbers == [2]
 
 
-def test_loss_and_duplication_come_as_often_as_asked() -> None:
+def test_loss_and_duplication_have_the_requested_frequency() -> None:
     sky = Sky(up=Impairment(loss=0.3))
     for number in range(4000):
         sky.send(number)
@@ -144,7 +144,7 @@ async def join(real: SimulatedDrone) -> tuple[ControllerSession, MessageListener
 BAD_AIR = Impairment(loss=0.25, delay=0.005, jitter=0.02, duplicate=0.2, reorder=0.2)
 
 
-async def test_every_command_arrives_once_and_in_order_through_bad_air(real: SimulatedDrone) -> None:
+async def test_commands_arrive_once_in_order_on_a_bad_link(real: SimulatedDrone) -> None:
     session, ear = await join(real)
     real.faults.up = real.faults.down = BAD_AIR
     names = [f"drone {number}" for number in range(20)]
@@ -174,7 +174,7 @@ async def test_one_direction_alone_can_be_dead(real: SimulatedDrone) -> None:
 # -- nobody is there
 
 
-def test_without_a_home_it_stays_where_it_is() -> None:
+def test_link_loss_without_home_keeps_the_place() -> None:
     bench = Bench()
     bench.faults.gps = False
     bench.take_off()

@@ -113,7 +113,7 @@ def test_tilt_after_a_step_is_the_closed_form(time: float) -> None:
 
 
 @pytest.mark.parametrize("time", [0.3, 0.5])
-def test_yaw_and_climb_after_a_step_are_the_closed_form(time: float) -> None:
+def test_yaw_and_climb_after_a_step_are_closed_form(time: float) -> None:
     """First-order lags of 0.1 s behind 0.1 s (yaw) and of 0.12 s behind 0.15 s (climb): rate and its integral."""
     flyer = Flyer()
     flyer.body.sticks(0.0, 0.0, 1.0, 3.0)
@@ -124,7 +124,7 @@ def test_yaw_and_climb_after_a_step_are_the_closed_form(time: float) -> None:
     assert pose.up - 50.0 == pytest.approx(3.0 * (time - 0.27 + 0.12 * kept), abs=1e-9)
 
 
-def test_poses_of_drones_at_rest_are_kept_until_one_is_carried() -> None:
+def test_poses_at_rest_are_kept_until_one_is_carried() -> None:
     motion = Motion([AIRFRAME] * 2)
     motion.step()
     before = motion.poses()
@@ -134,7 +134,7 @@ def test_poses_of_drones_at_rest_are_kept_until_one_is_carried() -> None:
     assert motion.poses() == [before[0], Pose(3.0, 4.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0)]
 
 
-def test_tilt_is_no_faster_than_its_limit() -> None:
+def test_tilt_rate_stays_below_its_limit() -> None:
     flyer = Flyer()
     flyer.body.limits(tilt_rate=40.0 * RAD, ceiling=4000.0)
     flyer.body.sticks(0.0, -40.0 * RAD, 0.0, 0.0)
@@ -159,7 +159,7 @@ def test_step_responses_are_those_of_the_paper() -> None:
     assert about.body.heading > 2.0 * math.pi
 
 
-def test_released_sticks_stop_it() -> None:
+def test_released_sticks_stop_the_drone() -> None:
     flyer = Flyer()
     flyer.body.sticks(0.0, -20.0 * RAD, 0.0, 0.0)
     moving = flyer.run(5.0)
@@ -193,7 +193,7 @@ def test_a_move_goes_straight_and_does_not_overshoot() -> None:
     assert flyer.motion.arrived() == [True]
 
 
-def test_a_turn_that_comes_first() -> None:
+def test_move_with_turn_first_turns_before_moving() -> None:
     flyer = Flyer()
     flyer.body.move(0.0, 20.0, 50.0, yaw=math.pi / 2, turn=Turn.FIRST, speed=5.0, climb=2.0, yaw_rate=1.0)
     pose = flyer.run(1.0)

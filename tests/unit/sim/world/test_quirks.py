@@ -23,7 +23,7 @@ def test_quirk_page_lists_each_quirk_with_its_description() -> None:
     assert [quirk for quirk in Quirk if f"| `{quirk.value}` | {quirk.description} |" not in page] == []
 
 
-def test_named_with_unknown_name_is_refused_with_the_known_ones() -> None:
+def test_unknown_quirk_is_refused_with_the_known_names() -> None:
     assert quirks.named(["no-flight-id"], "x") == {Quirk.NO_FLIGHT_ID}
     with pytest.raises(ConfigError, match=r"x: expected one of landing-ignores-takeoff, .*, got 'no-wings'"):
         quirks.named(["no-flight-id", "no-wings"], "x")

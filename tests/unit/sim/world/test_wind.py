@@ -43,7 +43,7 @@ def test_wind_comes_from_its_direction(direction: float, north: float, east: flo
     assert WindSpec(5.0, direction).steady == pytest.approx((north, east), abs=1e-4)
 
 
-def test_gusts_have_the_spread_that_was_asked_for() -> None:
+def test_gusts_have_the_requested_spread() -> None:
     wind = Wind(WindSpec(10.0, 0.0, 0.2), random.Random(1))
     north = [wind.advance(0.5)[0] for _ in range(8000)]
     assert statistics.mean(north) == pytest.approx(-10.0, abs=0.15)
@@ -52,7 +52,7 @@ def test_gusts_have_the_spread_that_was_asked_for() -> None:
     assert [again.advance(0.5)[0] for _ in range(100)] == north[:100]
 
 
-def test_a_steady_wind_is_held_by_the_tilt_that_balances_it() -> None:
+def test_steady_wind_is_balanced_by_tilt() -> None:
     hover = Hover(WindSpec(8.0, 0.0, 0.0))
     pose = hover.run(15.0)
     # Drag grows with the square and is tan 40 deg at 15 m/s: tan(tilt) = tan 40 (8/15)^2 = 0.2387, 13.4 deg, nose down
@@ -62,7 +62,7 @@ def test_a_steady_wind_is_held_by_the_tilt_that_balances_it() -> None:
     assert hover.motion.still() == [True]
 
 
-def test_gusts_do_not_carry_it_away() -> None:
+def test_gusts_do_not_displace_a_hover() -> None:
     hover = Hover(WindSpec(10.0, 270.0))
     places = [hover.run(1.0) for _ in range(60)]
     assert max(math.hypot(pose.north, pose.east) for pose in places) < 2.0
@@ -84,7 +84,7 @@ def test_full_tilt_with_and_against_the_wind() -> None:
         assert hover.run(30.0).vn == pytest.approx(speed, abs=0.1)
 
 
-def test_a_move_ends_where_it_should_in_wind() -> None:
+def test_move_in_wind_ends_at_its_target() -> None:
     hover = Hover(WindSpec(8.0, 90.0))
     hover.run(3.0)
     hover.body.move(20.0, 10.0, 50.0, speed=5.0, climb=2.0, yaw_rate=1.0)
@@ -96,7 +96,7 @@ def test_a_move_ends_where_it_should_in_wind() -> None:
     assert (pose.north, pose.east) == pytest.approx((20.0, 10.0), abs=0.6)
 
 
-def test_on_the_ground_there_is_none() -> None:
+def test_drone_on_the_ground_is_unmoved_by_wind() -> None:
     hover = Hover(WindSpec(15.0, 0.0))
     hover.motion.position[2, 0] = 0.0
     hover.body.off()
@@ -123,7 +123,7 @@ def test_wind_warning_level_follows_the_felt_wind() -> None:
     ("values", "key"),
     [((-1.0,), "speed"), ((41.0,), "speed"), ((5.0, 361.0), "direction"), ((5.0, 0.0, 1.1), "gusts")],
 )
-def test_a_wind_that_cannot_be(values: tuple[float, ...], key: str) -> None:
+def test_invalid_wind_is_refused(values: tuple[float, ...], key: str) -> None:
     with pytest.raises(ConfigError) as caught:
         WindSpec(*values)
     assert caught.value.key_path == key

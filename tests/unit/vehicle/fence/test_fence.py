@@ -415,7 +415,7 @@ def test_fence_acts_before_the_boundary() -> None:
     assert watch.breaches == 1
 
 
-def test_drone_that_continues_outward_is_stopped_again() -> None:
+def test_drone_continuing_outward_is_stopped_again() -> None:
     watch = watching()
     assert watch.look(sight(85.0, speed=(9.0, 0.0)), 0.0) is Reaction.HOLD
     watch.done(2)
@@ -425,7 +425,7 @@ def test_drone_that_continues_outward_is_stopped_again() -> None:
     assert watch.look(sight(101.0, speed=(6.0, 0.0), orders=5), 3.0) is Reaction.HOLD
 
 
-def test_an_estimate_that_flickers_is_one_approach() -> None:
+def test_flickering_estimate_is_one_approach() -> None:
     """Each position corrects where the drone was thought to be."""
     watch = watching(Reaction.WARN)
     assert watch.look(sight(75.0, speed=(10.0, 0.0)), 0.0) is Reaction.WARN
@@ -490,7 +490,7 @@ def test_without_a_position_nothing_is_known() -> None:
     assert not watch.blind
 
 
-def test_an_action_that_failed_is_tried_again() -> None:
+def test_failed_action_is_repeated() -> None:
     watch = watching()
     assert watch.look(sight(110.0), 0.0) is Reaction.HOLD
     watch.failed(0.5)
@@ -501,7 +501,7 @@ def test_an_action_that_failed_is_tried_again() -> None:
     assert watch.breaches == 1
 
 
-def test_action_that_an_order_has_ended_is_not_tried_again_outside() -> None:
+def test_action_ended_by_a_command_is_not_repeated_outside() -> None:
     watch = watching()
     assert watch.look(sight(110.0), 0.0) is Reaction.HOLD
     watch.failed(0.5, replaced=True)
@@ -512,7 +512,7 @@ def test_action_that_an_order_has_ended_is_not_tried_again_outside() -> None:
     assert watch.look(sight(110.0), 80.0) is Reaction.HOLD  # another breach
 
 
-def test_action_ahead_that_an_order_has_ended_is_tried_again_while_the_boundary_is_ahead() -> None:
+def test_action_ahead_ended_by_a_command_is_repeated() -> None:
     watch = watching()
     assert watch.look(sight(85.0, speed=(9.0, 0.0)), 0.0) is Reaction.HOLD
     watch.failed(0.5, replaced=True)
@@ -520,7 +520,7 @@ def test_action_ahead_that_an_order_has_ended_is_tried_again_while_the_boundary_
     assert watch.look(sight(92.0, speed=(8.0, 0.0), orders=2), 0.5 + RETRY) is Reaction.HOLD
 
 
-def test_an_action_that_failed_is_forgotten_inside() -> None:
+def test_failed_action_is_discarded_inside() -> None:
     watch = watching()
     watch.look(sight(110.0), 0.0)
     watch.failed(0.0)
@@ -529,7 +529,7 @@ def test_an_action_that_failed_is_forgotten_inside() -> None:
     assert watch.state is State.INSIDE
 
 
-def test_the_floor_counts_once_the_drone_was_above_it() -> None:
+def test_floor_counts_once_the_drone_was_above_it() -> None:
     watch = FenceWatch()
     watch.floor = 5.0
     assert watch.look(sight(ato=2.5), 0.0) is None

@@ -31,7 +31,7 @@ def test_the_end() -> None:
     assert Course([ZOOM]).stepped
 
 
-def test_parts_that_are_not_on_the_drone_wait_for_a_command() -> None:
+def test_parts_absent_from_the_drone_wait_for_a_command() -> None:
     course = Course([FILE, ZOOM], REST)
     course.end_with_this_part()
     assert (course.parts, course.following, course.later) == ([FILE], 2, 2)

@@ -25,7 +25,7 @@ IMPOSSIBLE = {
 }
 
 
-def test_every_state_knows_its_events() -> None:
+def test_every_progress_state_has_its_events() -> None:
     for state in State:
         for event in Event:
             assert ((state, event) in IMPOSSIBLE) is (event not in TRANSITIONS[state]), (state, event)
@@ -101,7 +101,7 @@ def test_skipped_lines_are_not_reported_as_reached() -> None:
     assert progress.current == 5
 
 
-def test_omitted_item_is_not_done_but_items_without_a_line_after_it_are() -> None:
+def test_omitted_item_is_skipped_but_lineless_items_count() -> None:
     progress = flying()
     progress.executed(2)
     assert progress.skip(3) == 2
@@ -109,7 +109,7 @@ def test_omitted_item_is_not_done_but_items_without_a_line_after_it_are() -> Non
     assert progress.skip(9) is None
 
 
-def test_nothing_is_done_while_it_is_not_flown() -> None:
+def test_paused_mission_completes_no_item() -> None:
     progress = flying()
     progress.executed(1)
     progress.stop()
@@ -119,7 +119,7 @@ def test_nothing_is_done_while_it_is_not_flown() -> None:
     assert progress.executed(2) == (1,)
 
 
-def test_the_end_that_is_the_plans_own() -> None:
+def test_last_line_marks_the_plans_own_end() -> None:
     progress = flying()
     seen = []
     for line in range(6):
@@ -210,7 +210,7 @@ def test_mission_record_with_invalid_values_is_not_read(key: str, wrong: object)
     assert MissionRecord.read({**kept().written, key: wrong}, KEPT) is None
 
 
-def test_mission_record_without_lines_or_of_a_shorter_mission_is_not_read() -> None:
+def test_mission_record_of_another_length_is_not_read() -> None:
     empty = {"content": "QGC WPL 120\n", "origins": [], "done": [], "line": -1}
     assert MissionRecord.read({**kept().written, **empty}, KEPT) is None
     assert MissionRecord.read(kept().written, KEPT[:5]) is None, "a shorter mission"

@@ -26,7 +26,7 @@ from anafi_mav.vehicle.offboard.stream import (
 NAN = math.nan
 
 
-def test_every_offboard_state_knows_its_events() -> None:
+def test_every_offboard_state_has_its_events() -> None:
     impossible = {
         (State.IDLE, Event.ENGAGE),
         (State.IDLE, Event.ENGAGE_SINGLE),
@@ -74,7 +74,7 @@ def test_thrust_is_vertical_speed(mask: int, thrust: float, climb: float) -> Non
         (7, (1e30, 0, 1e30, 0), "length is not 1"),
     ],
 )
-def test_setpoints_that_cannot_be_flown(mask: int, q: tuple[float, ...], reason: str) -> None:
+def test_unusable_attitude_setpoint_names_its_reason(mask: int, q: tuple[float, ...], reason: str) -> None:
     refusal = attitude_setpoint(attitude_target(mask, q, 0.5))
     assert isinstance(refusal, str)
     assert reason in refusal
@@ -89,7 +89,7 @@ LEVEL = AttitudeSetpoint(0, 0, 0, 0, 0)
 NOSE_DOWN = AttitudeSetpoint(0, -0.1, 0, 0, 0)
 
 
-def test_an_offboard_session_ends_with_its_setpoints() -> None:
+def test_offboard_session_ends_with_its_setpoints() -> None:
     stream = OffboardStream()
     assert stream.candidate("a", 0.0) is None
     assert stream.receive("a", LEVEL, 10.0)
@@ -117,13 +117,13 @@ def test_an_offboard_session_ends_with_its_setpoints() -> None:
         (LEVEL, 1.5, 0.45),
     ],
 )
-def test_silence_that_ends_a_setpoint_is_longer_for_velocities_of_guided_alone(
+def test_silence_limit_is_longer_for_guided_velocities_alone(
     setpoint: Setpoint, guided: float | None, seconds: float
 ) -> None:
     assert lasts(setpoint, guided) == pytest.approx(seconds)
 
 
-def test_sticks_of_a_velocity_stay_young_until_shortly_before_its_end() -> None:
+def test_sticks_of_a_velocity_last_until_shortly_before_end() -> None:
     """The layer below centres sticks of half a second: it must not before a velocity of 1.5 s is over."""
     stream, velocity = OffboardStream(), MotionSetpoint(PositionReference.LOCAL, velocity=(1.0, 0.0, 0.0))
     stream.receive("a", velocity, 10.0, 1.45)
@@ -183,7 +183,7 @@ def test_a_single_setpoint_ends_by_no_silence() -> None:
     assert stream.state is State.IDLE
 
 
-def test_a_single_setpoint_may_have_waited_for_its_turn() -> None:
+def test_single_setpoint_may_have_waited_in_the_queue() -> None:
     stream = OffboardStream()
     stream.receive("a", PLACE, 0.0)
     stream.expire(SILENCE)
@@ -317,7 +317,7 @@ def test_another_unit_is_not_flown(name: str, value: float) -> None:
     assert isinstance(local_setpoint(local(0, **{name: value})), str)
 
 
-def test_half_a_place_on_earth_is_none() -> None:
+def test_position_with_one_coordinate_is_refused() -> None:
     assert global_setpoint(on_earth(0x001)) == global_setpoint(on_earth(0x002)) == "latitude without longitude"
     height = global_setpoint(on_earth(0x003))
     assert isinstance(height, MotionSetpoint)

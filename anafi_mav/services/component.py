@@ -1,0 +1,276 @@
+"""One component of a MAVLink system: its own services, commands, streams and files.
+
+A component answers with its own component id, and has its own command history: what a client sends to the camera
+neither repeats nor replaces a command to the autopilot. Everything that exists once in a system (drone, vehicle,
+clock, memory, channels, texts) is the system's.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Coroutine, Hashable, Iterable, Mapping, Sequence
+from typing import Any, Protocol
+
+from anafi_mav.clock import Clock
+from anafi_mav.drone import Drone
+from anafi_mav.errors import AnafiMavError
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.mavlink.router import EVERY_COMPONENT
+from anafi_mav.services.command.command_service import CommandService
+from anafi_mav.services.commands import Action, ActionGroup
+from anafi_mav.services.definition_link import DefinitionLink
+from anafi_mav.services.flavours import Flavour, flavour_of
+from anafi_mav.services.ftp.ftp_service import FtpService
+from anafi_mav.services.memory import Memory
+from anafi_mav.services.pose import VehiclePose
+from anafi_mav.services.service import MessageHandler, Service
+from anafi_mav.services.stream import Times
+from anafi_mav.services.telemetry.message_service import MessageService
+from anafi_mav.texts import OperatorText
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.vehicle import Vehicle
+
+logger = logging.getLogger(__name__)
+
+COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)
+
+BY_MESSAGE = (
+    dialect.MAV_CMD_REQUEST_MESSAGE,
+    dialect.MAV_CMD_SET_MESSAGE_INTERVAL,
+    dialect.MAV_CMD_GET_MESSAGE_INTERVAL,
+)
+"""Commands that every component has; the message in param1 decides which one owns them."""
+
+BY_AUTOPILOT = (dialect.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL,)
+"""Messages that every component handles; one to component 0 is the autopilot's."""
+
+
+class ComponentSystem(Protocol):
+    """Interface of a system for its components."""
+
+    sysid: int
+    drone: Drone
+    vehicle: Vehicle
+    clock: Clock
+    memory: Memory
+    has_picture_pose: bool
+    """True when the configuration allows pose from the live video."""
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        """The open channels without the muted ones."""
+
+    def owner(self, message: Any) -> Component:
+        """Return the component that answers this message to component 0."""
+
+    def send_as(
+        self, compid: int, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None, *, give_way: bool
+    ) -> None:
+        """Send as this component to one channel, to some, or to all (None)."""
+
+    def send_heartbeat(self) -> None:
+        """Send one more HEARTBEAT of the autopilot to all."""
+
+    def text(self, severity: Severity, text: OperatorText, to: Channel | None = None) -> None:
+        """A STATUSTEXT to everybody, and a line in the log; or to one channel alone."""
+
+    def warn_throttled(self, text: OperatorText) -> None:
+        """Send a warning on a frequent event."""
+
+    def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        """Run in the background; cancelled when the drone's link goes down."""
+
+    def times(self, at: float | None = None) -> Times:
+        """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
+
+    def set_muted(self, channel: Channel, *, muted: bool) -> None:
+        """Send only answers on this channel; with False everything again."""
+
+
+class Component:
+    """One component of a system; the `Host` of its services."""
+
+    def __init__(self, system: ComponentSystem, compid: int, services: Iterable[type[Service]]) -> None:
+        self.compid = compid
+        self.sysid = system.sysid
+        self.drone = system.drone
+        self.vehicle = system.vehicle
+        self.clock = system.clock
+        self.memory = system.memory
+        self.has_picture_pose = system.has_picture_pose
+        self.definition = DefinitionLink()
+        self._system = system
+        self.commands = CommandService(self)
+        self.messages = MessageService(self)
+        self._ftp = FtpService(self)
+        self.services: list[Service] = [self.commands, self.messages, self._ftp]
+        self.services += [kind(self) for kind in services]
+        self.capabilities: int = 0
+        for service in self.services:
+            self.capabilities |= service.capabilities()
+        self.telemetry: frozenset[int] = frozenset()
+        """Messages that the next one of their kind replaces: a full channel drops them rather than answers."""
+        self._handlers: dict[int, MessageHandler] = {}
+        self._own: frozenset[int] = frozenset()
+        """The commands of this component's services."""
+        self._receiving = [service for service in self.services if type(service).received is not Service.received]
+
+    def take_tables(self, others: Mapping[int, Action]) -> None:
+        """Join the tables of all services.
+
+        `others`: actions that this component answers for others. Raises `ValueError` when two services claim the same.
+        """
+        streams = joined(service.streams() for service in self.services)
+        self.telemetry = frozenset({*streams, dialect.MAVLINK_MSG_ID_HEARTBEAT})
+        self.messages.take_tables(streams, joined(service.requests() for service in self.services))
+        queries = joined(service.queries() for service in self.services)
+        actions = joined(service.actions() for service in self.services)
+        self._own = frozenset({*queries, *actions})
+        self.commands.take_tables(queries, joined([actions, others]))
+        self._ftp.take_tables(
+            joined(service.files() for service in self.services),
+            joined(service.folders() for service in self.services),
+        )
+        self._handlers = joined(service.messages() for service in self.services)
+        self._handlers[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self._heard
+
+    def owns(self, message: Any) -> bool:
+        """True for a COMMAND_LONG or COMMAND_INT that is this component's own."""
+        if message.command in BY_MESSAGE:
+            return self.messages.has(message.param1)
+        return message.command in self._own
+
+    # Host.
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        """The open channels without the muted ones."""
+        return self._system.channels
+
+    def send(self, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None = None) -> None:
+        """Send as this component to one channel, to some, or to all.
+
+        Nothing is sent while the link is down.
+        """
+        self._system.send_as(self.compid, message, to, give_way=message.get_msgId() in self.telemetry)
+
+    def send_by_flavour(
+        self, build: Callable[[Flavour], dialect.MAVLink_message | None], to: Sequence[Channel] | None = None
+    ) -> None:
+        """Send to each of these channels (None: all) the message that `build` makes for its flavour.
+
+        If `build` returns None, nothing is sent.
+        """
+        groups: dict[str, tuple[Flavour, list[Channel]]] = {}
+        for channel in self.channels if to is None else to:
+            flavour = flavour_of(channel)
+            groups.setdefault(flavour.name, (flavour, []))[1].append(channel)
+        for flavour, channels in groups.values():
+            message = build(flavour)
+            if message is not None:
+                self.send(message, channels)
+
+    def send_heartbeat(self) -> None:
+        """Send one more HEARTBEAT of the autopilot to all."""
+        self._system.send_heartbeat()
+
+    def text(self, severity: Severity, text: OperatorText, to: Channel | None = None) -> None:
+        """Send a STATUSTEXT of the autopilot to all, or to one channel alone."""
+        self._system.text(severity, text, to)
+
+    def warn_throttled(self, text: OperatorText) -> None:
+        """Send a warning on a frequent event, at most once per five seconds."""
+        self._system.warn_throttled(text)
+
+    def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        """Run in the background; cancelled when the drone's link goes down."""
+        return self._system.spawn(work)
+
+    def run_action(
+        self,
+        client: Hashable,
+        work: Coroutine[Any, Any, None],
+        *,
+        is_order: bool = True,
+        group: ActionGroup = ActionGroup.FLIGHT,
+    ) -> asyncio.Task[None]:
+        """Run an action that a message without COMMAND_ACK requests."""
+        return self.commands.run(client, work, is_order=is_order, group=group)
+
+    def end_others(self, group: ActionGroup) -> list[asyncio.Task[None]]:
+        """Cancel the older running actions of a group, and return them."""
+        return self.commands.end_others(group)
+
+    @property
+    def replaced_by_order(self) -> bool:
+        """True in an action that a newer order of a client has ended."""
+        return self.commands.replaced_by_order
+
+    def times(self, at: float | None = None) -> Times:
+        """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
+        return self._system.times(at)
+
+    @property
+    def needs_pictures(self) -> bool:
+        """True while a client requests pose more often than events are reported."""
+        return self.messages.needs_pictures
+
+    @property
+    def needs_video(self) -> bool:
+        """True while a client has a stream whose fields are in the live video only."""
+        return self.messages.needs_video
+
+    def show_picture(self, pose: VehiclePose, shot: float, now: float) -> None:
+        """Send the pose that a picture reports; `shot`: when it was taken (s, monotonic)."""
+        self.messages.show_picture(pose, shot, now)
+
+    def mark_updated(self, id: int, at: float) -> None:
+        """Send a streamed message for a value that no event reports.
+
+        `at`: when it was true (s, monotonic).
+        """
+        self.messages.mark_updated(id, at)
+
+    def set_muted(self, channel: Channel, *, muted: bool) -> None:
+        """Send only answers on this channel; with False everything again."""
+        self._system.set_muted(channel, muted=muted)
+
+    # What clients send.
+
+    def receive(self, inbound: Inbound) -> None:
+        """Handle a message to this component, to its system, or to all."""
+        message = inbound.message
+        id = message.get_msgId()
+        handler = self._handlers.get(id)
+        if handler is None:
+            return
+        try:
+            if getattr(message, "target_system", 0) == self.sysid:
+                for service in self._receiving:
+                    service.received(inbound)
+            if id in COMMANDS or id in BY_AUTOPILOT:
+                to_all = message.target_component == EVERY_COMPONENT
+                if to_all and self._system.owner(message) is not self:
+                    return
+            handler(inbound)
+        except AnafiMavError as error:  # the drone's link may just have died
+            logger.debug("%s: %s not handled: %s", self.drone.name, message.get_type(), error)
+        except Exception:
+            logger.exception("%s: %s not handled", self.drone.name, message.get_type())
+
+    def _heard(self, inbound: Inbound) -> None:
+        for service in self.services:
+            service.heartbeat(inbound)
+
+
+def joined(tables: Any) -> dict[Any, Any]:
+    """One table of all services'. Raises `ValueError` when two services claim the same."""
+    result: dict[Any, Any] = {}
+    for table in tables:
+        if twice := result.keys() & table.keys():
+            raise ValueError(f"two services claim {sorted(twice)}")
+        result.update(table)
+    return result
