@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Coroutine, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
 from anafi_mav.clock import Clock
@@ -20,7 +20,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.router import EVERY_COMPONENT
 from anafi_mav.services.command.command_service import CommandService
-from anafi_mav.services.commands import Action, ActionGroup
+from anafi_mav.services.commands import Action
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.ftp.ftp_service import FtpService
 from anafi_mav.services.memory import Memory
@@ -97,8 +97,12 @@ class Component:
         self.clock = system.clock
         self.memory = system.memory
         self._system = system
+        self.text, self.warn_throttled, self.send_heartbeat = system.text, system.warn_throttled, system.send_heartbeat
+        self.spawn, self.times, self.set_muted = system.spawn, system.times, system.set_muted
         self.commands = CommandService(self)
+        self.run_action, self.end_others = self.commands.run, self.commands.end_others
         self.messages = MessageService(self)
+        self.is_streamed, self.mark_updated = self.messages.is_streamed, self.messages.mark_updated
         self._ftp = FtpService(self)
         self.services: list[Service] = [self.commands, self.messages, self._ftp]
         self.services += [kind(self) for kind in services]
@@ -164,60 +168,10 @@ class Component:
             if message is not None:
                 self.send(message, channels)
 
-    def send_heartbeat(self) -> None:
-        """Send one more HEARTBEAT of the autopilot to all."""
-        self._system.send_heartbeat()
-
-    def text(self, severity: Severity, text: OperatorText, to: Channel | None = None) -> None:
-        """Send a STATUSTEXT of the autopilot to all, or to one channel alone."""
-        self._system.text(severity, text, to)
-
-    def warn_throttled(self, text: OperatorText) -> None:
-        """Send a warning on a frequent event, at most once per five seconds."""
-        self._system.warn_throttled(text)
-
-    def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
-        """Run in the background; cancelled when the drone's link goes down."""
-        return self._system.spawn(work)
-
-    def run_action(
-        self,
-        client: Hashable,
-        work: Coroutine[Any, Any, None],
-        *,
-        is_order: bool = True,
-        group: ActionGroup = ActionGroup.FLIGHT,
-    ) -> asyncio.Task[None]:
-        """Run an action that a message without COMMAND_ACK requests."""
-        return self.commands.run(client, work, is_order=is_order, group=group)
-
-    def end_others(self, group: ActionGroup) -> list[asyncio.Task[None]]:
-        """Cancel the older running actions of a group, and return them."""
-        return self.commands.end_others(group)
-
     @property
     def replaced_by_order(self) -> bool:
         """True in an action that a newer order of a client has ended."""
         return self.commands.replaced_by_order
-
-    def times(self, at: float | None = None) -> Times:
-        """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
-        return self._system.times(at)
-
-    def is_streamed(self, id: int) -> bool:
-        """Return True when the component streams this message on some channel."""
-        return self.messages.is_streamed(id)
-
-    def mark_updated(self, id: int, at: float) -> None:
-        """Send a streamed message for a value that no event reports.
-
-        `at`: when it was true (s, monotonic).
-        """
-        self.messages.mark_updated(id, at)
-
-    def set_muted(self, channel: Channel, *, muted: bool) -> None:
-        """Send only answers on this channel; with False everything again."""
-        self._system.set_muted(channel, muted=muted)
 
     # What clients send.
 
