@@ -21,6 +21,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.router import EVERY_COMPONENT
 from anafi_mav.services.command.command_service import CommandService
 from anafi_mav.services.commands import Action
+from anafi_mav.services.definition_link import DefinitionLink
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.ftp.ftp_service import FtpService
 from anafi_mav.services.memory import Memory
@@ -54,6 +55,8 @@ class ComponentSystem(Protocol):
     vehicle: Vehicle
     clock: Clock
     memory: Memory
+    has_picture_pose: bool
+    """True when the configuration allows pose from the live video."""
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -96,13 +99,22 @@ class Component:
         self.vehicle = system.vehicle
         self.clock = system.clock
         self.memory = system.memory
+        self.has_picture_pose = system.has_picture_pose
+        self.definition = DefinitionLink()
         self._system = system
-        self.text, self.warn_throttled, self.send_heartbeat = system.text, system.warn_throttled, system.send_heartbeat
-        self.spawn, self.times, self.set_muted = system.spawn, system.times, system.set_muted
+        # The system's part of `Host`, without a method here for each.
+        self.text = system.text
+        self.warn_throttled = system.warn_throttled
+        self.send_heartbeat = system.send_heartbeat
+        self.spawn = system.spawn
+        self.times = system.times
+        self.set_muted = system.set_muted
         self.commands = CommandService(self)
-        self.run_action, self.end_others = self.commands.run, self.commands.end_others
+        self.run_action = self.commands.run
+        self.end_others = self.commands.end_others
         self.messages = MessageService(self)
-        self.is_streamed, self.mark_updated = self.messages.is_streamed, self.messages.mark_updated
+        self.show_picture = self.messages.show_picture
+        self.mark_updated = self.messages.mark_updated
         self._ftp = FtpService(self)
         self.services: list[Service] = [self.commands, self.messages, self._ftp]
         self.services += [kind(self) for kind in services]
@@ -128,7 +140,10 @@ class Component:
         actions = joined(service.actions() for service in self.services)
         self._own = frozenset({*queries, *actions})
         self.commands.take_tables(queries, joined([actions, others]))
-        self._ftp.take_tables(joined(service.files() for service in self.services))
+        self._ftp.take_tables(
+            joined(service.files() for service in self.services),
+            joined(service.folders() for service in self.services),
+        )
         self._handlers = joined(service.messages() for service in self.services)
         self._handlers[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self._heard
 
@@ -150,7 +165,7 @@ class Component:
 
         Nothing is sent while the link is down.
         """
-        self._system.send_as(self.compid, message, to, give_way=message.id in self.telemetry)
+        self._system.send_as(self.compid, message, to, give_way=message.get_msgId() in self.telemetry)
 
     def send_by_flavour(
         self, build: Callable[[Flavour], dialect.MAVLink_message | None], to: Sequence[Channel] | None = None
@@ -173,12 +188,22 @@ class Component:
         """True in an action that a newer order of a client has ended."""
         return self.commands.replaced_by_order
 
+    @property
+    def needs_pictures(self) -> bool:
+        """True while a client requests pose more often than events are reported."""
+        return self.messages.needs_pictures
+
+    @property
+    def needs_video(self) -> bool:
+        """True while a client has a stream whose fields are in the live video only."""
+        return self.messages.needs_video
+
     # What clients send.
 
     def receive(self, inbound: Inbound) -> None:
         """Handle a message to this component, to its system, or to all."""
         message = inbound.message
-        id = message.id
+        id = message.get_msgId()
         handler = self._handlers.get(id)
         if handler is None:
             return

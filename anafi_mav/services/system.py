@@ -20,6 +20,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.mavlink.router import EVERY_COMPONENT
+from anafi_mav.services.camera_definition.param_ext_service import ParamExtService
 from anafi_mav.services.command.calibration_service import CalibrationService
 from anafi_mav.services.command.command_service import SETTLE
 from anafi_mav.services.command.compass_service import CompassService
@@ -30,12 +31,14 @@ from anafi_mav.services.command.orbit_service import OrbitService
 from anafi_mav.services.component import BY_AUTOPILOT, COMMANDS, Component, joined
 from anafi_mav.services.event.event_service import EventService
 from anafi_mav.services.ftp.log_service import LogService
+from anafi_mav.services.gimbal.gimbal_service import GimbalService
 from anafi_mav.services.ground_station.banner_service import BannerService
 from anafi_mav.services.ground_station.identity_service import IdentityService
 from anafi_mav.services.ground_station.node_status_service import NodeStatusService
 from anafi_mav.services.ground_station.shell_service import ShellService
 from anafi_mav.services.ground_station.time_service import TimeService
 from anafi_mav.services.ground_station.tune_service import TuneService
+from anafi_mav.services.media.media_service import MediaService
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.monitor import takeoff_point_service
 from anafi_mav.services.monitor.aborted_return_service import AbortedReturnService
@@ -76,6 +79,7 @@ AUTOPILOT_SERVICES: tuple[type[Service], ...] = (
     CalibrationService,
     CompassService,
     OrbitService,
+    GimbalService,
     TelemetryService,
     ParameterService,
     LinkLossService,
@@ -104,7 +108,7 @@ AUTOPILOT_SERVICES: tuple[type[Service], ...] = (
 )
 """Services of component 1, beside commands, messages and files themselves."""
 
-CAMERA_SERVICES: tuple[type[Service], ...] = ()
+CAMERA_SERVICES: tuple[type[Service], ...] = (ParamExtService, MediaService)
 """Services of component 100."""
 
 AUTOPILOT = dialect.MAV_COMP_ID_AUTOPILOT1
@@ -148,8 +152,10 @@ class System:
         *,
         allow_kill: bool,
         state: Path | None = None,
+        has_picture_pose: bool = True,
     ) -> None:
         self.sysid = sysid
+        self.has_picture_pose = has_picture_pose
         self.drone = drone
         self.clock = clock
         self.memory = Memory(state)
@@ -278,7 +284,7 @@ class System:
         It is a command, or a message that several components handle. The autopilot answers for commands that no
         component has.
         """
-        if message.id in BY_AUTOPILOT:
+        if message.get_msgId() in BY_AUTOPILOT:
             return self._autopilot
         return next((component for component in self.components if component.owns(message)), self._autopilot)
 
@@ -457,15 +463,15 @@ class System:
 
     def _commands_us(self, message: Any) -> bool:
         """Return True for a command to this system by its id that is no query."""
-        if message.id == dialect.MAVLINK_MSG_ID_SET_MODE:
+        if message.get_msgId() == dialect.MAVLINK_MSG_ID_SET_MODE:
             return bool(message.target_system == self.sysid)
-        known = message.id in COMMANDS and message.target_system == self.sysid
+        known = message.get_msgId() in COMMANDS and message.target_system == self.sysid
         return known and any(component.commands.acts_on(message.command) for component in self.components)
 
     def _refuse(self, inbound: Inbound) -> None:
         """Answer a command to one of the components in `ABSENT` alone: it is unsupported."""
         message = inbound.message
-        if message.id in COMMANDS and message.target_system == self.sysid and message.target_component:
+        if message.get_msgId() in COMMANDS and message.target_system == self.sysid and message.target_component:
             answer = _unsupported(inbound)
             self._node.send(answer, sysid=self.sysid, compid=message.target_component, to=inbound.channel)
 
