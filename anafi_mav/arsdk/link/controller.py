@@ -117,7 +117,7 @@ class ControllerSession(Session):
         return self._watchdog is None or not self._watchdog.standing_by or self._watchdog.secure()
 
     def sent(self) -> None:
-        """Renew the standby frames, whose sequence numbers follow those of the datagrams that have left."""
+        """Renew the standby frames: their sequence numbers follow those of the sent datagrams."""
         standing_by = self._watchdog is not None and self._watchdog.standing_by
         if standing_by and self._transport.next_seq != self._standby_seq:
             self._renew()
