@@ -25,6 +25,7 @@ from anafi_mav.services.definition_link import DefinitionLink
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.ftp.ftp_service import FtpService
 from anafi_mav.services.memory import Memory
+from anafi_mav.services.pose import UNKNOWN_POSE, VehiclePose
 from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.stream import Times
 from anafi_mav.services.telemetry.message_service import MessageService
@@ -82,7 +83,7 @@ class ComponentSystem(Protocol):
     def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """Run in the background; cancelled when the drone's link goes down."""
 
-    def times(self, at: float | None = None) -> Times:
+    def times(self, at: float | None = None, pose: VehiclePose = UNKNOWN_POSE) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
 
     def set_muted(self, channel: Channel, *, muted: bool) -> None:
