@@ -196,6 +196,9 @@ class System:
             if isinstance(service, PlanService):
                 service.take_tables(joined(service.item_commands() for service in self._autopilot.services))
         self._ticking = [service for service in self.services if type(service).tick is not Service.tick]
+        self._on_change = [
+            service for service in self.services if type(service).state_changed is not Service.state_changed
+        ]
         self._subscribed: dict[type[Message], tuple[EventHandler, ...]] = {}
         """The handlers of each kind of event, in the order in which they are called."""
 
@@ -422,7 +425,7 @@ class System:
             self._hold_mode(last)
             if not disarmed:
                 self.send_heartbeat()
-        for service in self.services:
+        for service in self._on_change:
             service.state_changed()
         if disarmed:
             self.send_heartbeat()
