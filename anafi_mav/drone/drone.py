@@ -575,6 +575,7 @@ class Drone:
                 self._on_lost(session, session.lost)
         self.streams.link_lost()
         await self.video.close()
+        await self.media.close()
         await self._rest.close()
 
     @property

@@ -9,6 +9,7 @@ followed: all the drone's content is on the drone.
 from __future__ import annotations
 
 import asyncio
+import re
 import socket
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager, suppress
@@ -29,17 +30,34 @@ ANSWER_LIMIT = 1 << 24
 ANSWER_TIMEOUT = 10.0
 """s for an answer, and between two pieces of a file: the drone reads a slow card."""
 
+CONNECTIONS = 8
+"""At a time: two files, notifications, a list, a checksum and a flight plan, which must not wait for them."""
+
+NOT_INDEXED_YET = "the drone has not indexed its media yet"
 NOT_INDEXED = 541
 """Parrot's status for a question about media while there is no index yet (developer.parrot.com, media API)."""
+
+
+PARTIAL = 206
+"""Status of an answer with one range of a file (RFC 9110 §15.3.7)."""
+
+_CONTENT_RANGE = re.compile(r"bytes ([0-9]{1,18})-[0-9]{1,18}/([0-9]{1,18})")
 
 
 class Rest:
     """One drone's web server."""
 
     def __init__(
-        self, address: str, port: int = HTTP_PORT, local_address: str | None = None, interface: str | None = None
+        self,
+        address: str,
+        port: int = HTTP_PORT,
+        local_address: str | None = None,
+        interface: str | None = None,
+        prefix: str = "",
     ) -> None:
+        """`prefix` of all paths, as "/drone/1" at a gateway that serves several drones."""
         self.address = address
+        self._prefix = prefix
         self.port = port
         self._local_address = local_address
         self._interface = interface
@@ -48,7 +66,7 @@ class Rest:
 
     @property
     def base(self) -> str:
-        return f"http://{self.address}:{self.port}"
+        return f"http://{self.address}:{self.port}{self._prefix}"
 
     async def aim(self, address: str, port: int, *, local: bool = False) -> None:
         """Ask there from now on. `local`: on this machine, where no interface has to be named."""
@@ -74,15 +92,21 @@ class Rest:
             raise RemoteProtocolError(f"{method} {path}: the drone answers no JSON: {error}") from error
 
     async def read(
-        self, method: str, path: str, data: bytes | None = None, query: Mapping[str, str] | None = None
+        self,
+        method: str,
+        path: str,
+        data: bytes | None = None,
+        query: Mapping[str, str] | None = None,
+        limit: int | None = None,
     ) -> bytes:
-        """The body of an answer."""
+        """The body of an answer of at most `limit` bytes; None: `ANSWER_LIMIT`."""
+        limit = ANSWER_LIMIT if limit is None else limit
         pieces, size = [], 0
         async with self.open(method, path, data, query) as answer:
             async for piece in answer:
                 size += len(piece)
-                if size > ANSWER_LIMIT:
-                    raise RemoteProtocolError(f"{method} {path}: the answer has more than {ANSWER_LIMIT} bytes")
+                if size > limit:
+                    raise RemoteProtocolError(f"{method} {path}: the answer has more than {limit} bytes")
                 pieces.append(piece)
         return b"".join(pieces)
 
@@ -91,16 +115,49 @@ class Rest:
         self, method: str, path: str, data: bytes | None = None, query: Mapping[str, str] | None = None
     ) -> AsyncIterator[AsyncIterator[bytes]]:
         """An answer piece by piece."""
+        async with self._request(method, path, data, query) as response:
+            yield response.content.iter_any()
+
+    @asynccontextmanager
+    async def open_file(self, path: str, offset: int, size: int) -> AsyncIterator[tuple[int, AsyncIterator[bytes]]]:
+        """Read a file of `size` bytes (0.
+
+        Unknown) from `offset` on: where the answer begins, and its pieces.
+
+        It begins at 0 when the web server has no ranges (RFC 9110 §14.2). Raises `RemoteProtocolError` when the file
+        has another size by now. The caller counts the bytes: an answer may end too early.
+        """
+        headers = {"Range": f"bytes={offset}-", "Accept-Encoding": "identity"} if offset else None
+        async with self._request("GET", path, headers=headers) as response:
+            start, total = 0, response.content_length
+            if response.status == PARTIAL:
+                found = _CONTENT_RANGE.fullmatch(response.headers.get("Content-Range", ""))
+                if found is None or int(found[1]) != offset:
+                    raise RemoteProtocolError(f"GET {path}: not the range that begins at {offset}")
+                start, total = offset, int(found[2])
+            if size and total is not None and total != size:
+                raise RemoteProtocolError(f"GET {path}: expected {size} bytes, the file has {total}")
+            yield start, response.content.iter_any()
+
+    @asynccontextmanager
+    async def _request(
+        self,
+        method: str,
+        path: str,
+        data: bytes | None = None,
+        query: Mapping[str, str] | None = None,
+        headers: Mapping[str, str] | None = None,
+    ) -> AsyncIterator[aiohttp.ClientResponse]:
         if not path.startswith("/") or path.startswith("//"):
             raise RemoteProtocolError(f"{path!r} is no place on the drone")
         what = f"{method} {path}"
         with _Translated(what, self.base):
             async with self._session().request(
-                method, self.base + path, data=data, params=query, allow_redirects=False
+                method, self.base + path, data=data, params=query, headers=headers, allow_redirects=False
             ) as response:
                 if response.status >= 300:
                     raise CommandRejected(await _refusal(what, response))
-                yield response.content.iter_any()
+                yield response
 
     @asynccontextmanager
     async def websocket(self, path: str, limit: int) -> AsyncIterator[aiohttp.ClientWebSocketResponse]:
@@ -112,7 +169,7 @@ class Rest:
 
     def _session(self) -> aiohttp.ClientSession:
         if self._client is None or self._client.closed:
-            options: dict[str, Any] = {"limit_per_host": 4}
+            options: dict[str, Any] = {"limit_per_host": CONNECTIONS}
             if self._local_address is not None and not self._local:
                 options["local_addr"] = (self._local_address, 0)
             if self._interface is not None and not self._local:
@@ -135,7 +192,7 @@ class Rest:
 
 async def _refusal(what: str, response: aiohttp.ClientResponse) -> str:
     if response.status == NOT_INDEXED:
-        return "the drone has not indexed its media yet"
+        return NOT_INDEXED_YET
     told = ""
     with suppress(aiohttp.ClientError, asyncio.TimeoutError, msgspec.DecodeError, AttributeError):
         answer = msgspec.json.decode(await response.content.read(1 << 12))

@@ -21,6 +21,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.router import EVERY_COMPONENT
 from anafi_mav.services.command.command_service import CommandService
 from anafi_mav.services.commands import Action, ActionGroup
+from anafi_mav.services.definition_link import DefinitionLink
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.ftp.ftp_service import FtpService
 from anafi_mav.services.memory import Memory
@@ -100,6 +101,7 @@ class Component:
         self.clock = system.clock
         self.memory = system.memory
         self.has_picture_pose = system.has_picture_pose
+        self.definition = DefinitionLink()
         self._system = system
         self.commands = CommandService(self)
         self.messages = MessageService(self)
@@ -128,7 +130,10 @@ class Component:
         actions = joined(service.actions() for service in self.services)
         self._own = frozenset({*queries, *actions})
         self.commands.take_tables(queries, joined([actions, others]))
-        self._ftp.take_tables(joined(service.files() for service in self.services))
+        self._ftp.take_tables(
+            joined(service.files() for service in self.services),
+            joined(service.folders() for service in self.services),
+        )
         self._handlers = joined(service.messages() for service in self.services)
         self._handlers[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self._heard
 
@@ -150,7 +155,7 @@ class Component:
 
         Nothing is sent while the link is down.
         """
-        self._system.send_as(self.compid, message, to, give_way=message.get_msgId() in self.telemetry)
+        self._system.send_as(self.compid, message, to, give_way=message.id in self.telemetry)
 
     def send_by_flavour(
         self, build: Callable[[Flavour], dialect.MAVLink_message | None], to: Sequence[Channel] | None = None
@@ -238,7 +243,7 @@ class Component:
     def receive(self, inbound: Inbound) -> None:
         """Handle a message to this component, to its system, or to all."""
         message = inbound.message
-        id = message.get_msgId()
+        id = message.id
         handler = self._handlers.get(id)
         if handler is None:
             return

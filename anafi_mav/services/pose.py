@@ -12,6 +12,7 @@ from msgspec.structs import replace
 from anafi_mav.drone.piloting.state import Attitude, Velocity
 from anafi_mav.drone.video.video import VideoFrame
 from anafi_mav.vehicle.base.geo_point import GeoPoint
+from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.vehicle import Vehicle
 
 
@@ -45,7 +46,7 @@ def reported_pose(vehicle: Vehicle) -> VehiclePose:
     """Return the motion as the newest events report it."""
     state, location = vehicle.drone.piloting.state, vehicle.drone.gps.state.location
     attitude = state.attitude
-    if attitude is not None and vehicle.roll.inverted:
+    if attitude is not None and vehicle.roll.sign is RollSign.INVERTED:
         attitude = replace(attitude, roll=-attitude.roll)
     gps_altitude = None if location is None else location.altitude
     return VehiclePose(attitude, state.velocity, state.altitude, state.height, vehicle.place, gps_altitude)

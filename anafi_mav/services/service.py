@@ -16,7 +16,8 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Action, ActionGroup, Command
-from anafi_mav.services.files import ServedFile
+from anafi_mav.services.definition_link import DefinitionLink
+from anafi_mav.services.files import Folder, ServedFile
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.pose import VehiclePose
@@ -50,6 +51,8 @@ class Host(Protocol):
     memory: Memory
     has_picture_pose: bool
     """True when the configuration allows pose from the live video."""
+    definition: DefinitionLink
+    """Camera definition of the component."""
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -187,6 +190,10 @@ class Service:
 
     def files(self) -> Mapping[str, ServedFile]:
         """Return the files that MAVLink FTP serves, by path."""
+        return {}
+
+    def folders(self) -> Mapping[str, Folder]:
+        """Return the folders that MAVLink FTP serves, by path."""
         return {}
 
     def link_up(self) -> None:

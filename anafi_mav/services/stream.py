@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import msgspec
+from msgspec.structs import replace
 
 from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
@@ -27,26 +28,20 @@ class Times(msgspec.Struct, frozen=True):
     """
 
     boot_ns: int
+    boot_us: int
+    boot_ms: int
+    """An uint32 that wraps after 49.7 days, as on every autopilot."""
     flavour: Flavour = PX4
     moment: VehiclePose | None = None
     """The pose at that time, as a picture or the events report it; None: as the events report it now."""
 
-    @property
-    def boot_ms(self) -> int:
-        """An uint32 that wraps after 49.7 days, as on every autopilot."""
-        return self.boot_ns // 1_000_000 & 0xFFFFFFFF
-
-    @property
-    def boot_us(self) -> int:
-        return self.boot_ns // 1000
-
     def for_flavour(self, flavour: Flavour) -> Times:
         """Return the same moment for clients of another flavour."""
-        return Times(self.boot_ns, flavour, self.moment)
+        return replace(self, flavour=flavour)
 
     def at(self, moment: VehiclePose) -> Times:
         """Return the same time for messages that are made of this pose."""
-        return Times(self.boot_ns, self.flavour, moment)
+        return replace(self, moment=moment)
 
     def pose(self, vehicle: Vehicle) -> VehiclePose:
         """Return the motion that the message is about."""

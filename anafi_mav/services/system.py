@@ -20,6 +20,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.mavlink.router import EVERY_COMPONENT
+from anafi_mav.services.camera_definition.param_ext_service import ParamExtService
 from anafi_mav.services.command.calibration_service import CalibrationService
 from anafi_mav.services.command.command_service import SETTLE
 from anafi_mav.services.command.compass_service import CompassService
@@ -30,12 +31,14 @@ from anafi_mav.services.command.orbit_service import OrbitService
 from anafi_mav.services.component import BY_AUTOPILOT, COMMANDS, Component, joined
 from anafi_mav.services.event.event_service import EventService
 from anafi_mav.services.ftp.log_service import LogService
+from anafi_mav.services.gimbal.gimbal_service import GimbalService
 from anafi_mav.services.ground_station.banner_service import BannerService
 from anafi_mav.services.ground_station.identity_service import IdentityService
 from anafi_mav.services.ground_station.node_status_service import NodeStatusService
 from anafi_mav.services.ground_station.shell_service import ShellService
 from anafi_mav.services.ground_station.time_service import TimeService
 from anafi_mav.services.ground_station.tune_service import TuneService
+from anafi_mav.services.media.media_service import MediaService
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.monitor import takeoff_point_service
 from anafi_mav.services.monitor.aborted_return_service import AbortedReturnService
@@ -76,6 +79,7 @@ AUTOPILOT_SERVICES: tuple[type[Service], ...] = (
     CalibrationService,
     CompassService,
     OrbitService,
+    GimbalService,
     TelemetryService,
     ParameterService,
     LinkLossService,
@@ -104,7 +108,7 @@ AUTOPILOT_SERVICES: tuple[type[Service], ...] = (
 )
 """Services of component 1, beside commands, messages and files themselves."""
 
-CAMERA_SERVICES: tuple[type[Service], ...] = ()
+CAMERA_SERVICES: tuple[type[Service], ...] = (ParamExtService, MediaService)
 """Services of component 100."""
 
 AUTOPILOT = dialect.MAV_COMP_ID_AUTOPILOT1
@@ -280,7 +284,7 @@ class System:
         It is a command, or a message that several components handle. The autopilot answers for commands that no
         component has.
         """
-        if message.get_msgId() in BY_AUTOPILOT:
+        if message.id in BY_AUTOPILOT:
             return self._autopilot
         return next((component for component in self.components if component.owns(message)), self._autopilot)
 
@@ -332,7 +336,8 @@ class System:
 
     def times(self, at: float | None = None) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
-        return Times(round(((self.clock.monotonic() if at is None else at) - self._started) * 1e9))
+        ns = round(((self.clock.monotonic() if at is None else at) - self._started) * 1e9)
+        return Times(ns, ns // 1_000, ns // 1_000_000 & 0xFFFFFFFF)
 
     # The heart.
 
@@ -342,7 +347,7 @@ class System:
         base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         if vehicle.armed:
             base |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
-        mode = FlightMode.MISSION if self._mission_over.is_set else vehicle.mode
+        mode = FlightMode.MISSION if self._mission_over.at is not None else vehicle.mode
         health = vehicle.health.value
         self._autopilot.send_by_flavour(
             lambda flavour: dialect.MAVLink_heartbeat_message(
@@ -428,7 +433,7 @@ class System:
         """
         vehicle = self.vehicle
         hovers = vehicle.armed and vehicle.mode in (FlightMode.HOLD, FlightMode.GUIDED)
-        if self._mission_over.is_set:
+        if self._mission_over.at is not None:
             if not hovers:
                 self._mission_over.cancel()
         elif hovers and last is not None and last[0] is FlightMode.MISSION:
@@ -458,15 +463,15 @@ class System:
 
     def _commands_us(self, message: Any) -> bool:
         """Return True for a command to this system by its id that is no query."""
-        if message.get_msgId() == dialect.MAVLINK_MSG_ID_SET_MODE:
+        if message.id == dialect.MAVLINK_MSG_ID_SET_MODE:
             return bool(message.target_system == self.sysid)
-        known = message.get_msgId() in COMMANDS and message.target_system == self.sysid
+        known = message.id in COMMANDS and message.target_system == self.sysid
         return known and any(component.commands.acts_on(message.command) for component in self.components)
 
     def _refuse(self, inbound: Inbound) -> None:
         """Answer a command to one of the components in `ABSENT` alone: it is unsupported."""
         message = inbound.message
-        if message.get_msgId() in COMMANDS and message.target_system == self.sysid and message.target_component:
+        if message.id in COMMANDS and message.target_system == self.sysid and message.target_component:
             answer = _unsupported(inbound)
             self._node.send(answer, sysid=self.sysid, compid=message.target_component, to=inbound.channel)
 

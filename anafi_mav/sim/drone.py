@@ -244,6 +244,11 @@ class SimulatedDrone:
         return None if self._web is None else self._web.port
 
     @property
+    def web(self) -> WebServer | None:
+        """The web server; None without one."""
+        return self._web
+
+    @property
     def rtsp_port(self) -> int | None:
         """Return the video server's port, or None without a video server."""
         return self._video.port or None
@@ -342,7 +347,13 @@ class SimulatedDrone:
             "hardware": model.hardware,
         }
         calendar = firmware.payload.calendar
-        return WebServer(firmware.payload.media, firmware.plans, properties, lambda: calendar.date(firmware.time))
+        return WebServer(
+            firmware.payload.media,
+            firmware.plans,
+            properties,
+            lambda: calendar.date(firmware.time),
+            lambda: Quirk.NO_HTTP_RANGE not in self.faults.quirks,
+        )
 
     async def close(self) -> None:
         """Close the sockets, without a word to the controller: ARSDK has no goodbye. Idempotent."""

@@ -9,17 +9,21 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from aiohttp import WSCloseCode, web
 from aiohttp.typedefs import Handler
 
-from anafi_mav.sim.payload.media import MediaKind, MediaStore
+from anafi_mav.sim.payload.media import PART, MediaKind, MediaStore
 from anafi_mav.sim.plan.plan_store import FlightPlanStore
 
 MAX_BODY = 1 << 20
 """Bytes of a request body that are read; a flight plan of a thousand items is a tenth of it."""
+
+SENT_PART = 1 << 16
+"""Bytes of a file that are sent at a time."""
 
 MAX_UNREAD = 1000
 """Notifications that wait for a client that does not read; then its socket is closed."""
@@ -41,18 +45,29 @@ _ORDERS = {"oldest": False, "newest": True}
 class WebServer:
     """One drone's HTTP server.
 
-    `properties` are what it says of itself, `date` the time on its clock.
+    `properties` are what it says of itself, `date` the time on its clock. `has_ranges` returns False while it ignores
+    Range in requests.
     """
 
     def __init__(
-        self, media: MediaStore, plans: FlightPlanStore, properties: Mapping[str, str], date: Callable[[], str]
+        self,
+        media: MediaStore,
+        plans: FlightPlanStore,
+        properties: Mapping[str, str],
+        date: Callable[[], str],
+        has_ranges: Callable[[], bool] = lambda: True,
     ) -> None:
         self._media = media
         self._plans = plans
         self._properties = dict(properties)
         self._date = date
+        self.has_ranges = has_ranges
         self._audible = asyncio.Event()
         self._audible.set()
+        self.refuses_sockets = False
+        """True: no notifications, as a firmware without them."""
+        self.served: Counter[str] = Counter()
+        """Requests of some kinds so far: "medias", the list."""
         self._listeners: dict[web.WebSocketResponse, tuple[asyncio.Queue[str], asyncio.Transport | None]] = {}
         app = web.Application(client_max_size=MAX_BODY, middlewares=[self._through_the_air])
         api = "/api/v1"
@@ -74,7 +89,7 @@ class WebServer:
                 web.delete(f"{api}/upload/flightplan/{{id}}", self._delete_plan),
             ]
         )
-        app.on_shutdown.append(self._close_sockets)
+        app.on_shutdown.append(lambda app: self.close_sockets())
         self._runner = web.AppRunner(app, access_log=None, shutdown_timeout=SHUTDOWN)
         self.port = 0
 
@@ -123,6 +138,7 @@ class WebServer:
         return web.json_response(self._properties)
 
     async def _medias(self, request: web.Request) -> web.Response:
+        self.served["medias"] += 1
         if not self._media.indexed:
             return _not_indexed()
         query = request.query
@@ -168,14 +184,39 @@ class WebServer:
         resource = self._media.resource(request.match_info["id"])
         if resource is None:
             return _unknown("resource")
-        told = {"resource_id": resource.id, "media_id": resource.media_id, "md5": resource.md5()}
-        return web.json_response(told)
+        # A video may have gigabytes: the drone's link must not wait for their digest.
+        md5 = resource.md5() if resource.size < PART else await asyncio.to_thread(resource.md5)
+        return web.json_response({"resource_id": resource.id, "media_id": resource.media_id, "md5": md5})
 
-    async def _file(self, request: web.Request) -> web.Response:
+    async def _file(self, request: web.Request) -> web.StreamResponse:
+        """Send a file part by part.
+
+        All of it, or the one range that the client wants (RFC 9110 §14).
+        """
         resource = self._media.resource(request.match_info["id"]) if self._media.indexed else None
         if resource is None:
             return _unknown("file")
-        return web.Response(body=resource.content(), content_type=_TYPES[resource.kind])
+        first, end = 0, resource.size
+        headers = {"Accept-Ranges": "bytes"} if self.has_ranges() else {}
+        status = 200
+        if self.has_ranges() and "Range" in request.headers:
+            try:
+                first, end, _ = request.http_range.indices(resource.size)
+            except ValueError:  # a range that cannot be read is none (RFC 9110 §14.2)
+                pass
+            else:
+                if first >= end:
+                    return web.Response(status=416, headers={"Content-Range": f"bytes */{resource.size}"})
+                status, headers["Content-Range"] = 206, f"bytes {first}-{end - 1}/{resource.size}"
+        response = web.StreamResponse(status=status, headers=headers)
+        response.content_type = _TYPES[resource.kind]
+        response.content_length = end - first
+        await response.prepare(request)
+        for part in resource.parts(first, end, SENT_PART):
+            await self._audible.wait()
+            await response.write(part)
+        await response.write_eof()
+        return response
 
     async def _thumbnail(self, request: web.Request) -> web.Response:
         resource = self._media.by_thumbnail(request.match_info["id"]) if self._media.indexed else None
@@ -198,7 +239,9 @@ class WebServer:
                 if transport is not None:
                     transport.abort()
 
-    async def _notifications(self, request: web.Request) -> web.WebSocketResponse:
+    async def _notifications(self, request: web.Request) -> web.StreamResponse:
+        if self.refuses_sockets:
+            return _unknown("page")
         socket = web.WebSocketResponse(heartbeat=30.0, max_msg_size=MAX_WORD)
         await socket.prepare(request)
         queue: asyncio.Queue[str] = asyncio.Queue(MAX_UNREAD)
@@ -212,7 +255,8 @@ class WebServer:
             writer.cancel()
         return socket
 
-    async def _close_sockets(self, app: web.Application) -> None:
+    async def close_sockets(self) -> None:
+        """Close the websockets of all clients."""
         for socket in list(self._listeners):
             with contextlib.suppress(ConnectionError):
                 await socket.close(code=WSCloseCode.GOING_AWAY)

@@ -10,8 +10,8 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.mav import Client
 
 ACK, NAK = 128, 129
-TERMINATE, RESET, LIST, OPEN, READ, BURST, CRC = 1, 2, 3, 4, 5, 15, 14
-EOF, PROTECTED, NOT_FOUND, NO_SESSION = 6, 9, 10, 4
+TERMINATE, RESET, LIST, OPEN, READ, REMOVE, BURST, CRC, LIST_TIMED = 1, 2, 3, 4, 5, 8, 15, 14, 16
+FAIL, EOF, PROTECTED, NOT_FOUND, NO_SESSION, SESSIONS_FULL = 1, 6, 9, 10, 4, 5
 
 
 class Reply(NamedTuple):
@@ -41,9 +41,10 @@ def taken_apart(message: Any) -> Reply:
 class Ftp:
     """One client's conversation."""
 
-    def __init__(self, client: Client, sender: tuple[int, int] | None = None) -> None:
-        """`sender`: another system and component that speak over the same connection."""
+    def __init__(self, client: Client, sender: tuple[int, int] | None = None, component: int = 1) -> None:
+        """`sender`: another system and component that speak over the same connection; `component`: whose files."""
         self.client = client
+        self.component = component
         self.ids = sender or (client.sysid, client.compid)
         self.seq = 0
         self._out = dialect.MAVLink(None, *self.ids)
@@ -53,7 +54,7 @@ class Ftp:
     ) -> None:
         header = struct.pack("<HBBBBBBI", seq, session, opcode, len(data) if size is None else size, 0, 0, 0, offset)
         payload = (header + data).ljust(251, b"\0")
-        message = dialect.MAVLink_file_transfer_protocol_message(0, 1, 1, list(payload))
+        message = dialect.MAVLink_file_transfer_protocol_message(0, 1, self.component, list(payload))
         self.client.send_raw(message.pack(self._out))
 
     async def ask(self, opcode: int, data: bytes = b"", *, timeout: float = 2.0, **more: Any) -> Reply:
@@ -69,6 +70,7 @@ class Ftp:
             timeout=timeout,
         )
         assert (message.target_system, message.target_component) == self.ids
+        assert message.get_srcComponent() == self.component
         return taken_apart(message)
 
     async def download(self, path: str, *, session: int = 0) -> bytes:
@@ -89,6 +91,14 @@ class Ftp:
                     break
         assert (await self.ask(TERMINATE, session=opened.session)).opcode == ACK
         return content
+
+    async def names(self, path: str) -> list[str]:
+        """The lines of a directory, as the server sends them."""
+        lines: list[str] = []
+        while (reply := await self.ask(LIST, path.encode(), offset=len(lines))).opcode == ACK:
+            lines += reply.data.decode().split("\0")[:-1]
+        assert reply.error == EOF
+        return lines
 
     async def _part(self, offset: int, mark: int) -> Reply:
         """The part of a burst that begins at this offset."""

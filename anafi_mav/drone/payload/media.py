@@ -6,11 +6,9 @@ server, which is used only on request of a caller (`/api/v1/media`, developer.pa
 
 from __future__ import annotations
 
-import asyncio
-import hashlib
 import logging
-import re
-from collections.abc import AsyncGenerator, Mapping
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Mapping
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -23,6 +21,12 @@ from anafi_mav.arsdk.messages import mediastore
 from anafi_mav.arsdk.messages.mediastore import MediastoreState
 from anafi_mav.drone.element import Reducer
 from anafi_mav.drone.expectation import Commander
+from anafi_mav.drone.payload.media_file import Place as Place
+from anafi_mav.drone.payload.media_file import Resource as Resource
+from anafi_mav.drone.payload.media_file import fetch, file_name
+from anafi_mav.drone.payload.media_index import Listing as Listing
+from anafi_mav.drone.payload.media_index import MediaIndex
+from anafi_mav.drone.payload.media_reader import MediaReader, OpenedFile
 from anafi_mav.drone.rest import Rest
 from anafi_mav.drone.settings import Commanding
 from anafi_mav.errors import RemoteProtocolError
@@ -32,11 +36,8 @@ log = logging.getLogger("anafi_mav")
 API = "/api/v1/media"
 NOTIFICATION_LIMIT = 1 << 20
 """Bytes of one notification; a media with a thousand resources is half of it."""
-PIECE = 1 << 18
-"""Bytes that are written to the disk at once."""
-
-_FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,127}")
-"""Ids of the drone become file names of ours: nothing but plain names may."""
+THUMBNAIL_LIMIT = 1 << 18
+"""Bytes of a thumbnail; an ANAFI's are about a tenth of it."""
 
 
 class MediaState(msgspec.Struct, frozen=True):
@@ -48,38 +49,6 @@ class MediaState(msgspec.Struct, frozen=True):
     videos: int | None = None
     photo_files: int | None = None
     video_files: int | None = None
-
-
-class Place(msgspec.Struct, frozen=True):
-    """A place: deg, deg, m; Parrot writes 500 for unknown."""
-
-    latitude: float = 500.0
-    longitude: float = 500.0
-    altitude: float = 500.0
-
-
-class Resource(msgspec.Struct, frozen=True):
-    """One file of a media."""
-
-    resource_id: str
-    media_id: str = ""
-    type: str = ""
-    format: str = ""
-    """"JPG", "DNG", "MP4"."""
-    size: int = 0
-    """Bytes."""
-    url: str = ""
-    thumbnail: str | None = None
-    datetime: str = ""
-    md5: str | None = None
-    """Newer firmware only; `Media.md5` requests it from others."""
-    storage: str | int | None = None
-    duration: float | None = None
-    """ms."""
-    replay_url: str | None = None
-    width: int | None = None
-    height: int | None = None
-    gps: Place | None = None
 
 
 class MediaItem(msgspec.Struct, frozen=True):
@@ -128,6 +97,89 @@ def _item(told: Any) -> MediaItem | None:
         return None
 
 
+class MediaClient:
+    """The media of one drone's web server, without ARSDK: also behind a gateway.
+
+    All methods raise `CommandRejected` while the drone has not indexed its media or when the web server refuses,
+    `CommandTimeout` and `LinkLost` when it does not answer, `RemoteProtocolError` when the answer is not readable.
+    """
+
+    def __init__(self, rest: Rest) -> None:
+        self._rest = rest
+
+    async def list(self, *, newest_first: bool = True) -> tuple[MediaItem, ...]:
+        """Return all media."""
+        query = {"sort_order": "newest" if newest_first else "oldest"}
+        told = await self._rest.json("GET", f"{API}/medias", query=query)
+        if not isinstance(told, list):
+            raise RemoteProtocolError("the drone's list of media is none")
+        items = [_item(one) for one in told]
+        if None in items:
+            log.warning("%d media of the drone are not readable", items.count(None))
+        return tuple(item for item in items if item is not None)
+
+    async def get(self, media_id: str) -> MediaItem:
+        """Return one media. Raises `CommandRejected` when no media has this id."""
+        item = _item(await self._rest.json("GET", f"{API}/medias/{file_name(media_id)}"))
+        if item is None:
+            raise RemoteProtocolError(f"media {media_id} is not readable")
+        return item
+
+    async def md5(self, resource: Resource) -> str:
+        """Return the MD5 of a file on the drone, hexadecimal."""
+        told = resource.md5
+        if told is None:
+            answer = await self._rest.json("GET", f"{API}/md5/{file_name(resource.resource_id)}")
+            told = answer.get("md5") if isinstance(answer, dict) else None
+        if not isinstance(told, str) or not told:
+            raise RemoteProtocolError(f"no MD5 of {resource.resource_id}")
+        return told.lower()
+
+    async def thumbnail(self, of: MediaItem | Resource) -> bytes:
+        """Return a small JPEG. Raises `CommandRejected` when the drone has none."""
+        if not of.thumbnail:
+            raise RemoteProtocolError("no thumbnail was told")
+        return await self._rest.read("GET", of.thumbnail, limit=THUMBNAIL_LIMIT)
+
+    def open(self, resource: Resource, offset: int = 0) -> OpenedFile:
+        """Open a file at `offset`.
+
+        Where its bytes begin (0 where the web server has no ranges), and the bytes.
+        """
+        return self._rest.open_file(resource.url, offset, resource.size)
+
+    async def delete(self, media_id: str) -> None:
+        """Delete a media with all its files."""
+        await self._rest.json("DELETE", f"{API}/medias/{file_name(media_id)}")
+
+    async def delete_resource(self, resource_id: str) -> None:
+        """Delete one file."""
+        await self._rest.json("DELETE", f"{API}/resources/{file_name(resource_id)}")
+
+    async def delete_all(self) -> None:
+        """Delete all media."""
+        await self._rest.json("DELETE", f"{API}/medias")
+
+    @asynccontextmanager
+    async def listen(self) -> AsyncIterator[AsyncIterator[Notification]]:
+        """Open the drone's notifications.
+
+        The events of the media store follow until the drone ends it.
+        """
+        async with self._rest.websocket(f"{API}/notifications", NOTIFICATION_LIMIT) as socket:
+            yield _notifications(socket)
+
+
+async def _notifications(socket: aiohttp.ClientWebSocketResponse) -> AsyncIterator[Notification]:
+    async for frame in socket:
+        if frame.type is not aiohttp.WSMsgType.TEXT:
+            continue
+        try:
+            yield msgspec.json.decode(frame.data, type=Notification)
+        except (msgspec.DecodeError, RecursionError) as error:
+            log.debug("unreadable notification: %s", error)
+
+
 class Media(Commanding[MediaState]):
     """Photos and videos on the drone, from its web server.
 
@@ -149,120 +201,110 @@ class Media(Commanding[MediaState]):
 
     def __init__(self, commander: Commander, rest: Rest) -> None:
         super().__init__(commander)
-        self._rest = rest
+        self._client = MediaClient(rest)
+        self._reader = MediaReader(self._client)
+        self._index = MediaIndex(self._client)
 
     # -- what there is
 
     async def list(self, *, newest_first: bool = True) -> tuple[MediaItem, ...]:
         """Return all media."""
-        told = await self._ask("GET", f"{API}/medias", sort_order="newest" if newest_first else "oldest")
-        if not isinstance(told, list):
-            raise RemoteProtocolError("the drone's list of media is none")
-        items = [_item(one) for one in told]
-        if None in items:
-            log.warning("%d media of the drone are not readable", items.count(None))
-        return tuple(item for item in items if item is not None)
+        return await self._available().list(newest_first=newest_first)
 
     async def get(self, media_id: str) -> MediaItem:
         """Return one media. Raises `CommandRejected` when no media has this id."""
-        item = _item(await self._ask("GET", f"{API}/medias/{_name(media_id)}"))
-        if item is None:
-            raise RemoteProtocolError(f"media {media_id} is not readable")
-        return item
+        return await self._available().get(media_id)
+
+    @property
+    def kept_listing(self) -> Listing | None:
+        """All files as `listing` returns them, while they are known without a question to the drone."""
+        return self._index.kept(self.state)
+
+    async def listing(self) -> Listing:
+        """Return all files by day and name; requested from the drone only after a change."""
+        self._available()
+        return await self._index.get(self.state)
 
     async def md5(self, resource: Resource) -> str:
         """Return the MD5 of a file on the drone, hexadecimal."""
-        told = resource.md5
-        if told is None:
-            answer = await self._ask("GET", f"{API}/md5/{_name(resource.resource_id)}")
-            told = answer.get("md5") if isinstance(answer, dict) else None
-        if not isinstance(told, str) or not told:
-            raise RemoteProtocolError(f"no MD5 of {resource.resource_id}")
-        return told.lower()
+        return await self._available().md5(resource)
 
     async def thumbnail(self, of: MediaItem | Resource) -> bytes:
         """Return a small JPEG. Raises `CommandRejected` when the drone has none."""
-        self._available()
-        if not of.thumbnail:
-            raise RemoteProtocolError("no thumbnail was told")
-        return await self._rest.read("GET", of.thumbnail)
+        client = self._available()
+        async with self._reader.turn():
+            return await client.thumbnail(of)
 
     # -- files
 
-    async def download(self, resource: Resource, directory: Path) -> Path:
+    async def read(self, resource: Resource, offset: int, size: int) -> bytes:
+        """Return these bytes of a file. At most two files are read from the drone at a time."""
+        self._available()
+        return await self._reader.read(resource, offset, size)
+
+    async def read_from(self, resource: Resource, offset: int = 0) -> AsyncGenerator[bytes, None]:
+        """Iterate over the bytes of a file from `offset` on."""
+        self._available()
+        async for piece in self._reader.read_from(resource, offset):
+            yield piece
+
+    async def download(
+        self, resource: Resource, directory: Path, progress: Callable[[int, int], None] | None = None
+    ) -> Path:
         """Download a file to a directory and compare its MD5; return its path.
 
-        The file has its name only once it is complete. Raises `RemoteProtocolError` when the MD5 differs.
+        The file has its name only once it is complete; one that was interrupted is continued. `progress` is called
+        with the bytes so far and those of the file. Raises `RemoteProtocolError` when the MD5 differs.
         """
-        self._available()
-        wanted = await self.md5(resource)
-        path = directory / _name(resource.resource_id)
-        part = path.with_name(path.name + ".part")
-        digest = hashlib.md5(usedforsecurity=False)
-        try:
-            with await asyncio.to_thread(part.open, "wb") as file:
-                async with self._rest.open("GET", resource.url) as pieces:
-                    waiting = bytearray()
-                    async for piece in pieces:
-                        digest.update(piece)
-                        waiting += piece
-                        if len(waiting) >= PIECE:
-                            await asyncio.to_thread(file.write, bytes(waiting))
-                            waiting.clear()
-                await asyncio.to_thread(file.write, bytes(waiting))
-            if digest.hexdigest() != wanted:
-                raise RemoteProtocolError(f"{resource.resource_id}: the copy is not what the drone has (MD5)")
-            part.replace(path)
-        finally:
-            part.unlink(missing_ok=True)
-        return path
+        client = self._available()
+        md5 = await client.md5(resource)
+        return await fetch(resource, directory, self._reader.read_from, md5, progress)
 
     async def download_media(self, media_id: str, directory: Path) -> tuple[Path, ...]:
         """Download every file of a media; return their paths."""
         item = await self.get(media_id)
         return tuple([await self.download(resource, directory) for resource in item.resources])
 
+    async def close(self) -> None:
+        """End the reads of files and lists."""
+        await self._index.close()
+        await self._reader.close()
+
     # -- away with them
 
     async def delete(self, media_id: str) -> None:
         """Delete a media with all its files."""
-        await self._ask("DELETE", f"{API}/medias/{_name(media_id)}")
+        await self._available().delete(media_id)
+        self._index.changed()
 
     async def delete_resource(self, resource_id: str) -> None:
         """Delete one file."""
-        await self._ask("DELETE", f"{API}/resources/{_name(resource_id)}")
+        await self._available().delete_resource(resource_id)
+        self._index.changed()
 
     async def delete_all(self) -> None:
         """Delete all media."""
-        await self._ask("DELETE", f"{API}/medias")
+        await self._available().delete_all()
+        self._index.changed()
 
     # -- news
+
+    def listen(self) -> AbstractAsyncContextManager[AsyncIterator[Notification]]:
+        """Open the drone's notifications.
+
+        The events of the media store follow until the drone ends it.
+        """
+        return self._available().listen()
 
     async def notifications(self) -> AsyncGenerator[Notification, None]:
         """Iterate over the events of the media store; use it in `contextlib.aclosing`.
 
         It ends when the drone ends it. Events that are not readable are left out.
         """
-        self._available()
-        async with self._rest.websocket(f"{API}/notifications", NOTIFICATION_LIMIT) as socket:
-            async for frame in socket:
-                if frame.type is not aiohttp.WSMsgType.TEXT:
-                    continue
-                try:
-                    yield msgspec.json.decode(frame.data, type=Notification)
-                except (msgspec.DecodeError, RecursionError) as error:
-                    log.debug("unreadable notification: %s", error)
+        async with self.listen() as notifications:
+            async for notification in notifications:
+                yield notification
 
-    def _available(self) -> None:
+    def _available(self) -> MediaClient:
         self._require(self.state.index, "media store")
-
-    async def _ask(self, method: str, path: str, **query: str) -> Any:
-        self._available()
-        return await self._rest.json(method, path, query=query)
-
-
-def _name(id: str) -> str:
-    """An id that can stand in a path, there and here."""
-    if not _FILE_NAME.fullmatch(id):
-        raise RemoteProtocolError(f"{id!r} is no id")
-    return id
+        return self._client

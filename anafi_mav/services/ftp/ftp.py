@@ -1,26 +1,24 @@
 """MAVLink FTP: the server's side of the protocol. No I/O.
 
-`FtpServer.receive` takes the payload of a FILE_TRANSFER_PROTOCOL and returns the payload of the answer; a burst is
-then
-taken part by part with `burst`. A `Files` lists the files; some can be replaced as a whole. Protocol: MAVLink ftp.md.
+`FtpServer.receive` takes the payload of a FILE_TRANSFER_PROTOCOL and returns the payload of the answer. Where the files
+need time it returns a `Wait` instead: its caller awaits the value and hands it to `finish`, which returns the answers
+to the request and to its repetitions. A burst is then taken part by part with `burst`. Protocol: MAVLink ftp.md.
 
-Every answer follows from the request and the file alone, which stays as it was when it was opened. So a lost answer
-is
-made again when its request is received again. A written file becomes valid when its session is terminated, and not
-before.
+Every answer follows from the request and the file alone, which stays as it was when it was opened. So a lost answer is
+made again when its request is received again; the answer to a request that must not run twice is kept. A written file
+becomes valid when its session is terminated, and not before.
 """
 
 from __future__ import annotations
 
 import enum
 import struct
-from collections.abc import Callable, Hashable, Mapping
-from dataclasses import dataclass, field
-from typing import Protocol
+from collections.abc import Awaitable, Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.checksum import crc32
-from anafi_mav.services.files import Entry
+from anafi_mav.services.files import MAX_SIZE, Entry, FileError, FileRefused, FileSource
 
 PAYLOAD = 251
 """Bytes of the message's payload field."""
@@ -52,6 +50,15 @@ BURST_PARTS = 128
 The client requests the next burst, which shows that it is still connected.
 """
 
+MAX_WAITS = 8
+"""Requests of one client that wait for a file at the same time: MAVProxy requests five missing parts at once.
+
+A further one is dropped; its client repeats it.
+"""
+MAX_REPETITIONS = 16
+"""Sequence numbers under which one waiting request is answered: QGroundControl repeats it three times, each time with
+another number."""
+
 _HEADER = struct.Struct("<HBBBBBBI")
 
 
@@ -79,7 +86,6 @@ ACK, NAK = dialect.MAV_FTP_OPCODE_ACK, dialect.MAV_FTP_OPCODE_NAK
 
 _PROTECTED = frozenset(
     {
-        Opcode.REMOVE_FILE,
         Opcode.CREATE_DIRECTORY,
         Opcode.REMOVE_DIRECTORY,
         Opcode.TRUNCATE_FILE,
@@ -87,24 +93,18 @@ _PROTECTED = frozenset(
     }
 )
 
+_SHORT = frozenset({Opcode.NONE, Opcode.TERMINATE_SESSION, Opcode.RESET_SESSIONS})
+"""Requests that never wait for a file."""
 
-class Error(enum.IntEnum):
-    """MAV_FTP_ERR, the ones in use."""
-
-    FAIL = 1
-    INVALID_DATA_SIZE = 3
-    INVALID_SESSION = 4
-    NO_SESSIONS_AVAILABLE = 5
-    EOF = 6
-    UNKNOWN_COMMAND = 7
-    FILE_PROTECTED = 9
-    FILE_NOT_FOUND = 10
+_KEPT = frozenset({Opcode.TERMINATE_SESSION, Opcode.REMOVE_FILE, Opcode.CALC_FILE_CRC32})
+"""Requests whose answer is kept for a repetition: the first two must not run twice, a checksum reads a whole file."""
 
 
 class State(enum.Enum):
     """Of one session."""
 
     CLOSED = "closed"
+    OPENING = "opening"
     OPEN = "open"
     BURSTING = "bursting"
     WRITING = "writing"
@@ -112,6 +112,8 @@ class State(enum.Enum):
 
 class Event(enum.Enum):
     OPEN = "open"
+    OPENED = "opened"
+    REFUSED = "refused"
     READ = "read"
     BURST = "burst"
     BURST_ENDS = "burst ends"
@@ -121,50 +123,39 @@ class Event(enum.Enum):
     EXPIRE = "expire"
 
 
+_BEGIN = {Event.OPEN: State.OPENING, Event.CREATE: State.WRITING}
+_END = {Event.TERMINATE: State.CLOSED, Event.EXPIRE: State.CLOSED}
+
 TRANSITIONS: Mapping[State, Mapping[Event, State]] = {
-    State.CLOSED: {
-        Event.OPEN: State.OPEN,
-        Event.CREATE: State.WRITING,
-    },
-    State.OPEN: {
-        Event.OPEN: State.OPEN,
-        Event.CREATE: State.WRITING,
-        Event.READ: State.OPEN,
-        Event.BURST: State.BURSTING,
-        Event.TERMINATE: State.CLOSED,
-        Event.EXPIRE: State.CLOSED,
-    },
-    State.BURSTING: {
-        Event.OPEN: State.OPEN,
-        Event.CREATE: State.WRITING,
-        Event.READ: State.OPEN,
-        Event.BURST: State.BURSTING,
-        Event.BURST_ENDS: State.OPEN,
-        Event.TERMINATE: State.CLOSED,
-        Event.EXPIRE: State.CLOSED,
-    },
-    State.WRITING: {
-        Event.OPEN: State.OPEN,
-        Event.CREATE: State.WRITING,
-        Event.WRITE: State.WRITING,
-        Event.TERMINATE: State.CLOSED,
-        Event.EXPIRE: State.CLOSED,
-    },
+    State.CLOSED: _BEGIN,
+    State.OPENING: _BEGIN | _END | {Event.OPENED: State.OPEN, Event.REFUSED: State.CLOSED},
+    State.OPEN: _BEGIN | _END | {Event.READ: State.OPEN, Event.BURST: State.BURSTING},
+    State.BURSTING: _BEGIN | _END | {Event.READ: State.OPEN, Event.BURST: State.BURSTING, Event.BURST_ENDS: State.OPEN},
+    State.WRITING: _BEGIN | _END | {Event.WRITE: State.WRITING},
 }
 """State transitions of a session; a missing pair cannot happen.
 
-Reading a closed session is answered with INVALID_SESSION, and so is writing to one that was opened to read.
+Reading a session that is not open is answered with INVALID_SESSION, and so is writing to one that was opened to read.
 """
 
 
 class Files(Protocol):
-    """The files that a client is shown."""
+    """The files that a client is shown.
 
-    def read(self, path: str) -> bytes | None:
-        """The content; None when there is no such file."""
+    Methods raise `FileRefused`, at once or when their answer is awaited.
+    """
 
-    def list(self, path: str) -> list[Entry] | None:
-        """Return the entries, always in the same sequence; None when there is no such directory."""
+    def open(self, path: str) -> FileSource | Awaitable[FileSource]:
+        """Open a file to read."""
+
+    def list(self, path: str) -> Sequence[Entry] | Awaitable[Sequence[Entry]]:
+        """Return the entries of a directory, always in the same sequence."""
+
+    def checksum(self, path: str) -> int | Awaitable[int]:
+        """Return MAVLink's CRC-32 of a file."""
+
+    def remove(self, path: str) -> Awaitable[None] | None:
+        """Remove a file."""
 
     def room(self, path: str) -> int | None:
         """Return the bytes that a client may write to a file; None when it is read-only or missing."""
@@ -172,12 +163,16 @@ class Files(Protocol):
     def write(self, path: str, content: bytes) -> bool:
         """Replace a file that has `room`; False when the content cannot be used."""
 
+    def refused(self, refusal: FileRefused) -> None:
+        """Notify the client of the reason of a refusal."""
+
 
 @dataclass
 class _Session:
     state: State = State.CLOSED
     path: str = ""
-    content: bytes = b""
+    source: FileSource | None = None
+    """The file that is open."""
     written: bytearray = field(default_factory=bytearray)
     """Received content of a file that is being written."""
     room: int = 0
@@ -190,19 +185,39 @@ class _Session:
     """Sequence number of the next part."""
     burst_offset: int = 0
     burst_size: int = DATA
-    burst_left: int = 0
-    """Parts that the burst may still have."""
+    burst_start: int = 0
+    """Offset of its first part."""
+    burst_data: bytes = b""
+    """All its bytes."""
 
     def step(self, event: Event) -> None:
         self.state = TRANSITIONS[self.state][event]
+
+
+@dataclass(eq=False)
+class Wait:
+    """A request that waits for a file. Await `value`, then call `FtpServer.finish`."""
+
+    value: Awaitable[Any]
+    who: Hashable
+    requests: list[FtpRequest]
+    """The request and its repetitions, each with another sequence number."""
+    files: Files
+    then: Callable[[Any, FtpRequest], bytes | FileError]
+    """Makes the answer to one of them."""
+    session: int | None = None
+    """Number of the session that it belongs to; None: to none."""
+    abandon: Callable[[], object] = lambda: None
+    """Called when the answer is no longer wanted; set by the caller that awaits."""
 
 
 @dataclass
 class _Client:
     sessions: dict[int, _Session] = field(default_factory=dict)
     """Those that are open."""
-    terminated: tuple[int, int] | None = None
-    """Sequence number and session of the last TerminateSession: a repetition is answered again."""
+    waits: list[Wait] = field(default_factory=list)
+    kept: tuple[FtpRequest, bytes] | None = None
+    """The last request of `_KEPT` and its answer, which a repetition gets again."""
     seen: float = 0.0
 
 
@@ -220,6 +235,10 @@ class FtpRequest:
 
     Except in a read, where `size` is the number of requested bytes.
     """
+
+    def repeats(self, other: FtpRequest) -> bool:
+        """Return True when it asks for the same, under any sequence number."""
+        return replace(self, seq=other.seq) == other
 
     @property
     def path(self) -> str:
@@ -260,10 +279,10 @@ class FtpServer:
         """Number of open sessions of all clients."""
         return sum(len(client.sessions) for client in self._clients.values())
 
-    def receive(self, who: Hashable, payload: bytes, files: Files, now: float) -> bytes | None:
-        """Return the payload of the answer; None when the payload is no request.
+    def receive(self, who: Hashable, payload: bytes, files: Files, now: float) -> bytes | Wait | None:
+        """Return the payload of the answer, or what the answer waits for.
 
-        After a BurstReadFile, call `burst` for more.
+        None when the payload is no request, or one that already waits. After a BurstReadFile, call `burst` for more.
         """
         request = parse(payload)
         if request is None or request.opcode >= ACK:
@@ -272,9 +291,38 @@ class FtpServer:
         self._clients[who] = client
         client.seen = now
         if len(self._clients) > MAX_CLIENTS:
-            del self._clients[next(iter(self._clients))]
-        answer = self._answer(client, request, files, now)
-        return self._nak(request, answer) if isinstance(answer, Error) else answer
+            self._drop(next(iter(self._clients)))
+        if client.kept is not None and client.kept[0] == request:
+            return client.kept[1]
+        if self._waits(client, request) or (len(client.waits) >= MAX_WAITS and request.opcode not in _SHORT):
+            return None
+        try:
+            answer = self._answer(who, client, request, files, now)
+        except FileRefused as refusal:
+            files.refused(refusal)
+            answer = refusal.error
+        if isinstance(answer, Wait):
+            client.waits.append(answer)
+            return answer
+        return self._reply(client, request, answer)
+
+    def finish(self, wait: Wait, value: Any) -> list[bytes]:
+        """Return the answers to a request that has waited; none when its client no longer wants it.
+
+        `value`: what it has waited for, or the `FileRefused` that was raised.
+        """
+        client = self._clients.get(wait.who)
+        if client is None or wait not in client.waits:
+            return []
+        client.waits.remove(wait)
+        if isinstance(value, FileRefused):
+            wait.files.refused(value)
+            self._end_opening(client, wait)
+        replies = []
+        for request in wait.requests:
+            answer = value.error if isinstance(value, FileRefused) else wait.then(value, request)
+            replies.append(self._reply(client, request, answer))
+        return replies
 
     def burst(self, who: Hashable) -> bytes | None:
         """Return the next part of this client's burst; None when none is due."""
@@ -291,33 +339,84 @@ class FtpServer:
         for who, client in list(self._clients.items()):
             for number, session in list(client.sessions.items()):
                 if now - session.used >= SESSION_TIMEOUT:
-                    session.step(Event.EXPIRE)
-                    del client.sessions[number]
-            if not client.sessions and now - client.seen >= SESSION_TIMEOUT:
+                    self._close(client, number, Event.EXPIRE)
+            if not client.sessions and not client.waits and now - client.seen >= SESSION_TIMEOUT:
                 del self._clients[who]
 
     def forget(self, gone: Callable[[Hashable], bool]) -> None:
         """Forget the disconnected clients, for which `gone` is true."""
         for who in [who for who in self._clients if gone(who)]:
-            del self._clients[who]
+            self._drop(who)
 
     def bursting(self, who: Hashable) -> bool:
         """True when a part of a burst is due to this client."""
         client = self._clients.get(who)
         return client is not None and any(one.state is State.BURSTING for one in client.sessions.values())
 
+    # Requests that wait.
+
+    def _waits(self, client: _Client, request: FtpRequest) -> bool:
+        """Return True for the repetition of a request that waits; it is answered with it."""
+        for wait in client.waits:
+            if wait.requests[0].repeats(request):
+                if request not in wait.requests and len(wait.requests) < MAX_REPETITIONS:
+                    wait.requests.append(request)
+                return True
+        return False
+
+    def _after(
+        self,
+        who: Hashable,
+        request: FtpRequest,
+        files: Files,
+        value: Any,
+        then: Callable[[Any, FtpRequest], bytes | FileError],
+        session: int | None = None,
+    ) -> bytes | FileError | Wait:
+        """Answer with a value that is at hand, or when it has arrived."""
+        if isinstance(value, Awaitable):
+            return Wait(value, who, [request], files, then, session)
+        return then(value, request)
+
+    def _reply(self, client: _Client, request: FtpRequest, answer: bytes | FileError) -> bytes:
+        reply = self._nak(request, answer) if isinstance(answer, FileError) else answer
+        if request.opcode in _KEPT and answer is not FileError.INVALID_SESSION:
+            client.kept = (request, reply)
+        return reply
+
+    def _drop(self, who: Hashable) -> None:
+        client = self._clients.pop(who)
+        for wait in client.waits:
+            wait.abandon()
+
+    def _close(self, client: _Client, number: int, event: Event) -> _Session:
+        """Close a session with everything that waits for its file."""
+        session = client.sessions.pop(number)
+        session.step(event)
+        self._abandon(client, number)
+        return session
+
+    def _abandon(self, client: _Client, number: int, opcode: int | None = None) -> None:
+        """Abandon what waits in a session; with `opcode` only requests of this kind."""
+        for wait in [
+            wait for wait in client.waits if wait.session == number and opcode in (None, wait.requests[0].opcode)
+        ]:
+            client.waits.remove(wait)
+            wait.abandon()
+
     # One request.
 
-    def _answer(self, client: _Client, request: FtpRequest, files: Files, now: float) -> bytes | Error:
+    def _answer(
+        self, who: Hashable, client: _Client, request: FtpRequest, files: Files, now: float
+    ) -> bytes | FileError | Wait:
         if request.size > DATA:
-            return Error.INVALID_DATA_SIZE
+            return FileError.INVALID_DATA_SIZE
         match request.opcode:
             case Opcode.NONE:
                 return self._ack(request)
             case Opcode.RESET_SESSIONS:
-                for session in client.sessions.values():
-                    session.step(Event.TERMINATE)
-                client.sessions.clear()
+                for number in list(client.sessions):
+                    self._close(client, number, Event.TERMINATE)
                 return self._ack(request)
             case Opcode.TERMINATE_SESSION:
                 return self._terminate(client, request, files)
@@ -326,114 +425,144 @@ class FtpServer:
             case Opcode.WRITE_FILE:
                 return self._write(client, request, now)
             case Opcode.OPEN_FILE_RO:
-                return self._open(client, request, files, now)
+                return self._open(who, client, request, files, now)
             case Opcode.READ_FILE:
-                return self._read(client, request, now)
+                return self._read(who, client, request, files, now)
             case Opcode.BURST_READ_FILE:
-                return self._begin_burst(client, request, now)
+                return self._begin_burst(who, client, request, files, now)
             case Opcode.LIST_DIRECTORY | Opcode.LIST_DIRECTORY_WITH_TIME:
-                return self._list(request, files)
+                return self._after(who, request, files, files.list(request.path), self._listed)
             case Opcode.CALC_FILE_CRC32:
-                content = files.read(request.path)
-                if content is None:
-                    return Error.FILE_NOT_FOUND
-                return self._ack(request, struct.pack("<I", crc32(content)))
+                return self._after(who, request, files, files.checksum(request.path), self._summed)
+            case Opcode.REMOVE_FILE:
+                return self._after(who, request, files, files.remove(request.path), self._removed)
             case opcode if opcode in _PROTECTED:
-                return Error.FILE_PROTECTED
-        return Error.UNKNOWN_COMMAND
+                return FileError.FILE_PROTECTED
+        return FileError.UNKNOWN_COMMAND
 
-    def _terminate(self, client: _Client, request: FtpRequest, files: Files) -> bytes | Error:
-        session = client.sessions.pop(request.session, None)
-        this = (request.seq, request.session)
-        if session is None and client.terminated != this:
-            return Error.INVALID_SESSION
-        if session is not None:
-            writing = session.state is State.WRITING
-            session.step(Event.TERMINATE)
-            if writing and not files.write(session.path, bytes(session.written)):
-                return Error.FAIL
-        client.terminated = this
+    def _terminate(self, client: _Client, request: FtpRequest, files: Files) -> bytes | FileError:
+        if request.session not in client.sessions:
+            return FileError.INVALID_SESSION
+        writing = client.sessions[request.session].state is State.WRITING
+        session = self._close(client, request.session, Event.TERMINATE)
+        if writing and not files.write(session.path, bytes(session.written)):
+            return FileError.FAIL
         return self._ack(request)
 
-    def _session_for(self, client: _Client, request: FtpRequest, now: float) -> _Session | Error:
+    def _session_for(self, client: _Client, request: FtpRequest, now: float) -> _Session | FileError:
         """Return the session in which a file is to be opened or created."""
         session = client.sessions.get(request.session)
         if session is None:
             if len(client.sessions) >= MAX_SESSIONS:
-                return Error.NO_SESSIONS_AVAILABLE
-            session = client.sessions[request.session] = _Session()
-        elif session.path != request.path and now - session.used < TAKEOVER:
-            return Error.NO_SESSIONS_AVAILABLE
+                return FileError.NO_SESSIONS_AVAILABLE
+            return _Session()
+        if session.path != request.path and now - session.used < TAKEOVER:
+            return FileError.NO_SESSIONS_AVAILABLE
         return session
 
-    def _create(self, client: _Client, request: FtpRequest, files: Files, now: float) -> bytes | Error:
+    def _create(self, client: _Client, request: FtpRequest, files: Files, now: float) -> bytes | FileError:
         """Begin to replace a file.
 
         A retransmission of the request must not drop what has been written since.
         """
         room = files.room(request.path)
         if room is None:
-            return Error.FILE_PROTECTED
+            return FileError.FILE_PROTECTED
         session = self._session_for(client, request, now)
-        if isinstance(session, Error):
+        if isinstance(session, FileError):
             return session
+        client.sessions[request.session] = session
         if session.state is not State.WRITING or session.created != request.seq:
+            self._abandon(client, request.session)
             session.step(Event.CREATE)
-            session.path, session.content, session.written = request.path, b"", bytearray()
+            session.path, session.source, session.written = request.path, None, bytearray()
             session.room, session.created = room, request.seq
         session.used = now
         return self._ack(request)
 
-    def _write(self, client: _Client, request: FtpRequest, now: float) -> bytes | Error:
+    def _write(self, client: _Client, request: FtpRequest, now: float) -> bytes | FileError:
         """Take a part of a file; parts may arrive in any sequence and more than once."""
         session = client.sessions.get(request.session)
         if session is None or session.state is not State.WRITING:
-            return Error.INVALID_SESSION
+            return FileError.INVALID_SESSION
         data = request.data[: request.size]
         end = request.offset + len(data)
         if end > session.room:
-            return Error.FAIL
+            return FileError.FAIL
         session.step(Event.WRITE)
         session.used = now
         session.written.extend(bytes(max(end - len(session.written), 0)))
         session.written[request.offset : end] = data
         return self._ack(request)
 
-    def _open(self, client: _Client, request: FtpRequest, files: Files, now: float) -> bytes | Error:
-        path = request.path
-        content = files.read(path)
-        if content is None:
-            return Error.FILE_NOT_FOUND
+    def _open(
+        self, who: Hashable, client: _Client, request: FtpRequest, files: Files, now: float
+    ) -> bytes | FileError | Wait:
         session = self._session_for(client, request, now)
-        if isinstance(session, Error):
+        if isinstance(session, FileError):
             return session
+        opening = files.open(request.path)
+        client.sessions[request.session] = session
+        self._abandon(client, request.session)
         session.step(Event.OPEN)
-        session.path, session.content, session.used = path, content, now
-        return self._ack(request, struct.pack("<I", len(content)))
+        session.path, session.source, session.used = request.path, None, now
 
-    def _read(self, client: _Client, request: FtpRequest, now: float) -> bytes | Error:
+        def opened(source: FileSource, request: FtpRequest) -> bytes | FileError:
+            if source.size > MAX_SIZE:
+                raise ValueError(f"MAVLink FTP cannot address a file of {source.size} bytes")
+            if session.source is None:
+                session.step(Event.OPENED)
+                session.source = source
+            return self._ack(request, struct.pack("<I", session.source.size))
+
+        return self._after(who, request, files, opening, opened, request.session)
+
+    def _end_opening(self, client: _Client, wait: Wait) -> None:
+        """End the session of a file that cannot be opened."""
+        for number, session in list(client.sessions.items()):
+            if number == wait.session and session.state is State.OPENING:
+                session.step(Event.REFUSED)
+                del client.sessions[number]
+
+    def _read(
+        self, who: Hashable, client: _Client, request: FtpRequest, files: Files, now: float
+    ) -> bytes | FileError | Wait:
         session = client.sessions.get(request.session)
-        if session is None or session.state is State.WRITING:
-            return Error.INVALID_SESSION
+        if session is None or session.source is None:
+            return FileError.INVALID_SESSION
         session.step(Event.READ)
         session.used = now
-        data = session.content[request.offset : request.offset + (request.size or DATA)]
-        return self._ack(request, data) if data else Error.EOF
+        size = min(request.size or DATA, session.source.size - request.offset)
+        if size <= 0:
+            return FileError.EOF
+        reading = session.source.read(request.offset, size)
+        return self._after(
+            who, request, files, reading, lambda data, request: self._ack(request, data), request.session
+        )
 
-    def _begin_burst(self, client: _Client, request: FtpRequest, now: float) -> bytes | Error:
+    def _begin_burst(
+        self, who: Hashable, client: _Client, request: FtpRequest, files: Files, now: float
+    ) -> bytes | FileError | Wait:
+        """Load the bytes of a burst; its first part is the answer."""
         session = client.sessions.get(request.session)
-        if session is None or session.state is State.WRITING:
-            return Error.INVALID_SESSION
+        if session is None or session.source is None:
+            return FileError.INVALID_SESSION
+        session.step(Event.READ)
         session.used = now
-        if request.offset >= len(session.content):
-            session.step(Event.READ)
-            return Error.EOF
-        session.step(Event.BURST)
-        session.burst_seq = request.seq + 1
-        session.burst_offset = request.offset
-        session.burst_size = request.size or DATA
-        session.burst_left = BURST_PARTS
-        return self._part(request.session, session)
+        part = request.size or DATA
+        size = min(part * BURST_PARTS, session.source.size - request.offset)
+        if size <= 0:
+            return FileError.EOF
+
+        self._abandon(client, request.session, Opcode.BURST_READ_FILE)
+
+        def loaded(data: bytes, request: FtpRequest) -> bytes:
+            session.step(Event.BURST)
+            session.burst_seq, session.burst_size, session.burst_data = request.seq + 1, part, data
+            session.burst_offset = session.burst_start = request.offset
+            return self._part(request.session, session)
+
+        return self._after(who, request, files, session.source.read(request.offset, size), loaded, request.session)
 
     def _part(self, number: int, session: _Session) -> bytes:
         """Return the next part of a session's burst.
@@ -441,12 +570,13 @@ class FtpServer:
         The last one is marked as complete: at the end of the file, or after enough parts.
         """
         offset, seq = session.burst_offset, session.burst_seq
-        data = session.content[offset : offset + session.burst_size]
+        sent = offset - session.burst_start
+        data = session.burst_data[sent : sent + session.burst_size]
         session.burst_offset += len(data)
         session.burst_seq += 1
-        session.burst_left -= 1
-        complete = session.burst_offset >= len(session.content) or session.burst_left <= 0
+        complete = sent + len(data) >= len(session.burst_data)
         if complete:
+            session.burst_data = b""
             session.step(Event.BURST_ENDS)
         return format_reply(
             FtpRequest(0, number, Opcode.BURST_READ_FILE, 0, 0, b""),
@@ -458,10 +588,7 @@ class FtpServer:
             complete=complete,
         )
 
-    def _list(self, request: FtpRequest, files: Files) -> bytes | Error:
-        entries = files.list(request.path)
-        if entries is None:
-            return Error.FILE_NOT_FOUND
+    def _listed(self, entries: Sequence[Entry], request: FtpRequest) -> bytes | FileError:
         timed = request.opcode == Opcode.LIST_DIRECTORY_WITH_TIME
         data = b""
         for entry in entries[request.offset :]:
@@ -469,25 +596,31 @@ class FtpServer:
             if len(data) + len(line) > DATA:
                 break
             data += line
-        return self._ack(request, data) if data else Error.EOF
+        return self._ack(request, data) if data else FileError.EOF
+
+    def _summed(self, crc: int, request: FtpRequest) -> bytes:
+        return self._ack(request, struct.pack("<I", crc))
+
+    def _removed(self, nothing: None, request: FtpRequest) -> bytes:
+        return self._ack(request)
 
     @staticmethod
     def _ack(request: FtpRequest, data: bytes = b"") -> bytes:
         return format_reply(request, ACK, data, seq=request.seq + 1, session=request.session, offset=request.offset)
 
     @staticmethod
-    def _nak(request: FtpRequest, error: Error) -> bytes:
+    def _nak(request: FtpRequest, error: FileError) -> bytes:
         return format_reply(
             request, NAK, bytes((error,)), seq=request.seq + 1, session=request.session, offset=request.offset
         )
 
 
 def _line(entry: Entry, *, timed: bool) -> bytes:
-    """Return one entry as ListDirectory sends it.
+    """Return one entry as ListDirectory sends it, with its time (s since 1970, 0.
 
-    With time, which no file here has: 0, unknown.
+    Unknown) if wanted.
     """
     line = f"D{entry.name}" if entry.size is None else f"F{entry.name}\t{entry.size}"
     if timed:
-        line += "\t0" if entry.size is not None else "\t0\t0"
-    return line.encode("ascii") + b"\0"
+        line += f"\t{entry.modified}" if entry.size is not None else f"\t0\t{entry.modified}"
+    return line.encode("ascii", errors="replace") + b"\0"

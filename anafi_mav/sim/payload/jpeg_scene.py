@@ -326,11 +326,22 @@ def mp4_size(scene: Scene, seconds: float) -> int:
     return _MP4_HEAD + frames_in(seconds) * len(_frame(scene))
 
 
-def mp4(scene: Scene, seconds: float) -> bytes:
-    """A video of this length."""
+def mp4(scene: Scene, seconds: float, offset: int = 0, size: int | None = None) -> bytes:
+    """Bytes of a video of this length, from `offset` on; all of them without a `size`.
+
+    Only these are made: a video may be larger than the memory.
+    """
     frame, count = _frame(scene), frames_in(seconds)
     moov = _moov(count, len(frame), round(seconds * 1000.0), _MP4_HEAD)
-    return _FTYP + moov + struct.pack(">I4s", count * len(frame) + 8, b"mdat") + frame * count
+    head = _FTYP + moov + struct.pack(">I4s", count * len(frame) + 8, b"mdat")
+    end = len(head) + count * len(frame)
+    end = end if size is None else min(end, offset + size)
+    made = head[offset:end]
+    start = max(offset, len(head)) - len(head)
+    if (left := end - len(head) - start) > 0:
+        skipped = start % len(frame)
+        made += (frame * ((skipped + left) // len(frame) + 1))[skipped : skipped + left]
+    return made
 
 
 @lru_cache(maxsize=64)

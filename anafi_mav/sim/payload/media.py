@@ -21,6 +21,8 @@ from anafi_mav.sim.payload.jpeg_scene import Scene
 FIRST_ID = 10_000_001
 INDEXING_TIME = 0.5
 """s that an empty card is indexed. Assumed."""
+PART = 1 << 20
+"""Bytes of a file that are made at a time."""
 MAX_RESOURCES = 9999
 """Files of one media: their number has four digits."""
 
@@ -78,8 +80,21 @@ class Resource:
         """A smaller JPEG of it."""
         return jpeg_scene.thumbnail(self.scene, self.number)
 
+    def parts(self, first: int, end: int, size: int = PART) -> Iterator[bytes]:
+        """Bytes `first` to `end` of the file, `size` at a time. A video is never made as a whole."""
+        whole = None if self.kind is MediaKind.MP4 else self.content()
+        for offset in range(first, end, size):
+            stop = min(offset + size, end)
+            if whole is None:
+                yield jpeg_scene.mp4(self.scene, self.seconds, offset, stop - offset)
+            else:
+                yield whole[offset:stop]
+
     def md5(self) -> str:
-        return hashlib.md5(self.content(), usedforsecurity=False).hexdigest()
+        digest = hashlib.md5(usedforsecurity=False)
+        for part in self.parts(0, self.size):
+            digest.update(part)
+        return digest.hexdigest()
 
     @property
     def thumbnail_name(self) -> str:

@@ -58,6 +58,7 @@ class Quirk(enum.Enum):
         "upload-refused-while-paused",
         "the web server takes no flight plan while another one is paused",
     )
+    NO_HTTP_RANGE = ("no-http-range", "the web server ignores Range in requests and answers with the whole file")
     ROLL_INVERTED = ("roll-inverted", "AttitudeChanged.roll is positive with the left wing down")
 
 

@@ -278,3 +278,32 @@ async def test_bytes_that_are_no_http_are_refused(site: Site, text: bytes) -> No
     line = await site.raw(text)
     assert line.split()[1] == b"400"
     assert await site.ask("GET", f"{API}/media/medias") == (200, [])
+
+
+@pytest.mark.parametrize(
+    ("wanted", "first", "end"), [("bytes=0-99", 0, 100), ("bytes=2000-", 2000, None), ("bytes=-5", -5, None)]
+)
+async def test_range_of_a_video_is_sent(site: Site, wanted: str, first: int, end: int | None) -> None:
+    (file,) = site.film().resources
+    content = file.content()
+    async with site.client.get(f"/data/media/{file.id}", headers={"Range": wanted}) as answer:
+        assert answer.status == 206
+        assert await answer.read() == content[first:end]
+        begin = first % len(content)
+        last = len(content) - 1 if end is None else end - 1
+        assert answer.headers["Content-Range"] == f"bytes {begin}-{last}/{len(content)}"
+
+
+async def test_range_behind_the_end_is_refused(site: Site) -> None:
+    (file,) = site.film().resources
+    async with site.client.get(f"/data/media/{file.id}", headers={"Range": f"bytes={file.size}-"}) as answer:
+        assert (answer.status, answer.headers["Content-Range"]) == (416, f"bytes */{file.size}")
+
+
+async def test_server_without_ranges_sends_the_whole_file(site: Site) -> None:
+    """Quirk NO_HTTP_RANGE."""
+    site.server.has_ranges = lambda: False
+    (file,) = site.film().resources
+    async with site.client.get(f"/data/media/{file.id}", headers={"Range": "bytes=5-"}) as answer:
+        assert (answer.status, "Accept-Ranges" in answer.headers) == (200, False)
+        assert await answer.read() == file.content()

@@ -4,27 +4,30 @@ from __future__ import annotations
 
 import random
 import struct
+from typing import Any
 
 import pytest
 
 from anafi_mav.services.checksum import crc32
-from anafi_mav.services.files import FileTree, Query
+from anafi_mav.services.files import Entry, FileRefused, FileSource, FileTree, MadeFile, Query
+from anafi_mav.services.files import FileError as Error
 from anafi_mav.services.ftp.ftp import (
     ACK,
     BURST_PARTS,
     DATA,
     MAX_CLIENTS,
     MAX_SESSIONS,
+    MAX_WAITS,
     NAK,
     PAYLOAD,
     SESSION_TIMEOUT,
     TAKEOVER,
     TRANSITIONS,
-    Error,
     Event,
     FtpServer,
     Opcode,
     State,
+    Wait,
 )
 
 CONTENT = bytes(range(256)) * 4
@@ -52,8 +55,8 @@ def request(
 class Reply:
     """An answer, taken apart."""
 
-    def __init__(self, payload: bytes | None) -> None:
-        assert payload is not None
+    def __init__(self, payload: bytes | Wait | None) -> None:
+        assert isinstance(payload, bytes)
         assert len(payload) == PAYLOAD
         fields = struct.unpack_from("<HBBBBBBI", payload)
         self.seq, self.session, self.opcode, self.size, self.req_opcode, self.complete, _, self.offset = fields
@@ -80,7 +83,7 @@ class Bench:
 def test_every_transition(state: State, event: Event) -> None:
     """A closed session can only be opened; the end of a burst belongs to a burst."""
     expected = {
-        Event.OPEN: State.OPEN,
+        Event.OPEN: State.OPENING,
         Event.READ: State.OPEN,
         Event.BURST: State.BURSTING,
         Event.TERMINATE: State.CLOSED,
@@ -88,10 +91,13 @@ def test_every_transition(state: State, event: Event) -> None:
         Event.CREATE: State.WRITING,
     }
     if state is State.CLOSED:
-        assert TRANSITIONS[state].get(event) is {Event.OPEN: State.OPEN, Event.CREATE: State.WRITING}.get(event)
+        assert TRANSITIONS[state].get(event) is {Event.OPEN: State.OPENING, Event.CREATE: State.WRITING}.get(event)
+    elif event in (Event.OPENED, Event.REFUSED):
+        ends = {Event.OPENED: State.OPEN, Event.REFUSED: State.CLOSED}
+        assert TRANSITIONS[state].get(event) is (ends[event] if state is State.OPENING else None)
     elif event is Event.WRITE:
         assert TRANSITIONS[state].get(event) is (State.WRITING if state is State.WRITING else None)
-    elif state is State.WRITING and event in (Event.READ, Event.BURST):
+    elif state in (State.WRITING, State.OPENING) and event in (Event.READ, Event.BURST):
         assert event not in TRANSITIONS[state]
     elif event is Event.BURST_ENDS:
         assert TRANSITIONS[state].get(event) is (State.OPEN if state is State.BURSTING else None)
@@ -138,10 +144,11 @@ def test_no_such_file(path: bytes) -> None:
 def test_queries() -> None:
     queries: list[Query] = []
     made = FileTree({"/@PARAM/param.pck": lambda query: queries.append(query) or b"x"})  # type: ignore[func-returns-value]
-    assert made.read("@PARAM/param.pck?start=3&count=10&withdefaults=1") == b"x"
-    assert made.read("@PARAM/param.pck") == b"x"
+    assert made.open("@PARAM/param.pck?start=3&count=10&withdefaults=1") == MadeFile(b"x")
+    assert made.open("@PARAM/param.pck") == MadeFile(b"x")
     assert queries == [{"start": "3", "count": "10", "withdefaults": "1"}, {}]
-    assert made.read("@PARAM/param.pck?" + "&".join(f"a{n}=1" for n in range(100))) is None
+    with pytest.raises(FileRefused):
+        made.open("@PARAM/param.pck?" + "&".join(f"a{n}=1" for n in range(100)))
 
 
 def test_bursts() -> None:
@@ -332,6 +339,171 @@ def test_a_crowd_of_clients_is_bounded() -> None:
     assert b.server.sessions == MAX_CLIENTS
     b.server.forget(lambda who: who != 3 * MAX_CLIENTS - 1)
     assert b.server.sessions == 1
+
+
+# -- files that need time
+
+
+class Later:
+    """An awaitable for a value that the test hands over itself."""
+
+    def __await__(self) -> Any:
+        raise AssertionError("the core awaits nothing")
+        yield
+
+
+class Slow(FileTree):
+    """A tree whose files need time: `/slow`, of the size of CONTENT."""
+
+    def __init__(self) -> None:
+        super().__init__({"/fast": lambda query: OTHER})
+        self.asked: list[Any] = []
+        self.reasons: list[FileRefused] = []
+
+    def open(self, path: str) -> Any:
+        return super().open(path) if path == "/fast" else self._later("open", path)
+
+    def list(self, path: str) -> Any:
+        return self._later("list", path)
+
+    def checksum(self, path: str) -> Any:
+        return self._later("checksum", path)
+
+    def remove(self, path: str) -> Any:
+        return self._later("remove", path)
+
+    def refused(self, refusal: FileRefused) -> None:
+        self.reasons.append(refusal)
+
+    def _later(self, *what: object) -> Later:
+        self.asked.append(what)
+        return Later()
+
+
+class SlowSource:
+    """An open file whose bytes need time."""
+
+    size = len(CONTENT)
+
+    def read(self, offset: int, size: int) -> Any:
+        return Later()
+
+
+class SlowBench:
+    def __init__(self) -> None:
+        self.server, self.files, self.now = FtpServer(), Slow(), 0.0
+
+    def ask(self, payload: bytes, who: object = "a") -> Wait:
+        wait = self.server.receive(who, payload, self.files, self.now)
+        assert isinstance(wait, Wait)
+        return wait
+
+    def again(self, payload: bytes) -> bytes | Wait | None:
+        return self.server.receive("a", payload, self.files, self.now)
+
+    def finish(self, wait: Wait, value: object) -> list[Reply]:
+        return [Reply(payload) for payload in self.server.finish(wait, value)]
+
+    def opened(self, source: FileSource | None = None) -> None:
+        (reply,) = self.finish(self.ask(request(Opcode.OPEN_FILE_RO, b"/slow")), source or SlowSource())
+        assert reply.data == len(CONTENT).to_bytes(4, "little")
+
+
+def test_late_file_is_answered_once_for_each_sequence_number() -> None:
+    """QGroundControl repeats a request under another number, MAVSDK under the same."""
+    b = SlowBench()
+    wait = b.ask(request(Opcode.OPEN_FILE_RO, b"/slow", seq=2))
+    for seq in (2, 4, 2, 6):
+        assert b.again(request(Opcode.OPEN_FILE_RO, b"/slow", seq=seq)) is None
+    assert [reply.seq for reply in b.finish(wait, SlowSource())] == [3, 5, 7]
+    assert b.files.asked == [("open", "/slow")]
+    assert b.finish(wait, SlowSource()) == []
+
+
+def test_late_read_and_burst_are_answered_with_their_bytes() -> None:
+    b = SlowBench()
+    b.opened()
+    (read,) = b.finish(b.ask(request(Opcode.READ_FILE, seq=4, size=100, offset=1000)), CONTENT[1000:])
+    assert (read.seq, read.offset, read.data) == (5, 1000, CONTENT[1000:])
+    wait = b.ask(request(Opcode.BURST_READ_FILE, seq=6, size=100, offset=24))
+    assert not b.server.bursting("a")
+    parts = b.finish(wait, CONTENT[24:])
+    while (part := b.server.burst("a")) is not None:
+        parts.append(Reply(part))
+    assert b"".join(part.data for part in parts) == CONTENT[24:]
+    assert [part.complete for part in parts] == [0] * 9 + [1]
+    assert Reply(b.again(request(Opcode.READ_FILE, seq=8, size=9, offset=1024))).error == Error.EOF
+
+
+def test_late_refusal_names_its_error_and_ends_the_opening() -> None:
+    b = SlowBench()
+    refusal = FileRefused(Error.FAIL)
+    (reply,) = b.finish(b.ask(request(Opcode.OPEN_FILE_RO, b"/slow")), refusal)
+    assert reply.error == Error.FAIL
+    assert b.files.reasons == [refusal]
+    assert b.server.sessions == 0
+    b.opened()
+    (reply,) = b.finish(b.ask(request(Opcode.READ_FILE, seq=4, size=9)), FileRefused(Error.FAIL))
+    assert reply.error == Error.FAIL
+    assert b.server.sessions == 1  # its client may try again
+
+
+@pytest.mark.parametrize("end", ["terminate", "reset", "expire", "forget", "another file"])
+def test_session_that_ends_abandons_what_waits(end: str) -> None:
+    b = SlowBench()
+    b.opened()
+    wait, abandoned = b.ask(request(Opcode.READ_FILE, seq=4, size=9)), []
+    wait.abandon = lambda: abandoned.append(end)
+    b.now = SESSION_TIMEOUT
+    match end:
+        case "terminate":
+            b.again(request(Opcode.TERMINATE_SESSION, seq=6))
+        case "reset":
+            b.again(request(Opcode.RESET_SESSIONS, seq=6))
+        case "expire":
+            b.server.expire(b.now)
+        case "forget":
+            b.server.forget(lambda who: True)
+        case _:
+            assert Reply(b.again(request(Opcode.OPEN_FILE_RO, b"/fast", seq=6))).data == b"\5\0\0\0"
+    assert abandoned == [end]
+    assert b.finish(wait, b"123456789") == []
+
+
+def test_file_being_opened_is_not_replaced_by_an_impatient_request() -> None:
+    b = SlowBench()
+    b.ask(request(Opcode.OPEN_FILE_RO, b"/slow"))
+    assert Reply(b.again(request(Opcode.OPEN_FILE_RO, b"/fast", seq=2))).error == Error.NO_SESSIONS_AVAILABLE
+    assert Reply(b.again(request(Opcode.READ_FILE, seq=4, size=9))).error == Error.INVALID_SESSION
+
+
+def test_waiting_requests_of_a_client_are_bounded() -> None:
+    b = SlowBench()
+    b.opened()
+    waits = [b.ask(request(Opcode.READ_FILE, seq=4, size=1, offset=n)) for n in range(MAX_WAITS)]
+    assert b.again(request(Opcode.READ_FILE, seq=6, size=1, offset=99)) is None
+    assert b.finish(waits[0], b"x")
+    b.ask(request(Opcode.READ_FILE, seq=6, size=1, offset=99))
+    assert Reply(b.again(request(Opcode.TERMINATE_SESSION, seq=8))).opcode == ACK
+
+
+@pytest.mark.parametrize(("opcode", "value"), [(Opcode.REMOVE_FILE, None), (Opcode.CALC_FILE_CRC32, 7)])
+def test_repeated_removal_or_checksum_is_not_run_again(opcode: Opcode, value: object) -> None:
+    b = SlowBench()
+    payload = request(opcode, b"/slow", seq=2)
+    (reply,) = b.server.finish(b.ask(payload), value)
+    assert b.again(payload) == reply
+    assert len(b.files.asked) == 1
+    b.ask(request(opcode, b"/slow", seq=4))
+    assert len(b.files.asked) == 2
+
+
+def test_late_list_is_paged_by_its_offset() -> None:
+    b = SlowBench()
+    wait = b.ask(request(Opcode.LIST_DIRECTORY_WITH_TIME, b"/media", offset=1))
+    entries = [Entry("a", 5), Entry("b", 6, modified=1_800_000_000), Entry("c", None, modified=3)]
+    (reply,) = b.finish(wait, entries)
+    assert reply.data == b"Fb\t6\t1800000000\0Dc\t0\t3\0"
 
 
 def test_no_bytes_break_it() -> None:

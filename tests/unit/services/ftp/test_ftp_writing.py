@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import struct
 
+from anafi_mav.services.files import FileError as Error
 from anafi_mav.services.files import FileTree
-from anafi_mav.services.ftp.ftp import ACK, NAK, PAYLOAD, SESSION_TIMEOUT, Error, FtpServer, Opcode
+from anafi_mav.services.ftp.ftp import ACK, NAK, PAYLOAD, SESSION_TIMEOUT, FtpServer, Opcode
 
 PATH = b"@MISSION/mission.dat"
 ROOM = 1000
@@ -16,7 +17,8 @@ class Writable:
 
     def __init__(self) -> None:
         tree = FileTree({"/@MISSION/mission.dat": lambda query: b"old"})
-        self.read, self.list = tree.read, tree.list
+        self.open, self.list, self.checksum, self.remove = tree.open, tree.list, tree.checksum, tree.remove
+        self.refused = tree.refused
         self.written: list[bytes] = []
 
     def room(self, path: str) -> int | None:

@@ -1,0 +1,146 @@
+"""One file of the drone's media, and its download to a folder of this computer."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import os
+import re
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from anafi_mav.errors import RemoteProtocolError
+
+WRITTEN = 1 << 20
+"""Bytes that are written to the disk at once."""
+
+_FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,127}")
+"""Ids of the drone become file names of ours: nothing but plain names may."""
+
+_DATE = re.compile(r"([0-9]{4})([0-9]{2})([0-9]{2})T")
+
+UNDATED = "undated"
+"""Folder of a file without a readable time."""
+
+
+class Place(msgspec.Struct, frozen=True):
+    """A place: deg, deg, m; Parrot writes 500 for unknown."""
+
+    latitude: float = 500.0
+    longitude: float = 500.0
+    altitude: float = 500.0
+
+
+class Resource(msgspec.Struct, frozen=True):
+    """One file of a media."""
+
+    resource_id: str
+    media_id: str = ""
+    type: str = ""
+    format: str = ""
+    """"JPG", "DNG", "MP4"."""
+    size: int = 0
+    """Bytes."""
+    url: str = ""
+    thumbnail: str | None = None
+    datetime: str = ""
+    md5: str | None = None
+    """Newer firmware only; `Media.md5` requests it from others."""
+    storage: str | int | None = None
+    duration: float | None = None
+    """ms."""
+    replay_url: str | None = None
+    width: int | None = None
+    height: int | None = None
+    gps: Place | None = None
+
+    @property
+    def date(self) -> str:
+        """Day on which it was made by the drone's clock, "2026-11-22".
+
+        "undated" when that is not readable.
+        """
+        found = _DATE.match(self.datetime)
+        return UNDATED if found is None else "-".join(found.groups())
+
+
+def file_name(id: str) -> str:
+    """Return an id that can stand in a path, there and here. Raises `RemoteProtocolError`."""
+    if not _FILE_NAME.fullmatch(id):
+        raise RemoteProtocolError(f"{id!r} is no id")
+    return id
+
+
+async def fetch(
+    resource: Resource,
+    directory: Path,
+    read_from: Callable[[Resource, int], AsyncIterator[bytes]],
+    md5: str | None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Path:
+    """Download a file to a directory, compare its MD5 if that is known, and return its path.
+
+    It has its name only once it is complete. Until then it is a `.part` with its MD5 or size in the name, from which
+    the next call continues: never one of another file. Raises `RemoteProtocolError` when size or MD5 differ; that
+    part is deleted.
+    """
+    name = file_name(resource.resource_id)
+    mark = md5[:12] if md5 is not None and re.fullmatch("[0-9a-f]{32}", md5) else str(resource.size)
+    path, part = directory / name, directory / f"{name}.{mark}.part"
+    digest = hashlib.md5(usedforsecurity=False)
+    try:
+        done = await asyncio.to_thread(_digest_part, part, digest, resource.size)
+        with await asyncio.to_thread(part.open, "ab") as file:
+            waiting = bytearray()
+            try:
+                if not resource.size or done < resource.size:
+                    async for piece in read_from(resource, done):
+                        waiting += piece
+                        if len(waiting) >= WRITTEN:
+                            data = bytes(waiting)
+                            waiting.clear()
+                            done += await asyncio.to_thread(_write, file, data, digest)
+                        if progress is not None:
+                            progress(done + len(waiting), resource.size)
+            finally:  # also the bytes before an interruption: the next call continues behind them
+                done += _write(file, bytes(waiting), digest)
+            await asyncio.to_thread(_sync, file)
+        if resource.size and done != resource.size:
+            raise RemoteProtocolError(f"{name}: expected {resource.size} bytes, got {done}")
+        if md5 is not None and digest.hexdigest() != md5:
+            part.unlink()
+            raise RemoteProtocolError(f"{name}: the copy is not what the drone has (MD5)")
+        part.replace(path)
+    finally:
+        if part.exists() and not part.stat().st_size:
+            part.unlink()
+    return path
+
+
+def _digest_part(part: Path, digest: Any, size: int) -> int:
+    """Return the bytes of an interrupted download, and put them into the digest."""
+    if not part.exists():
+        return 0
+    if not size or part.stat().st_size > size:
+        part.unlink()
+        return 0
+    done = 0
+    with part.open("rb") as file:
+        while data := file.read(WRITTEN):
+            digest.update(data)
+            done += len(data)
+    return done
+
+
+def _sync(file: Any) -> None:
+    file.flush()
+    os.fsync(file.fileno())
+
+
+def _write(file: Any, data: bytes, digest: Any) -> int:
+    file.write(data)
+    digest.update(data)
+    return len(data)

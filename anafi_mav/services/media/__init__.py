@@ -1,0 +1,1 @@
+"""The drone's photos and videos: over MAVLink FTP, and brought home after a landing."""

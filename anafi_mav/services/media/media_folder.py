@@ -1,0 +1,168 @@
+"""The drone's photos and videos as a folder: `<day>/<file>`, read from the drone while a client reads them.
+
+A day is "2026-11-22" by the drone's clock. Nothing is kept here but checksums: `drone.media` keeps the list and the
+pieces that were read last.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+from collections import OrderedDict
+from collections.abc import Awaitable, Callable, Iterator, Sequence
+from contextlib import aclosing, contextmanager
+from dataclasses import dataclass
+from datetime import datetime
+from typing import TypeVar
+
+from anafi_mav import texts
+from anafi_mav.drone import Drone
+from anafi_mav.drone.payload.media import Listing, Resource
+from anafi_mav.drone.rest import NOT_INDEXED_YET
+from anafi_mav.errors import AnafiMavError, CommandRejected
+from anafi_mav.services.checksum import crc32
+from anafi_mav.services.files import MAX_SIZE, Entry, FileError, FileRefused, FileSource
+
+MAX_CHECKSUMS = 64
+"""Checksums that are kept: a client compares a day's photos twice at most."""
+
+T = TypeVar("T")
+
+
+class MediaFolder:
+    """All files of one drone."""
+
+    def __init__(self, drone: Drone) -> None:
+        self._drone = drone
+        self._checksums: OrderedDict[Resource, int] = OrderedDict()
+        self._summing = asyncio.Lock()
+        """A checksum reads a whole file: one at a time."""
+
+    def list(self, path: str) -> Sequence[Entry] | Awaitable[Sequence[Entry]]:
+        return when_listed(self._drone, lambda listing: entries(listing, path, lambda file: file_entry(file)))
+
+    def open(self, path: str) -> FileSource | Awaitable[FileSource]:
+        def opened(listing: Listing) -> FileSource:
+            resource = find(listing, path)
+            if resource.size > MAX_SIZE:
+                raise FileRefused(FileError.FAIL, texts.FILE_TOO_LARGE)
+            return _OpenFile(self._drone, resource)
+
+        return when_listed(self._drone, opened)
+
+    async def checksum(self, path: str) -> int:
+        """Read a whole file, and compare it with the drone's MD5 where the drone has one."""
+        with refusing():
+            resource = find(await self._drone.media.listing(), path)
+            async with self._summing:
+                if resource not in self._checksums:
+                    self._checksums[resource] = await self._sum(resource)
+                    while len(self._checksums) > MAX_CHECKSUMS:
+                        self._checksums.popitem(last=False)
+                return self._checksums[resource]
+
+    async def _sum(self, resource: Resource) -> int:
+        crc, digest = 0, hashlib.md5(usedforsecurity=False)
+        async with aclosing(self._drone.media.read_from(resource)) as pieces:
+            async for piece in pieces:
+                crc = crc32(piece, crc)
+                digest.update(piece)
+        md5 = await known_md5(self._drone, resource)
+        if md5 is not None and digest.hexdigest() != md5:
+            raise FileRefused(FileError.FAIL, texts.FILE_DAMAGED)
+        return crc
+
+    async def remove(self, path: str) -> None:
+        """Delete a file on the drone. Refused while a camera records or saves."""
+        with refusing():
+            resource = find(await self._drone.media.listing(), path)
+            if (reason := busy(self._drone)) is not None:
+                raise FileRefused(FileError.FAIL, texts.REFUSED.fill(what=texts.DELETE, reason=reason))
+            await self._drone.media.delete_resource(resource.resource_id)
+
+
+@dataclass(frozen=True)
+class _OpenFile:
+    drone: Drone
+    resource: Resource
+
+    @property
+    def size(self) -> int:
+        return self.resource.size
+
+    async def read(self, offset: int, size: int) -> bytes:
+        with refusing():
+            return await self.drone.media.read(self.resource, offset, size)
+
+
+def busy(drone: Drone) -> texts.OperatorText | None:
+    """Return the reason why media must not be deleted now; None when they may be."""
+    cameras = drone.camera.state
+    if cameras.is_recording:
+        return texts.CAMERA_RECORDING
+    return texts.CAMERA_SAVING if cameras.is_taking else None
+
+
+def when_listed(drone: Drone, then: Callable[[Listing], T]) -> T | Awaitable[T]:
+    """Apply `then` to the list of media: at once when it is kept, else when the drone has sent it."""
+    kept = drone.media.kept_listing
+    return _after_listing(drone, then) if kept is None else then(kept)
+
+
+async def _after_listing(drone: Drone, then: Callable[[Listing], T]) -> T:
+    with refusing():
+        return then(await drone.media.listing())
+
+
+async def known_md5(drone: Drone, resource: Resource) -> str | None:
+    """Return the MD5 of a file; None when the drone has none."""
+    try:
+        return await drone.media.md5(resource)
+    except AnafiMavError:
+        return None
+
+
+def find(listing: Listing, path: str) -> Resource:
+    """Return the file at `<day>/<file>`. Raises `FileRefused`."""
+    day, _, name = path.partition("/")
+    resource = listing.files.get(day, {}).get(name)
+    if resource is None:
+        raise FileRefused(FileError.FILE_NOT_FOUND)
+    return resource
+
+
+def entries(listing: Listing, path: str, entry: Callable[[Resource], Entry]) -> list[Entry]:
+    """Return the days, or the files of a day. Raises `FileRefused`."""
+    if not path:
+        return [Entry(day, None) for day in listing.files]
+    if path not in listing.files:
+        raise FileRefused(FileError.FILE_NOT_FOUND)
+    return [entry(file) for file in listing.files[path].values()]
+
+
+def file_entry(file: Resource) -> Entry:
+    """Return a file's name, size and time."""
+    return Entry(file.resource_id, file.size, modified(file))
+
+
+def modified(file: Resource) -> int:
+    """Return when a file was made, s since 1970; 0 when that is not readable."""
+    try:
+        return max(int(datetime.strptime(file.datetime, "%Y%m%dT%H%M%S%z").timestamp()), 0)
+    except (ValueError, OverflowError):
+        return 0
+
+
+@contextmanager
+def refusing() -> Iterator[None]:
+    """Turn the errors of the drone's web server into those of FTP."""
+    try:
+        yield
+    except FileRefused:
+        raise
+    except AnafiMavError as error:
+        if isinstance(error, CommandRejected) and error.reason == NOT_INDEXED_YET:
+            raise FileRefused(FileError.FAIL, texts.MEDIA_NOT_INDEXED) from error
+        if isinstance(error, CommandRejected) and "HTTP 404" in error.reason:
+            raise FileRefused(FileError.FILE_NOT_FOUND) from error
+        raise FileRefused(FileError.FAIL, texts.MEDIA_UNAVAILABLE.fill(error=texts.from_below(error))) from error
