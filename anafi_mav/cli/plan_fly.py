@@ -93,7 +93,7 @@ class MissionFollower:
 
     def _hear(self, inbound: Inbound) -> None:
         message = inbound.message
-        match message.id:
+        match message.get_msgId():
             case dialect.MAVLINK_MSG_ID_HEARTBEAT:
                 self._beat(message)
             case dialect.MAVLINK_MSG_ID_MISSION_CURRENT:

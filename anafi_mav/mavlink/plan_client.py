@@ -113,7 +113,7 @@ class Upload(Transfer):
         """A message of any sender."""
         if not self._ours(message, sysid, compid):
             return []
-        match message.id:
+        match message.get_msgId():
             case dialect.MAVLINK_MSG_ID_MISSION_REQUEST_INT | dialect.MAVLINK_MSG_ID_MISSION_REQUEST:
                 # Who asks by the older message takes either form (common.xml MISSION_REQUEST).
                 return self._item(message.seq, now)
@@ -182,7 +182,7 @@ class Download(Transfer):
         """A message of any sender."""
         if not self._ours(message, sysid, compid):
             return []
-        match message.id:
+        match message.get_msgId():
             case dialect.MAVLINK_MSG_ID_MISSION_COUNT if not self._begun:
                 if message.count > MAX_ITEMS:
                     return [self._ack(dialect.MAV_MISSION_NO_SPACE), *self._end(Outcome.TOO_MANY)]

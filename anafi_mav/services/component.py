@@ -155,7 +155,7 @@ class Component:
 
         Nothing is sent while the link is down.
         """
-        self._system.send_as(self.compid, message, to, give_way=message.id in self.telemetry)
+        self._system.send_as(self.compid, message, to, give_way=message.get_msgId() in self.telemetry)
 
     def send_by_flavour(
         self, build: Callable[[Flavour], dialect.MAVLink_message | None], to: Sequence[Channel] | None = None
@@ -243,7 +243,7 @@ class Component:
     def receive(self, inbound: Inbound) -> None:
         """Handle a message to this component, to its system, or to all."""
         message = inbound.message
-        id = message.id
+        id = message.get_msgId()
         handler = self._handlers.get(id)
         if handler is None:
             return

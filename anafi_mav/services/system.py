@@ -284,7 +284,7 @@ class System:
         It is a command, or a message that several components handle. The autopilot answers for commands that no
         component has.
         """
-        if message.id in BY_AUTOPILOT:
+        if message.get_msgId() in BY_AUTOPILOT:
             return self._autopilot
         return next((component for component in self.components if component.owns(message)), self._autopilot)
 
@@ -463,15 +463,15 @@ class System:
 
     def _commands_us(self, message: Any) -> bool:
         """Return True for a command to this system by its id that is no query."""
-        if message.id == dialect.MAVLINK_MSG_ID_SET_MODE:
+        if message.get_msgId() == dialect.MAVLINK_MSG_ID_SET_MODE:
             return bool(message.target_system == self.sysid)
-        known = message.id in COMMANDS and message.target_system == self.sysid
+        known = message.get_msgId() in COMMANDS and message.target_system == self.sysid
         return known and any(component.commands.acts_on(message.command) for component in self.components)
 
     def _refuse(self, inbound: Inbound) -> None:
         """Answer a command to one of the components in `ABSENT` alone: it is unsupported."""
         message = inbound.message
-        if message.id in COMMANDS and message.target_system == self.sysid and message.target_component:
+        if message.get_msgId() in COMMANDS and message.target_system == self.sysid and message.target_component:
             answer = _unsupported(inbound)
             self._node.send(answer, sysid=self.sysid, compid=message.target_component, to=inbound.channel)
 

@@ -53,7 +53,7 @@ def guided_mode(flavour: Flavour) -> FlightMode:
 
 async def _fly_item(host: Host, inbound: Inbound) -> None:
     item, flavour = inbound.message, flavour_of(inbound.channel)
-    scale = 1e7 if item.id == dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT else 1.0
+    scale = 1e7 if item.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT else 1.0
     vehicle = host.vehicle
     result = dialect.MAV_MISSION_ERROR
     try:

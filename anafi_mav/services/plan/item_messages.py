@@ -27,7 +27,7 @@ def item_of(message: Any) -> PlanItem | PlanFault:
     """Return the item of a MISSION_ITEM or MISSION_ITEM_INT, or its fault."""
     x: int | None = message.x
     y: int | None = message.y
-    if message.id == dialect.MAVLINK_MSG_ID_MISSION_ITEM:
+    if message.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_ITEM:
         scale = DEGREES if has_place(message.command, message.frame) else 1.0
         x, y = _integer(message.x, scale), _integer(message.y, scale)
     if x is None:

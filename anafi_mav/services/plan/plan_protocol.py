@@ -56,13 +56,13 @@ class MissionProtocol:
 
     def receive(self, message: Any, peer: Peer, now: float) -> list[Effect]:
         """A message of `MESSAGES` from a client."""
-        if message.id == dialect.MAVLINK_MSG_ID_MISSION_ACK:  # it gives up what it has asked for
+        if message.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_ACK:  # it gives up what it has asked for
             self._waiting = deque(
                 (other, who)
                 for other, who in self._waiting
                 if (other.mission_type, who.client) != (message.mission_type, peer.client)
             )
-        if message.id not in _WHOLE:
+        if message.get_msgId() not in _WHOLE:
             return self._handle(message, peer, now)
         for kind, transfer in self.transfers.items():
             if kind != message.mission_type:
@@ -75,7 +75,7 @@ class MissionProtocol:
         return []
 
     def _handle(self, message: Any, peer: Peer, now: float) -> list[Effect]:
-        id, kind = message.id, message.mission_type
+        id, kind = message.get_msgId(), message.mission_type
         if kind == ALL and id == dialect.MAVLINK_MSG_ID_MISSION_CLEAR_ALL:
             return self._clear_all(peer, now)
         transfer = self.transfers.get(kind)
