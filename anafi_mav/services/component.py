@@ -24,6 +24,7 @@ from anafi_mav.services.commands import Action, ActionGroup
 from anafi_mav.services.definition_link import DefinitionLink
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.ftp.ftp_service import FtpService
+from anafi_mav.services.gateway_uris import GatewayUris
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.pose import VehiclePose
 from anafi_mav.services.service import MessageHandler, Service
@@ -56,6 +57,7 @@ class ComponentSystem(Protocol):
     vehicle: Vehicle
     clock: Clock
     memory: Memory
+    uris: GatewayUris
     has_picture_pose: bool
     """True when the configuration allows pose from the live video."""
 
@@ -100,6 +102,7 @@ class Component:
         self.vehicle = system.vehicle
         self.clock = system.clock
         self.memory = system.memory
+        self.uris = system.uris
         self.has_picture_pose = system.has_picture_pose
         self.definition = DefinitionLink()
         self._system = system

@@ -19,6 +19,7 @@ from anafi_mav.services.commands import Action, ActionGroup, Command
 from anafi_mav.services.definition_link import DefinitionLink
 from anafi_mav.services.files import Folder, ServedFile
 from anafi_mav.services.flavours import Flavour
+from anafi_mav.services.gateway_uris import GatewayUris
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.pose import VehiclePose
 from anafi_mav.services.stream import MessageStream, Times
@@ -49,6 +50,8 @@ class Host(Protocol):
     capabilities: int
     """MAV_PROTOCOL_CAPABILITY bits of all services of the component."""
     memory: Memory
+    uris: GatewayUris
+    """What the gateway serves beside MAVLink."""
     has_picture_pose: bool
     """True when the configuration allows pose from the live video."""
     definition: DefinitionLink

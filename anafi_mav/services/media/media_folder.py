@@ -99,7 +99,7 @@ def busy(drone: Drone) -> texts.OperatorText | None:
     """Return the reason why media must not be deleted now; None when they may be."""
     cameras = drone.camera.state
     if cameras.is_recording:
-        return texts.CAMERA_RECORDING
+        return texts.CAMERA_RECORDS
     return texts.CAMERA_SAVING if cameras.is_taking else None
 
 
