@@ -18,7 +18,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.command_targets import UnsupportedFrame
 from anafi_mav.services.commands import (
-    MODE_PROGRESS_AFTER,
+    LATE_PROGRESS_AFTER,
     PROGRESS_AFTER,
     PROGRESS_EVERY,
     QUERY,
@@ -279,7 +279,7 @@ class CommandService(Service):
     async def _report_progress(self, inbound: Inbound, command: Command) -> None:
         if command.progress is None:
             return
-        await asyncio.sleep(MODE_PROGRESS_AFTER if command.progress is ProgressPolicy.LATE else PROGRESS_AFTER)
+        await asyncio.sleep(LATE_PROGRESS_AFTER if command.progress is ProgressPolicy.LATE else PROGRESS_AFTER)
         while True:
             self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)
             await asyncio.sleep(PROGRESS_EVERY)
