@@ -47,7 +47,7 @@ MEMINFO = Path("/proc/meminfo")
 def rc_channels(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """Return RC_CHANNELS of the Skycontroller's grabbed inputs.
 
-    Its rssi is the quality of the drone's radio. Without a Skycontroller there are no sticks, and no radio of theirs: unknown.
+    Its rssi is the quality of the drone's radio. It is unknown without a Skycontroller: there is no radio of sticks.
     """
     controller = vehicle.drone.controller
     quality = vehicle.drone.link.state.quality if controller.present else None
