@@ -178,3 +178,35 @@ async def test_stop_overtakes_no_start_of_another_client() -> None:
         ]
         assert len(videos(w)) == 1
         assert not w.drone.firmware.payload.cameras.busy
+
+
+PANORAMA = dialect.MAV_CMD_PANORAMA_CREATE
+
+
+async def test_panorama_turns_the_hovering_drone_and_hold_ends_it() -> None:
+    async with world(web=True) as w:
+        assert await command(w.client, PANORAMA, 360, 180) == REJECTED  # on the ground
+        await w.take_off(10.0)
+        mark = w.client.mark()
+        assert await command(w.client, PANORAMA, 180, 0) == ACCEPTED
+        assert w.commands("animation.start_horizontal_180_photo_panorama")
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", since=mark, timeout=60.0)
+        (panorama,) = photos(w)
+        assert panorama.mode == "PANORAMA"
+        images = [image for _, image in w.client.since(mark, "CAMERA_IMAGE_CAPTURED")]
+        assert len(images) == len(panorama.resources)
+
+        mark = w.client.mark()
+        assert await command(w.client, PANORAMA, 360, 180) == ACCEPTED
+        await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 1, since=mark)
+        assert (await w.client.command(dialect.MAV_CMD_DO_PAUSE_CONTINUE, 0)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.name == "animation.cancel")
+        for angle in range(90, 100):  # the drone offers no panorama until it has stopped
+            await w.client.wait("HEARTBEAT")
+            if (result := await command(w.client, PANORAMA, angle, 0)) == ACCEPTED:
+                break
+        assert result == ACCEPTED
+        assert (
+            await w.client.command(dialect.MAV_CMD_DO_REPOSITION, -1, 1, x=HOME[0] + 2e-4, y=HOME[1], z=10.0, frame=6)
+        ).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 15.0, 30.0)
