@@ -201,12 +201,12 @@ async def test_panorama_turns_the_hovering_drone_and_hold_ends_it() -> None:
         await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 1, since=mark)
         assert (await w.client.command(dialect.MAV_CMD_DO_PAUSE_CONTINUE, 0)).result == ACCEPTED
         await w.drone.wait_log(lambda e: e.name == "animation.cancel")
-        for angle in range(90, 100):  # the drone offers no panorama until it has stopped
+        for angle in range(180, 190):  # the drone offers no panorama until it has stopped
             await w.client.wait("HEARTBEAT")
             if (result := await command(w.client, PANORAMA, angle, 0)) == ACCEPTED:
                 break
         assert result == ACCEPTED
-        assert (
-            await w.client.command(dialect.MAV_CMD_DO_REPOSITION, -1, 1, x=HOME[0] + 2e-4, y=HOME[1], z=10.0, frame=6)
-        ).result == ACCEPTED
+        mark = w.client.mark()
+        ack = await w.client.command(dialect.MAV_CMD_DO_REPOSITION, -1, 1, x=HOME[0] + 2e-4, y=HOME[1], z=10.0, frame=6)
+        assert ack.result == ACCEPTED, texts(w.client, mark)
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 15.0, 30.0)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 
 from anafi_mav import texts
 from anafi_mav.drone.events import AnimationType, FlyingState
@@ -25,17 +25,18 @@ TURNED = 360.0
 """deg from which a panorama is spherical: Parrot's only one around the whole horizon."""
 
 HALF = 180.0
-"""deg from which it is Parrot's horizontal or vertical one; the super wide one is smaller."""
+"""deg from which it is Parrot's horizontal or vertical one; the Ai has a smaller one, the super wide."""
 
 HOVERING = (FlightMode.HOLD, FlightMode.GUIDED, FlightMode.POSITION)
 
 
-def panorama_type(wide: float, high: float) -> AnimationType:
-    """Return the panorama for these angles (deg)."""
+def panorama_type(wide: float, high: float, available: Container[AnimationType]) -> AnimationType:
+    """Return the panorama for these angles (deg); `available` are those that the drone offers."""
     if abs(wide) >= TURNED:
         return AnimationType.SPHERICAL_PHOTO_PANORAMA
-    if max(abs(wide), abs(high)) < HALF:
-        return AnimationType.SUPER_WIDE_PHOTO_PANORAMA
+    small = AnimationType.SUPER_WIDE_PHOTO_PANORAMA
+    if max(abs(wide), abs(high)) < HALF and small in available:
+        return small
     is_wide = abs(wide) >= abs(high)
     return AnimationType.HORIZONTAL_180_PHOTO_PANORAMA if is_wide else AnimationType.VERTICAL_180_PHOTO_PANORAMA
 
@@ -66,7 +67,7 @@ class PanoramaService(Service):
         if not self._is_active:
             return []
         self._is_active = False
-        if self.host.drone.animations.state.running in (None, AnimationType.NONE):
+        if not self.host.drone.animations.state.is_running:
             return []
         return [self.host.spawn(self._cancel())]
 
@@ -102,6 +103,7 @@ class PanoramaService(Service):
         ):
             raise Refused(texts.PANORAMA, texts.CAMERA_MODE_KEPT)
         await vehicle.take_over()
-        await drone.animations.photo_panorama(panorama_type(wide, high))
+        kind = panorama_type(wide, high, drone.animations.state.available or ())
+        await drone.animations.photo_panorama(kind)
         vehicle.select(FlightMode.HOLD, self)
         self._is_active = True
