@@ -12,13 +12,14 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from anafi_mav.drone import MODELS, Drone, Range, events
-from anafi_mav.drone.events import Axis, PreciseHomeMode, RthEndingBehavior, RthHomeType
+from anafi_mav.drone.events import Axis, PilotingStyleStyle, PreciseHomeMode, RthEndingBehavior, RthHomeType
 from anafi_mav.drone.events import ObstacleAvoidanceMode as AvoidanceMode
 from anafi_mav.services.parameter.parameter import Limits, Parameter, bounds, current, number, own
 from anafi_mav.services.parameter.parameter_codec import ParamType
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.base.bounds import LOWEST
 from anafi_mav.vehicle.base.link_loss import LossAction
+from anafi_mav.vehicle.base.move_heading import MoveHeading
 from anafi_mav.vehicle.joystick_override import Override
 from anafi_mav.vehicle.offboard.stream import GUIDED_TIMEOUT, LONGEST_TIMEOUT, SHORTEST_TIMEOUT
 from anafi_mav.vehicle.return_end import LONGEST_WAIT, SHORTEST_WAIT, EndOfReturn
@@ -175,6 +176,20 @@ GEOFENCE = _switch(
     lambda drone: drone.piloting.set_geofence,
     events.NoFlyOverMaxDistanceChanged,
     group=FLIGHT,
+)
+CAMERA_RELATIVE = Parameter(
+    "ANF_CAM_RELATIVE",
+    ParamType.INT32,
+    "Stick input is relative to the direction of the camera",
+    read=lambda host: number(host.drone.piloting.state.style),
+    write=lambda host, value: host.drone.piloting.set_style(PilotingStyleStyle(int(value))),
+    values=OFF_ON,
+    updates=(events.PilotingStyle,),
+    present=lambda drone: drone.piloting.state.style is not None,
+    group=FLIGHT,
+    long="Also of a Skycontroller. On: velocity setpoints, follow and orbit are refused, since their loops need the "
+    "drone's own axes.",
+    source=events.PilotingStyle.NAME,
 )
 BANKED_TURN = _switch(
     "ANF_BANKED_TURN",
@@ -448,6 +463,31 @@ CLIMB_SPEED = Parameter(
 )
 
 
+def _put_yaw_mode(host: Host, value: float) -> None:
+    host.vehicle.move_heading = MoveHeading(int(value))
+
+
+YAW_MODE = Parameter(
+    "ANF_YAW_MODE",
+    ParamType.INT32,
+    "Heading of a move to a place whose command names none",
+    read=lambda host: float(host.vehicle.move_heading),
+    write=own(_put_yaw_mode),
+    put=_put_yaw_mode,
+    values={
+        int(MoveHeading.KEEP): "Keep the heading",
+        int(MoveHeading.TO_TARGET): "Turn to the target on the way",
+        int(MoveHeading.TO_TARGET_FIRST): "Turn to the target, then move",
+    },
+    polled=True,
+    group=GATEWAY,
+    long="From the next move on. With 2, a heading that a command names is also turned to before the drone moves. "
+    "Not for PX4's Offboard, which keeps the heading, nor for missions, whose way points look to the next one.",
+    default=float(MoveHeading.KEEP),
+    source="gateway",
+)
+
+
 def _put_loss_action(host: Host, value: float) -> None:
     host.vehicle.gcs_loss.action = LossAction(int(value))
 
@@ -607,6 +647,7 @@ NATIVE: tuple[Parameter, ...] = (
     MAX_DISTANCE,
     GEOFENCE,
     BANKED_TURN,
+    CAMERA_RELATIVE,
     AVOIDANCE,
     RETURN_ALTITUDE,
     RETURN_END_ALTITUDE,
@@ -622,6 +663,7 @@ NATIVE: tuple[Parameter, ...] = (
     HAND_LAUNCH,
     CRUISE_SPEED,
     CLIMB_SPEED,
+    YAW_MODE,
     GCS_LOSS,
     GCS_LOSS_TIME,
     RETURN_LANDING,

@@ -36,6 +36,7 @@ CORES = [
     *("relay/dialogue.py", "relay/feed.py", "relay/uri_host.py"),
     *("sim/autopilot/firmware.py", "sim/autopilot/flight.py"),
     *("vehicle/base/clients.py", "vehicle/base/height.py", "vehicle/base/link_loss.py", "vehicle/base/modes.py"),
+    "vehicle/base/move_heading.py",
     *("vehicle/base/roll_sign.py", "vehicle/base/severity.py", "vehicle/base/silence.py"),
     *("vehicle/base/subscriptions.py", "vehicle/base/velocity_loop.py", "vehicle/fence"),
     *("vehicle/mission/course.py", "vehicle/mission/payload_items.py", "vehicle/mission/progress.py"),
