@@ -58,7 +58,10 @@ REACHED: dict[str, Reach] = {
     "camera/exposure_time": Reach(
         "`ANAFI_CAMERA_EXPOSURE`.exposure_time", _ANAFI + "test_video_runs_while_a_stream_needs_its_metadata"
     ),
-    "camera/image": Reach("", waits=PAYLOAD),
+    "camera/image": Reach(
+        "`VIDEO_STREAM_INFORMATION`.uri, [RTSP](video.md)",
+        "conformance/test_conf_video.py::test_conf_091_each_uri_opens_once_its_stream_is_shown",
+    ),
     "camera/hfov": Reach("`ANAFI_CAMERA_EXPOSURE`.hfov", _ANAFI + "test_video_runs_while_a_stream_needs_its_metadata"),
     "camera/iso_gain": Reach(
         "`ANAFI_CAMERA_EXPOSURE`.iso", _ANAFI + "test_video_runs_while_a_stream_needs_its_metadata"
