@@ -14,8 +14,8 @@ from collections.abc import Mapping
 from typing import TypedDict
 
 from anafi_mav import texts, units
-from anafi_mav.drone import Aim, GimbalState
-from anafi_mav.drone.events import Axis, GimbalAttitudeChanged
+from anafi_mav.drone import Aim, GimbalAttitude, GimbalState
+from anafi_mav.drone.events import Axis, FrameOfReference, GimbalAttitudeChanged
 from anafi_mav.errors import AnafiMavError, LinkLost
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
@@ -34,11 +34,15 @@ from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
 from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
 
 STOPS = 4
 """Zero rates sent after a stop is confirmed. Targets are not acknowledged by the drone, and a gimbal that turns slowly
 looks as if it stood."""
+
+STANDS = 0.1
+"""deg between two reported attitudes of an axis that stands."""
 
 REPEATS = 3
 """Times that the angles of a message are sent again: the drone may have lost the first."""
@@ -85,6 +89,12 @@ class GimbalService(Service):
         """Stops the gimbal, and makes sure of it."""
         self._zeros = 0
         """Zero rates that are still to be sent."""
+        self._still: frozenset[Axis] = frozenset()
+        """Axes that an earlier rate may still turn, and the target in force does not aim."""
+        self._still_zeros = 0
+        """Zero rates of these that are still to be sent."""
+        self._seen: GimbalAttitude | None = None
+        """The attitude reported last."""
         self._repeat: tuple[Mapping[Axis, Aim], int, float] | None = None
         """Angles of a message, how often they are to be sent again, and when next."""
         self._ticked = math.inf
@@ -189,10 +199,25 @@ class GimbalService(Service):
         self._control = GimbalControl(self._heartbeats)
         self._roi.link_down()
         self._command = self._halt = self._repeat = None
-        self._zeros, self._neutral, self._status = 0, False, ()
+        self._zeros, self._still_zeros, self._still = 0, 0, frozenset()
+        self._neutral, self._status, self._seen = False, (), None
 
     def heartbeat(self, inbound: Inbound) -> None:
         self._heartbeats.receive((inbound.sysid, inbound.compid), inbound.now)
+
+    def subscriptions(self) -> Subscriptions:
+        return {GimbalAttitudeChanged: self._watch_still}
+
+    def _watch_still(self, message: GimbalAttitudeChanged, now: float) -> None:
+        """Send further zero rates while an axis that is to stand turns: earlier ones may be lost."""
+        last, attitude = self._seen, self.host.drone.gimbal.main.attitude
+        self._seen = attitude
+        if last is None or attitude is None:
+            return
+        for axis in self._still:
+            frame = attitude.frames[axis]
+            if abs(targets.wrap_180(attitude.angle(axis, frame) - last.angle(axis, frame))) > STANDS:
+                self._still_zeros = STOPS
 
     def tick(self, now: float) -> None:
         if (
@@ -221,7 +246,7 @@ class GimbalService(Service):
         """Give the gimbal to the mission that is flown while it needs it."""
         if self._control.mission(needs_gimbal=self.host.vehicle.mission_needs_gimbal) and self._control.is_of_mission:
             self._roi.forget_system()
-            turns = self._rates.end_unless(()) or self._halt is not None
+            turns = self._ends_turning()
             self._begin()
             self._neutral, self._zeros = False, STOPS if turns else 0  # soon: its first target may follow
 
@@ -245,8 +270,11 @@ class GimbalService(Service):
         """Repeat what the drone may have lost: rates in force, a stop, the angles of a message."""
         if self._command is not None or self._halt is not None:
             return  # they repeat it themselves
-        if self._rates.turns:
-            self._turn(self._rates.rates)
+        if self._rates.turns or self._still_zeros > 0:
+            self._turn({**self._zero_rates(), **self._rates.rates})
+            self._still_zeros = max(self._still_zeros - 1, 0)
+            if self._still_zeros == 0:
+                self._still = frozenset()
         elif self._zeros > 0:
             self._zeros -= 1
             self.host.drone.gimbal.halt()
@@ -335,11 +363,12 @@ class GimbalService(Service):
         target = target.on(gimbal.main.axes)
         if not (target.angles or target.rates or target.neutral):
             return  # yaw alone, of a gimbal without this axis
-        self._begin()
+        self._begin(target)
         task = self._command = asyncio.current_task()
         try:
             await self._roi.free_gimbal()
             self._neutral = target.neutral
+            self._turn(self._zero_rates())
             if target.rates:
                 self._rates.take(client, target.rates, self.host.clock.monotonic(), by_message=False)
             else:
@@ -363,8 +392,22 @@ class GimbalService(Service):
                 self._command = None
                 self._zeros = STOPS if target.is_zero_rate else 0
 
-    def _begin(self) -> None:
-        """End what moves the gimbal: a newer target replaces it."""
+    def _begin(self, target: GimbalTarget | None = None) -> None:
+        """End what moves the gimbal: a newer target replaces it.
+
+        The drone turns an axis until its next target. So zero rates are sent for axes that may turn and that the new
+        target does not aim; without one the drone aims the gimbal, or all axes are stopped.
+        """
+        turned = set(self._still) | self._rates.rates.keys()
+        if self._halt is not None or self._zeros > 0:
+            turned |= self.host.drone.gimbal.main.axes or frozenset()
+        if target is None or target.neutral:
+            still: frozenset[Axis] = frozenset()
+        else:
+            still = frozenset((turned - target.angles.keys() - target.rates.keys()) | target.held)
+        if not still <= self._still:
+            self._still_zeros = STOPS
+        self._still = still
         if self._command is not None and self._command is not asyncio.current_task():
             self._command.cancel()
             self._command = None
@@ -374,7 +417,14 @@ class GimbalService(Service):
         self._zeros, self._repeat = 0, None
 
     def _turn(self, rates: Mapping[Axis, Aim]) -> None:
-        self.host.drone.gimbal.turn(**_by_axis(rates))
+        if rates:
+            self.host.drone.gimbal.turn(**_by_axis(rates))
+
+    def _zero_rates(self) -> Mapping[Axis, Aim]:
+        """Return zero rates of the axes that are to stand, in the frames that they hold."""
+        attitude = self.host.drone.gimbal.main.attitude
+        frames = {} if attitude is None else attitude.frames
+        return {axis: Aim(0.0, frames.get(axis, FrameOfReference.RELATIVE)) for axis in self._still}
 
     def _stop_turning(self) -> None:
         """Stop the gimbal in the background, until the drone reports that it stands."""
@@ -462,9 +512,11 @@ class GimbalService(Service):
             return
         if not (target.angles or target.rates):
             return
-        before = self._rates.rates
-        self._begin()
+        before, still = self._rates.rates, self._still
+        self._begin(target)
         self._neutral = False
+        if not self._still <= still:
+            self._turn(self._zero_rates())
         if target.rates:
             self._rates.take(client, target.rates, now, by_message=True)
         else:
@@ -509,11 +561,15 @@ class GimbalService(Service):
 
     async def _rest(self) -> None:
         """End what moves the gimbal, before the drone aims it: a stop sent later could end that."""
-        turns = self._rates.end_unless(()) or self._halt is not None
+        turns = self._ends_turning()
         self._begin()
         self._neutral = False
         if turns:
             await self.host.drone.gimbal.stop()
+
+    def _ends_turning(self) -> bool:
+        """End the rates; return True when an axis may turn by one."""
+        return self._rates.end_unless(()) or self._halt is not None or bool(self._still)
 
     async def _look_at_system(self, command: Command) -> None:
         """Run MAV_CMD_DO_SET_ROI_SYSID: param1 system, param2 gimbal device."""
