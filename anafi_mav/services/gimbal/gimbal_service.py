@@ -15,7 +15,7 @@ from typing import TypedDict
 
 from anafi_mav import texts, units
 from anafi_mav.drone import Aim, GimbalAttitude, GimbalState
-from anafi_mav.drone.events import Axis, FrameOfReference, GimbalAttitudeChanged
+from anafi_mav.drone.events import Axis, FrameOfReference, GimbalAttitudeChanged, GimbalCalibrationState
 from anafi_mav.errors import AnafiMavError, LinkLost
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
@@ -336,6 +336,11 @@ class GimbalService(Service):
             return texts.GIMBAL_OF_MISSION
         return texts.GIMBAL_OF_CLIENT.fill(system=self._control.primary[0])
 
+    @property
+    def _calibrates(self) -> bool:
+        """True while the drone calibrates the gimbal and ignores targets."""
+        return self.host.drone.gimbal.main.calibration == GimbalCalibrationState.IN_PROGRESS
+
     # Angles and rates by command.
 
     async def _pitch_yaw(self, command: Command) -> None:
@@ -360,6 +365,8 @@ class GimbalService(Service):
         gimbal = self.host.drone.gimbal
         if gimbal.main.axes is None:
             raise Unsupported(texts.GIMBAL, texts.NO_GIMBAL)
+        if self._calibrates:
+            raise Refused(texts.GIMBAL, texts.GIMBAL_CALIBRATES)
         target = target.on(gimbal.main.axes)
         if not (target.angles or target.rates or target.neutral):
             return  # yaw alone, of a gimbal without this axis
@@ -471,6 +478,8 @@ class GimbalService(Service):
             reason = target
         elif not self._control.allows(client):
             reason = self._holder
+        elif self._calibrates:
+            reason = texts.GIMBAL_CALIBRATES
         if reason is not None or isinstance(target, str):
             self.host.warn_throttled(texts.REFUSED.fill(what=texts.GIMBAL, reason=reason))
             return
