@@ -166,9 +166,7 @@ class GimbalService(Service):
                 lambda vehicle, times: gimbal_messages.device_information(vehicle, gimbal(vehicle), times)
             ),
             dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS: MessageStream(
-                lambda vehicle, times: gimbal_messages.attitude_status(
-                    vehicle, gimbal(vehicle), times, neutral=self._neutral
-                ),
+                lambda vehicle, times: gimbal_messages.attitude_status(gimbal(vehicle), times, neutral=self._neutral),
                 attitude,
                 every=0.1,
                 from_pictures=True,
