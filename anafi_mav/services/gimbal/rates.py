@@ -104,9 +104,9 @@ class GimbalRates:
         """End the rates: an angle was commanded."""
         self._enter(RateEvent.TARGET)
 
-    def end_unless(self, allowed: Iterable[ClientId]) -> bool:
-        """End the rates unless their sender is one of these; True when that stops the gimbal."""
-        if self.client is None or self.client in allowed:
+    def end(self) -> bool:
+        """End the rates; True when that stops the gimbal."""
+        if self.client is None:
             return False
         self._enter(RateEvent.CONTROL)
         return True

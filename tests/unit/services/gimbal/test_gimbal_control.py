@@ -170,8 +170,8 @@ def test_rate_ends_by_each_other_event(end: str) -> None:
     elif end == "limit":
         assert turning.limit([Axis.PITCH])
     else:
-        assert not turning.end_unless([STATION])
-        assert turning.end_unless([PROGRAM])
+        assert turning.end()
+        assert not turning.end()
     assert (turning.turns, turning.client, turning.rates) == (False, None, {})
 
 
