@@ -1,8 +1,8 @@
 """Gimbal manager of component 1 (MAVLink gimbal_v2.md, device id 1), and older mounts.
 
 `control` decides which client may move the gimbal, `targets` reads angles and rates, `motion` carries them out, `rates`
-ends a rate, `roi` looks at places. A command is ACCEPTED when the drone reports that the gimbal turns as commanded, or has arrived:
-stations send the next command after the acknowledgement, and operators turn on before the gimbal rests.
+ends a rate, `roi` looks at places. A command is ACCEPTED when the drone reports that the gimbal turns as commanded, or
+has arrived: stations send the next command after the acknowledgement, and operators turn on before the gimbal rests.
 """
 
 from __future__ import annotations
