@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Coroutine, Hashable, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Protocol
 
 from anafi_mav.clock import Clock
@@ -54,6 +55,7 @@ class ComponentSystem(Protocol):
     vehicle: Vehicle
     clock: Clock
     memory: Memory
+    download_folder: Path | None
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -96,6 +98,7 @@ class Component:
         self.vehicle = system.vehicle
         self.clock = system.clock
         self.memory = system.memory
+        self.download_folder = system.download_folder
         self._system = system
         self.commands = CommandService(self)
         self.messages = MessageService(self)

@@ -36,6 +36,7 @@ from anafi_mav.services.ground_station.node_status_service import NodeStatusServ
 from anafi_mav.services.ground_station.shell_service import ShellService
 from anafi_mav.services.ground_station.time_service import TimeService
 from anafi_mav.services.ground_station.tune_service import TuneService
+from anafi_mav.services.media.download_service import DownloadService
 from anafi_mav.services.media.media_service import MediaService
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.monitor import takeoff_point_service
@@ -105,7 +106,7 @@ AUTOPILOT_SERVICES: tuple[type[Service], ...] = (
 )
 """Services of component 1, beside commands, messages and files themselves."""
 
-CAMERA_SERVICES: tuple[type[Service], ...] = (MediaService,)
+CAMERA_SERVICES: tuple[type[Service], ...] = (MediaService, DownloadService)
 """Services of component 100."""
 
 AUTOPILOT = dialect.MAV_COMP_ID_AUTOPILOT1
@@ -149,11 +150,14 @@ class System:
         *,
         allow_kill: bool,
         state: Path | None = None,
+        download_folder: Path | None = None,
     ) -> None:
+        """`state`: folder of stored state. `download_folder`: for copies of the drone's media after a landing."""
         self.sysid = sysid
         self.drone = drone
         self.clock = clock
         self.memory = Memory(state)
+        self.download_folder = download_folder
         self.active = False
         self._node = node
         self._started = started

@@ -67,7 +67,7 @@ class MediaFolder:
             async for piece in pieces:
                 crc = crc32(piece, crc)
                 digest.update(piece)
-        md5 = await known_md5(self._drone, resource)
+        md5 = await self._drone.media.known_md5(resource)
         if md5 is not None and digest.hexdigest() != md5:
             raise FileRefused(FileError.FAIL, texts.FILE_DAMAGED)
         return crc
@@ -112,14 +112,6 @@ def when_listed(drone: Drone, then: Callable[[Listing], T]) -> T | Awaitable[T]:
 async def _after_listing(drone: Drone, then: Callable[[Listing], T]) -> T:
     with refusing():
         return then(await drone.media.listing())
-
-
-async def known_md5(drone: Drone, resource: Resource) -> str | None:
-    """Return the MD5 of a file; None when the drone has none."""
-    try:
-        return await drone.media.md5(resource)
-    except AnafiMavError:
-        return None
 
 
 def find(listing: Listing, path: str) -> Resource:
