@@ -39,22 +39,26 @@ class Alarm:
     Setting it again replaces the time set before.
     """
 
-    __slots__ = ("_call", "_handle")
+    __slots__ = ("_call", "_handle", "at")
 
     def __init__(self, call: Callable[[], None]) -> None:
         """`call` may set the alarm again."""
         self._call = call
         self._handle: asyncio.TimerHandle | None = None
+        self.at: float | None = None
+        """When it calls (s, loop clock); None after a cancellation or the call."""
 
     @property
     def is_set(self) -> bool:
         """True until it is cancelled or has called."""
-        return self._handle is not None
+        return self.at is not None
 
     def set(self, at: float) -> None:
         """Call at this time (s, loop clock), or as soon as possible when it has passed."""
-        self.cancel()
+        if self._handle is not None:
+            self._handle.cancel()
         self._handle = asyncio.get_running_loop().call_at(at, self._fire)
+        self.at = at
 
     def set_in(self, seconds: float) -> None:
         """Call after this many seconds."""
@@ -64,8 +68,8 @@ class Alarm:
         """Do not call. Cancelling twice does no harm."""
         if self._handle is not None:
             self._handle.cancel()
-            self._handle = None
+            self._handle = self.at = None
 
     def _fire(self) -> None:
-        self._handle = None
+        self._handle = self.at = None
         self._call()

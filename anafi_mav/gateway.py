@@ -29,6 +29,8 @@ from anafi_mav.drone.rest import HTTP_PORT
 from anafi_mav.errors import AnafiMavError, ConfigError, HandshakeRefused
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Node
+from anafi_mav.relay.server import RelayServer
+from anafi_mav.relay.source import DroneSource
 from anafi_mav.services.flavours import FLAVOURS
 from anafi_mav.services.system import System
 from anafi_mav.state_lock import FILE, NO_LOCKS, HeldDrone, Holder, StateLock, state_folder
@@ -210,6 +212,8 @@ class Gateway:
         self.config = config
         self._clock: Clock = clock or SystemClock()
         self._node = Node(on_channel=self._on_channel, clock=self._clock, flavours=tuple(FLAVOURS))
+        self.relay = RelayServer(config.video.host, config.video.rtsp_port, self._clock)
+        """The video server."""
         self._supervised: list[_Supervised] = []
         self._state: Path | None = None
         self._lock: StateLock | None = None
@@ -232,7 +236,7 @@ class Gateway:
         await self.close()
 
     async def open(self) -> None:
-        """Lock the state folder, open every endpoint and the web server.
+        """Lock the state folder, open every endpoint, the video and the web server.
 
         Raises `ConfigError`; nothing is then left open or locked.
 
@@ -245,9 +249,11 @@ class Gateway:
         self._lock_state()
         try:
             await self._node.start(self.config.endpoints)
+            await self.relay.start()
             if self.web is not None:
                 await self.web.start()
         except BaseException:
+            await self.relay.close()
             await self._node.close()
             self._unlock_state()
             raise
@@ -312,7 +318,9 @@ class Gateway:
                 allow_kill=allow_kill,
                 state=self._state,
                 download_folder=download_folder(self.config.media),
+                has_picture_pose=self.config.pose == "video",
             )
+            self.relay.add(DroneSource(config.sysid, config.name, drone))
             supervised = _Supervised(config, drone, system, self._write_lock)
             supervised.task = asyncio.get_running_loop().create_task(supervised.run())
             self._supervised.append(supervised)
@@ -336,6 +344,7 @@ class Gateway:
         Clients are not heard any more, or one of them would fly on what has just been stopped.
         """
         self._node.stop_delivering()
+        await self.relay.close()
         await asyncio.gather(*(self._leave(s) for s in self._supervised))
         self._supervised.clear()
         if self.web is not None:
@@ -366,9 +375,10 @@ class Gateway:
         return next((supervised.drone for supervised in self._supervised if supervised.config.sysid == sysid), None)
 
     def lines(self) -> list[str]:
-        """One line per drone and per endpoint, and one for the web server."""
+        """One line per drone and per endpoint, one for the video and one for the web server."""
         lines = [s.line() for s in self._supervised]
         lines += [f"endpoint {endpoint.describe()}" for endpoint in self._node.endpoints]
+        lines.append(f"video {self.relay.describe()}")
         return lines if self.web is None else [*lines, f"web page {self.web.describe()}"]
 
     def counters(self) -> Counter[str]:

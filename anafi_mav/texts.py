@@ -115,6 +115,7 @@ DISARM = Subject("Disarm")
 FENCE = Subject("Fence")
 FLIGHT_COMMAND = Subject("Command")
 FOLLOW = Subject("Follow")
+GIMBAL = Subject("Gimbal")
 GOTO = Subject("Goto")
 HEIGHT = Subject("Height")
 HOME = Subject("Home")
@@ -205,6 +206,8 @@ ANOTHER_CLIENT_TRANSFERS = Reason("another client transfers")
 STICKS_DO_NOT_ARM = Reason("arm by command")
 NOTHING_PAUSED = Reason("nothing paused, or replaced")
 OTHER_STICKS = Reason("another joystick flies")
+GIMBAL_OF_CLIENT = ReasonTemplate("system {system} has control", system=255)
+GIMBAL_OF_MISSION = Reason("mission has control")
 
 # == Reasons: parameters of commands ==
 
@@ -231,6 +234,15 @@ BAD_LATITUDE = Reason("latitude out of range")
 BAD_LONGITUDE = Reason("longitude out of range")
 NO_PLACE = Reason("no position given")
 ROI_KINDS = Reason("only a location or none")
+NO_SUCH_GIMBAL = ReasonTemplate("no gimbal {number:g}", number=-1.23457e-38)
+NO_GIMBAL = Reason("drone reports no gimbal")
+NO_RETRACT = Reason("cannot retract")
+TWO_YAW_FRAMES = Reason("both yaw frame flags")
+GIMBAL_ANGLE = Reason("angle beyond 360 deg")
+GIMBAL_RATE = Reason("rate beyond 1000 deg/s")
+GIMBAL_SHARE = Reason("share beyond -1 to 1")
+GIMBAL_IDS = Reason("param1-4 are no client ids")
+GIMBAL_MODE = ReasonTemplate("mount mode {mode:g} unsupported", mode=255)
 FRAME_UNSUPPORTED = ReasonTemplate("frame {frame} unsupported", frame=255)
 TERRAIN_UNSUPPORTED = ReasonTemplate("terrain frame {frame} unsupported", frame=11)
 LATITUDE_LONGITUDE_NUMBERS = Reason("latitude or longitude missing")
@@ -393,6 +405,17 @@ ORBIT_SLOWED = Template(
     speed=9.9, asked=99.9, limit="unverified roll", tilt=40,
 )  # fmt: skip
 
+# == Gimbal ==
+
+GIMBAL_RELEASED = Template("Gimbal free: system {system} is silent", system=255)
+GIMBAL_STOPPED = Template("Gimbal stopped: {reason}", reason="r" * REASON_BYTES)
+RATE_CLIENT_SILENT = ReasonTemplate("system {system} is silent", system=255)
+GIMBAL_STOP_FAILED = Template("Gimbal stop not confirmed: {error}", error=BELOW)
+ROI_LOST = Template("ROI kept: no position of system {system}", system=255)
+ROI_ENDED = Template("ROI ended: {reason}", reason="r" * REASON_BYTES)
+ROI_NO_SYSTEM = ReasonTemplate("no position of system {system:g}", system=255)
+ROI_NO_WAYPOINT = Reason("no waypoint is flown to")
+
 # == Mission ==
 
 MISSION_NOT_STARTED = Template("Mission not started: {reason}", reason="not armed within 10 s")
@@ -543,7 +566,6 @@ FILE_DAMAGED = OperatorText("File damaged: MD5 is not the drone's")
 MEDIA_COPIED = Template("Media copied: {count} files", count=99999)
 MEDIA_NOT_COPIED = Template("Media not copied: {error}", error=BELOW)
 DELETE = Subject("Delete")
-CAMERA_RECORDING = Reason("camera is recording")
 CAMERA_SAVING = Reason("camera is saving photos")
 
 # == Ground stations ==
@@ -563,6 +585,7 @@ BANNER_DRONE = Template(
 TUNE_REFUSED = OperatorText("Tune refused: drone is not on the ground")
 TUNE_FAILED = Template("Tune not played: {error}", error=BELOW)
 NO_EXPOSURE = Template("Exposure unknown: no video: {error}", error=BELOW)
+NO_PICTURES = Template("Pose from events: no video: {error}", error=BELOW)
 
 # == Parameters ==
 
@@ -570,6 +593,10 @@ PARAMETER_NOT_SET = Template("{name} not set: {reason}", name="N" * 16, reason="
 WRONG_TYPE = Reason("wrong type")
 READ_ONLY = Reason("read only")
 OUT_OF_RANGE = Reason("out of range")
+CAMERA_RECORDS = Reason("camera is recording")
+CAMERA_TAKES_PHOTOS = Reason("camera takes photos")
+MISSION_USES_CAMERA = Reason("mission uses camera")
+VALUE_KEPT = Reason("drone keeps its value")
 RTL_ALT_FINAL = Template("RTL_ALT_FINAL: hovers at {height:.0f} m (ANF_RTH_END_ALT)", height=99)
 
 # == Warnings of the drone ==

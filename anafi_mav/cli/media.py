@@ -79,7 +79,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the action. Raises `ConfigError` for a wrong option, other errors of ours when the drone is out of reach."""
+    """Run the action.
+
+    Raises `ConfigError` for a wrong option, other errors of ours when the drone is out of reach.
+    """
     log.set_up(logging.ERROR)
     module = importlib.import_module("anafi_mav.cli.media_transfer")
     action = cast(Callable[[argparse.Namespace], asyncio.Future[int]], getattr(module, f"{arguments.action}_media"))

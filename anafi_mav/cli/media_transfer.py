@@ -84,7 +84,10 @@ async def delete_media(arguments: argparse.Namespace) -> int:
 
 
 def _chosen(items: Sequence[MediaItem], names: Sequence[str]) -> list[Resource]:
-    """Return the files with these names or days, oldest first. Raises `ConfigError` for a name that none has."""
+    """Return the files with these names or days, oldest first.
+
+    Raises `ConfigError` for a name that no file has.
+    """
     files = [
         file for day in by_day([file for item in items for file in item.resources]).values() for file in day.values()
     ]

@@ -13,3 +13,4 @@ from anafi_mav.config.schema import DroneConfig as DroneConfig
 from anafi_mav.config.schema import HttpConfig as HttpConfig
 from anafi_mav.config.schema import MediaConfig as MediaConfig
 from anafi_mav.config.schema import SimConfig as SimConfig
+from anafi_mav.config.schema import VideoConfig as VideoConfig

@@ -17,7 +17,7 @@ from typing import Any
 import msgspec
 
 from anafi_mav import documents, models
-from anafi_mav.config.schema import MAVSDK_SYSID, Config, DroneConfig, HttpConfig, SimConfig, alternatives
+from anafi_mav.config.schema import MAVSDK_SYSID, Config, DroneConfig, HttpConfig, SimConfig, VideoConfig, alternatives
 from anafi_mav.errors import ConfigError
 
 _HOST_NAME = re.compile(r"(?!-)[A-Za-z0-9-]{1,63}(?<!-)(\.(?!-)[A-Za-z0-9-]{1,63}(?<!-))*\.?")
@@ -205,6 +205,10 @@ def _contradictions(config: Config) -> Iterator[tuple[str, str]]:
     http = config.http_server
     if http is not None and not _is_host(http.host):
         yield "http.host", _wrong(HttpConfig, "host", http.host)
+    for key in ("host", "public_host"):
+        host = getattr(config.video, key)
+        if host is not None and not _is_host(host):
+            yield f"video.{key}", _wrong(VideoConfig, key, host)
     yield from _agree("speed", {path: sim.speed for path, sim in simulated.items()})
     yield from _agree("seed", {path: sim.seed for path, sim in simulated.items() if sim.seed is not None})
 

@@ -301,6 +301,40 @@ class MediaConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     ] = None
 
 
+class VideoConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The gateway's video server (RTSP), which passes on the live video of every drone.
+
+    It has no password.
+    """
+
+    host: Annotated[
+        str,
+        Meta(
+            min_length=1,
+            max_length=MAX_TEXT,
+            description="The address that it listens on: 127.0.0.1 for this computer alone, 0.0.0.0 for every network "
+            "that this computer is in.",
+            extra=expected("an IPv4 address or a host name of this computer, like 0.0.0.0"),
+        ),
+    ] = "127.0.0.1"
+    rtsp_port: Annotated[
+        Annotated[int, Meta(ge=0, le=65535)] | None,
+        Meta(
+            description="Its TCP port; 0 is a free one. Left out: 8555, or a free one where that is in use. The "
+            "gateway prints it.",
+            extra=expected("a port from 0 to 65535"),
+        ),
+    ] = None
+    public_host: Annotated[
+        Annotated[str, Meta(min_length=1, max_length=64)] | None,
+        Meta(
+            description="The host in the URIs that stations receive, where it is not the address that their link "
+            "shows: behind NAT, in a container, or for stations on serial lines.",
+            extra=expected("an IPv4 address or a host name, like 10.0.0.7"),
+        ),
+    ] = None
+
+
 class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The whole file.
 
@@ -338,6 +372,15 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             extra=expected("true or false"),
         ),
     ] = False
+    pose: Annotated[
+        Literal["video", "events"],
+        Meta(
+            description="Source of attitude, position and speed for a client that requests them more than ten times a "
+            "second: the metadata of the live video, up to 30 times a second, or the drone's events, 5 times a second. "
+            "The video costs the radio some Mbit/s while such a client has its streams.",
+            extra=expected("video or events"),
+        ),
+    ] = "video"
     state: Annotated[
         Annotated[str, Meta(min_length=1, max_length=MAX_PATH)] | None,
         Meta(
@@ -360,6 +403,13 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             extra=expected("a mapping like {host: 127.0.0.1, port: 8088}, or off"),
         ),
     ] = HttpConfig()
+    video: Annotated[
+        VideoConfig,
+        Meta(
+            description="The gateway's video server.",
+            extra=expected("a mapping like {host: 0.0.0.0, rtsp_port: 8555}"),
+        ),
+    ] = VideoConfig()
 
     @property
     def http_server(self) -> HttpConfig | None:
@@ -376,5 +426,6 @@ SECTIONS: dict[str, type[msgspec.Struct]] = {
     "drones[…].sim.wind": WindConfig,
     "media": MediaConfig,
     "http": HttpConfig,
+    "video": VideoConfig,
 }
 """Place in the file of each group of keys, in the order of the manual."""

@@ -70,6 +70,7 @@ from anafi_mav.arsdk.messages.flight_plan import WaypointSkipped as WaypointSkip
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.arsdk.messages.gimbal import Attitude as GimbalAttitudeChanged
 from anafi_mav.arsdk.messages.gimbal import Axis as Axis
+from anafi_mav.arsdk.messages.gimbal import Error as GimbalError
 from anafi_mav.arsdk.messages.gimbal import FrameOfReference as FrameOfReference
 from anafi_mav.arsdk.messages.gimbal import GimbalCalibrationState as GimbalCalibrationState
 from anafi_mav.arsdk.messages.gimbal import MaxSpeed as GimbalMaxSpeed
@@ -99,10 +100,13 @@ from anafi_mav.arsdk.messages.rth import StateReason as ReturnReason
 from anafi_mav.arsdk.messages.rth import TakeoffLocation as TakeoffLocation
 from anafi_mav.arsdk.messages.skyctrl import AttitudeChanged as ControllerAttitudeChanged
 from anafi_mav.arsdk.messages.skyctrl import PilotingSource as PilotingSource
+from anafi_mav.arsdk.messages.thermal import ColorizationMode as ColorizationMode
 from anafi_mav.arsdk.messages.thermal import PaletteMode as PaletteMode
 from anafi_mav.arsdk.messages.thermal import Range as ThermalSensitivity
+from anafi_mav.arsdk.messages.thermal import RelativeRangeMode as RelativeRangeMode
 from anafi_mav.arsdk.messages.thermal import RenderingMode as RenderingMode
 from anafi_mav.arsdk.messages.thermal import ShutterTrigger as ShutterTrigger
+from anafi_mav.arsdk.messages.thermal import SpotType as SpotType
 from anafi_mav.arsdk.messages.thermal import ThermalMode as ThermalMode
 from anafi_mav.arsdk.messages.user_storage import FormattingType as FormattingType
 from anafi_mav.arsdk.messages.user_storage import FsState as FsState
@@ -143,6 +147,7 @@ __all__ = [
     "GPSFixStateChanged",
     "GimbalAttitudeChanged",
     "GimbalCalibrationState",
+    "GimbalError",
     "GimbalMaxSpeed",
     "GpsLocationChanged",
     "GrabAxisEvent",

@@ -7,14 +7,16 @@ their sink.
 from __future__ import annotations
 
 import asyncio
+import ipaddress
 import logging
 import os
 import re
+import socket
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 from anafi_mav.clock import Clock
 from anafi_mav.mavlink.channel import QUEUE_BYTES, Channel
@@ -190,6 +192,7 @@ class StreamPeer(asyncio.Protocol):
         # Duck-typed by pyserial-asyncio-fast's transport, too.
         assert hasattr(transport, "set_write_buffer_limits")
         self._transport = transport  # type: ignore[assignment]
+        self.channel.local_host = seen_host(transport.get_extra_info("sockname"), transport.get_extra_info("peername"))
         transport.set_write_buffer_limits(high=self._write_ahead)
         self._sink.opened(self.channel)
 
@@ -227,6 +230,30 @@ def reason(error: Exception) -> str:
     number = getattr(error, "errno", None)
     # Name resolution numbers its errors below 0 and has its own text.
     return os.strerror(number) if number is not None and number > 0 else getattr(error, "strerror", "") or str(error)
+
+
+def seen_host(own: Any, peer: Any) -> str | None:
+    """Return this computer's address as a peer sees it, from the two socket addresses.
+
+    A loopback address for a peer on this computer; None where there are no addresses.
+    """
+    if not own or not peer or isinstance(own, str) or isinstance(peer, str):
+        return None
+    here, there = str(own[0]).partition("%")[0], str(peer[0]).partition("%")[0]
+    if here != there:
+        return here
+    return here if ipaddress.ip_address(here).is_loopback else "127.0.0.1"
+
+
+def routed_host(peer: Any) -> str | None:
+    """Return this computer's address as a peer sees it, by the route to it. Nothing is sent."""
+    family = socket.AF_INET6 if ":" in str(peer[0]) else socket.AF_INET
+    try:
+        with socket.socket(family, socket.SOCK_DGRAM) as probe:
+            probe.connect(peer)
+            return seen_host(probe.getsockname(), peer)
+    except OSError:
+        return None
 
 
 async def close_peers(peers: Iterable[StreamPeer]) -> None:

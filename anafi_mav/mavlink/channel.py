@@ -46,6 +46,9 @@ class Channel:
         """The autopilot that clients of this endpoint want to see; None: as configured for all."""
         self.bytes_per_second = bytes_per_second
         """Capacity of the line, None when it is not limited."""
+        self.local_host: str | None = None
+        """This computer's address as the peer sees it, for the URIs that it is sent: a loopback address for a peer on
+        this computer, None for a line without addresses."""
         self.counters: Counter[str] = Counter()
         """sent_frames, dropped_frames (queue full, or sent after the channel had closed)."""
         self.sent_bytes = 0

@@ -143,7 +143,7 @@ class Node:
         `give_way`: a full channel drops this before an answer, because the next one of its kind replaces it. Raises
         `LocalProtocolError` for a field that does not fit; nothing is then sent to anybody.
         """
-        self._router.spoke(sysid, compid)
+        self._router.own_sources.add((sysid, compid))
         packed = pack(message)
         if isinstance(to, Channel):
             to.send_packed(packed, sysid, compid, give_way=give_way)

@@ -51,7 +51,8 @@ class Router(Generic[KeyT, HostT]):
         self._channels: dict[KeyT, set[tuple[int, int]]] = {}
         self._hosts: dict[int, dict[int, HostT]] = {}
         """Our hosts by system and component, in that order."""
-        self._spoken: set[tuple[int, int]] = set()
+        self.own_sources: set[tuple[int, int]] = set()
+        """Systems and components in whose name we have sent: frames from them are echoes, and not learned from."""
         self._recent: OrderedDict[bytes, float] = OrderedDict()
 
     def add(self, channel: KeyT) -> None:
@@ -85,10 +86,6 @@ class Router(Generic[KeyT, HostT]):
         found = [hosts.get(component, hosts.get(EVERY_COMPONENT)) for hosts in systems.values()]
         return tuple([host for host in found if host is not None])
 
-    def spoke(self, sysid: int, compid: int) -> None:
-        """We send in this name: frames in it that come in are echoes, and not learned from."""
-        self._spoken.add((sysid, compid))
-
     def heard_on(self, sysid: int, compid: int | None = None) -> list[KeyT]:
         """The channels on which this system, or this component of it, has been heard."""
         channels = self._channels.items()
@@ -99,7 +96,7 @@ class Router(Generic[KeyT, HostT]):
     def route(self, channel: KeyT, received: ReceivedFrame, now: float) -> Route[KeyT, HostT]:
         """Return the destinations of a frame from this channel, and learn its source."""
         source = (received.sysid, received.compid)
-        if source in self._spoken:
+        if source in self.own_sources:
             self.counters["own_sources"] += 1
             return Route((), ())
         # 0 is the address of all, nobody's name.

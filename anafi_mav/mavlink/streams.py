@@ -16,6 +16,9 @@ ChannelT = TypeVar("ChannelT")
 
 _NEVER = float("inf")
 
+MAX_AUDIENCES = 4
+"""Lists of channels that are asked about in turn: all, those with events, those with pictures, and one that changes."""
+
 MAX_GROUPS = 256
 """Groups of messages that are asked about together, and of which it is remembered when one is due next."""
 
@@ -54,6 +57,19 @@ class _Lane(Generic[ChannelT]):
         self.until = -_NEVER
 
 
+class _Audience(Generic[ChannelT]):
+    """Channels that are asked about together, and what is known of them."""
+
+    __slots__ = ("channels", "lanes", "quiet")
+
+    def __init__(self, channels: Sequence[ChannelT]) -> None:
+        self.channels = channels
+        self.lanes: dict[int, _Lane[ChannelT]] = {}
+        self.quiet: dict[tuple[int, ...], float] = {}
+        """Messages asked about together -> until when none of them is due: this alone answers most questions of a
+        fast drone."""
+
+
 class Streams(Generic[ChannelT]):
     """The intervals of one vehicle's messages on every channel.
 
@@ -72,12 +88,7 @@ class Streams(Generic[ChannelT]):
         self._defaults = dict(defaults)
         self._without = without
         self._channels: WeakKeyDictionary[ChannelT, dict[int, _Stream]] = WeakKeyDictionary()
-        self._asked: Sequence[ChannelT] = ()
-        """The channels last asked about, to which the next two belong."""
-        self._lanes: dict[int, _Lane[ChannelT]] = {}
-        self._quiet: dict[tuple[int, ...], float] = {}
-        """Messages asked about together -> until when none of them is due: this alone answers most questions of a
-        fast drone."""
+        self._audiences: list[_Audience[ChannelT]] = []
 
     def interval(self, channel: ChannelT, id: int) -> float | None:
         """Seconds between two messages on this channel; None: not streamed."""
@@ -107,16 +118,13 @@ class Streams(Generic[ChannelT]):
 
         A list of channels that has changed must be another object, as `Node.channels` is.
         """
-        if channels is not self._asked:
-            self._asked = channels
-            self._lanes.clear()
-            self._quiet.clear()
-        elif now < self._quiet.get(ids, -_NEVER):
+        audience = self._audience(channels)
+        if now < audience.quiet.get(ids, -_NEVER):
             return []
         found: list[tuple[int, list[ChannelT]]] = []
         soonest = _NEVER
         for id in ids:
-            lane = self._lanes.get(id) or self._new_lane(id)
+            lane = audience.lanes.get(id) or self._new_lane(audience, id)
             if now >= lane.until:
                 due = [channel for channel, stream in lane.streams if stream.due(now)]
                 lane.until = min((stream.next for _, stream in lane.streams), default=_NEVER)
@@ -124,9 +132,9 @@ class Streams(Generic[ChannelT]):
                     found.append((id, due))
             if lane.until < soonest:
                 soonest = lane.until
-        if len(self._quiet) >= MAX_GROUPS:
-            self._quiet.clear()
-        self._quiet[ids] = soonest
+        if len(audience.quiet) >= MAX_GROUPS:
+            audience.quiet.clear()
+        audience.quiet[ids] = soonest
         return found
 
     def due(self, channel: ChannelT, id: int, now: float) -> bool:
@@ -134,13 +142,26 @@ class Streams(Generic[ChannelT]):
         self._forget(id)
         return self._stream(channel, id).due(now)
 
+    def channel_closed(self) -> None:
+        """Forget the lists of channels, which keep the closed one alive."""
+        self._audiences.clear()
+
     def _forget(self, id: int) -> None:
         """Something about this message has changed."""
-        self._lanes.pop(id, None)
-        self._quiet.clear()
+        for audience in self._audiences:
+            audience.lanes.pop(id, None)
+            audience.quiet.clear()
 
-    def _new_lane(self, id: int) -> _Lane[ChannelT]:
-        lane = self._lanes[id] = _Lane([(channel, self._stream(channel, id)) for channel in self._asked])
+    def _audience(self, channels: Sequence[ChannelT]) -> _Audience[ChannelT]:
+        for audience in self._audiences:
+            if audience.channels is channels:
+                return audience
+        audience = _Audience(channels)
+        self._audiences = [audience, *self._audiences[: MAX_AUDIENCES - 1]]
+        return audience
+
+    def _new_lane(self, audience: _Audience[ChannelT], id: int) -> _Lane[ChannelT]:
+        lane = audience.lanes[id] = _Lane([(channel, self._stream(channel, id)) for channel in audience.channels])
         return lane
 
     def _stream(self, channel: ChannelT, id: int) -> _Stream:

@@ -21,6 +21,8 @@ from anafi_mav.mavlink.base import (
     Outbox,
     Sink,
     reason,
+    routed_host,
+    seen_host,
 )
 from anafi_mav.mavlink.channel import Channel
 
@@ -142,6 +144,9 @@ class UdpOut(Endpoint):
         self._transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
             lambda: _Datagrams(self._received, self._failed, self._paused), remote_addr=address
         )
+        self.channel.local_host = seen_host(
+            self._transport.get_extra_info("sockname"), self._transport.get_extra_info("peername")
+        )
         self._problem = ""
 
     def _write(self, raw: bytes) -> None:
@@ -253,6 +258,7 @@ class UdpIn(Endpoint):
             outbox = Outbox(self._writer(address), _datagram_limit(self.parsed))
             channel = Channel(f"{self.url} from {address[0]}:{address[1]}", outbox.add, datagrams=True)
             channel.flavour = self.parsed.flavour
+            channel.local_host = routed_host(address)
             frames = channel.receive(data)
             if not frames:
                 self.counters.update(channel.parser.counters)

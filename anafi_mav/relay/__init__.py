@@ -1,1 +1,1 @@
-"""RTSP relay: the live video of each drone, from one session at the drone to any number of viewers."""
+"""RTSP relay: the live video of a drone, from one session to many viewers."""

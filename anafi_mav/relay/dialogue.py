@@ -1,4 +1,4 @@
-"""One viewer's RTSP connection: which requests are valid, and their responses. No I/O.
+"""One viewer's RTSP connection: valid requests and their responses. No I/O.
 
 `judge` takes a request and returns what is to be done for it; the response is made when that is done. A connection has
 one session at most, which ends with it, and a session has one stream: each stream is its own URI.
@@ -158,7 +158,10 @@ class ViewerDialogue:
         return self._response(request, (("Transport", rtsp.format_transport(transport)), self._session_header()))
 
     def playing(self, request: RtspRequest, start: tuple[int, int] | None) -> Response:
-        """Return the response to PLAY; `start` is sequence number and timestamp of the first packet, if known."""
+        """Return the response to PLAY.
+
+        `start` is sequence number and timestamp of the first packet, if known.
+        """
         self.state = TRANSITIONS[self.state]["PLAY"]
         info = RtpInfo(self._url, *(start or (None, None)))
         headers = (
@@ -189,7 +192,7 @@ class ViewerDialogue:
 
 
 def stream_path(uri: str) -> tuple[str, ...]:
-    """Return the parts of a stream's path, without the name of its track; empty when there is none."""
+    """Return the parts of a stream's path, without its track; empty when there is none."""
     url = rtsp.split_url(uri)
     if url is None or len(url[2]) > MAX_PATH:
         return ()
@@ -198,7 +201,7 @@ def stream_path(uri: str) -> tuple[str, ...]:
 
 
 def _usable(header: str) -> tuple[RtspTransport, ...]:
-    """Return the transports of a header that can be used: UDP to given ports, or inside the connection."""
+    """Return the usable transports of a header: UDP to given ports, or inside the connection."""
     usable = []
     for offer in rtsp.parse_transport(header):
         if offer.lower == "UDP" and offer.unicast and offer.client_ports is not None:

@@ -1,4 +1,4 @@
-"""Pictures of one stream as packets for its viewers, and what one viewer gets of them. No I/O.
+"""Pictures of one stream as packets for its viewers. No I/O.
 
 A picture is packed once. Its packets are the same for every viewer that has missed none; the others' are numbered
 again, so that a player sees no gap in the numbers and waits for nothing. Pictures are passed on whole or not at all.
@@ -99,7 +99,7 @@ class Feed:
         self._at = 0.0
         """Arrival of the newest picture."""
         self._offset: int | None = None
-        """From the drone's timestamps to ours; None: anew at the next picture."""
+        """From the drone's timestamps to ours; None: set at the next picture."""
         self._kept: deque[PackedPicture] = deque()
         self._kept_bytes = 0
 
@@ -153,7 +153,7 @@ class Feed:
         return self._encode(split_units([self.sps, self.pps]), sequence, timestamp, ends=False)
 
     def report(self, now: float, time: float, packets: int, octets: int) -> SenderReport:
-        """Return the sender report of a viewer's packets; `time` is the moment `now` in s since 1970."""
+        """Return the sender report of a viewer's packets; `time` is `now` in s since 1970."""
         timestamp = self._timestamp + round((now - self._at) * CLOCK_RATE)
         return SenderReport(self.ssrc, round(time * 1e6), timestamp & _WRAP32, packets & _WRAP32, octets & _WRAP32)
 
@@ -163,7 +163,7 @@ class Feed:
         return format_description(SessionDescription(name=name, tool=tool, control="*", media=(media,)))
 
     def _time(self, timestamp: int, now: float) -> int:
-        """Return our timestamp of a picture: the drone's own steps, without the jumps of its restarts."""
+        """Return our timestamp of a picture: the drone's steps without the jumps of its restarts."""
         due = self._timestamp + round((now - self._at) * CLOCK_RATE) if self._at else self._timestamp
         if self._offset is not None:
             ours = timestamp + self._offset & _WRAP32
@@ -212,7 +212,7 @@ class Feed:
 
 
 class FeedReader:
-    """One viewer's part of a feed: where it begins, what it misses, and the numbers of its packets."""
+    """One viewer's part of a feed: its beginning, the pictures it misses, its packet numbers."""
 
     def __init__(self, feed: Feed) -> None:
         self.counts: Counter[str] = Counter()
@@ -231,7 +231,7 @@ class FeedReader:
 
     @property
     def start(self) -> tuple[int, int] | None:
-        """Return sequence number and timestamp of the first packet of `begin`; None when that has none."""
+        """Return sequence number and timestamp of the first packet of `begin`, or None."""
         kept = self._feed.kept
         return (kept[0].sequence, self._burst_time(0)) if kept else None
 
@@ -248,9 +248,9 @@ class FeedReader:
         return list(self._sent(datagrams))
 
     def take(self, picture: PackedPicture, waiting: int, now: float) -> Sequence[bytes]:
-        """Return the datagrams of a new picture for this viewer, for which `waiting` bytes wait; or none.
+        """Return the datagrams of a new picture for this viewer, or none.
 
-        The picture's own where they fit as they are.
+        `waiting` bytes wait for it already. The datagrams are the picture's own where they fit as they are.
         """
         if waiting > MAX_WAITING and not self._is_slow:
             self._is_slow = self._awaits_entry = True

@@ -80,7 +80,7 @@ class _Reports(asyncio.DatagramProtocol):
 
 
 class UdpOutlet:
-    """Two sockets, RTP and RTCP, to the host that the RTSP connection comes from and to no other."""
+    """Two sockets, RTP and RTCP, to the host that the RTSP connection comes from."""
 
     def __init__(self, sockets: tuple[asyncio.DatagramTransport, asyncio.DatagramTransport], ports: tuple[int, int]):
         self._rtp, self._rtcp = sockets

@@ -341,7 +341,7 @@ class _Connection:
     # -- the end
 
     def _stop(self) -> None:
-        """Send no more pictures."""
+        """Stop sending pictures."""
         if self._watch is None:
             return
         dropped = self._watch.counts["dropped pictures"]

@@ -1,4 +1,4 @@
-"""One drone as a source for viewers: its video runs while somebody needs it, and what it shows becomes a feed."""
+"""One drone as a source for viewers: runs its video while they need it."""
 
 from __future__ import annotations
 
@@ -96,11 +96,13 @@ class DroneSource:
         """
         loop = asyncio.get_running_loop()
         give_up = loop.time() + FEED_WAIT
+        if self.refusal(kind) is None:
+            self._start()
         while True:
             reason = self.refusal(kind)
             if reason is not None:
                 raise NotShown(reason)
-            self._hold()
+            self._linger.set_in(LINGER)
             if self._feed is not None and self._is_ready(self._feed, loop.time()):
                 return self._feed
             if self._problem:
@@ -116,13 +118,13 @@ class DroneSource:
     def join(self, viewer: FeedViewer) -> None:
         """Show pictures to this viewer from now on."""
         self._viewers = (*self._viewers, viewer)
-        self._hold()
+        self._start()
 
     def leave(self, viewer: FeedViewer) -> None:
         """Show it none any more. Idempotent."""
         if viewer in self._viewers:
             self._viewers = tuple(other for other in self._viewers if other is not viewer)
-            self._hold()
+            self._linger.set_in(LINGER)
 
     async def close(self) -> None:
         """End the drone's session; the viewers are their server's. Idempotent."""
@@ -140,8 +142,8 @@ class DroneSource:
     def _is_needed(self) -> bool:
         return bool(self._viewers) or self._linger.is_set
 
-    def _hold(self) -> None:
-        """Let the video run for `LINGER` longer, or as long as there are viewers."""
+    def _start(self) -> None:
+        """Let the video run for `LINGER`, and as long as there are viewers."""
         if not self._undo:
             return
         self._linger.set_in(LINGER)

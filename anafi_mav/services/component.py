@@ -22,9 +22,11 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.router import EVERY_COMPONENT
 from anafi_mav.services.command.command_service import CommandService
 from anafi_mav.services.commands import Action, ActionGroup
+from anafi_mav.services.definition_link import DefinitionLink
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.ftp.ftp_service import FtpService
 from anafi_mav.services.memory import Memory
+from anafi_mav.services.pose import VehiclePose
 from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.stream import Times
 from anafi_mav.services.telemetry.message_service import MessageService
@@ -56,6 +58,8 @@ class ComponentSystem(Protocol):
     clock: Clock
     memory: Memory
     download_folder: Path | None
+    has_picture_pose: bool
+    """True when the configuration allows pose from the live video."""
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -99,6 +103,8 @@ class Component:
         self.clock = system.clock
         self.memory = system.memory
         self.download_folder = system.download_folder
+        self.has_picture_pose = system.has_picture_pose
+        self.definition = DefinitionLink()
         self._system = system
         self.commands = CommandService(self)
         self.messages = MessageService(self)
@@ -210,9 +216,19 @@ class Component:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
         return self._system.times(at)
 
-    def is_streamed(self, id: int) -> bool:
-        """Return True when the component streams this message on some channel."""
-        return self.messages.is_streamed(id)
+    @property
+    def needs_pictures(self) -> bool:
+        """True while a client requests pose more often than events are reported."""
+        return self.messages.needs_pictures
+
+    @property
+    def needs_video(self) -> bool:
+        """True while a client has a stream whose fields are in the live video only."""
+        return self.messages.needs_video
+
+    def show_picture(self, pose: VehiclePose, shot: float, now: float) -> None:
+        """Send the pose that a picture reports; `shot`: when it was taken (s, monotonic)."""
+        self.messages.show_picture(pose, shot, now)
 
     def mark_updated(self, id: int, at: float) -> None:
         """Send a streamed message for a value that no event reports.

@@ -104,6 +104,9 @@ class Flavour:
     sik_radio: bool = False
     """RADIO_STATUS is read as a SiK radio's register, 1.9 a dB above -127 dBm (Mission Planner CurrentState.cs), and
     255 is unknown; otherwise as a signed number of dBm (QGroundControl RadioStatusFactGroup.cc), and 0 is unknown."""
+    gimbal_keeps_horizon: bool = False
+    """Clients of this family set no lock of the gimbal, and mean pitch and roll to the horizon; otherwise an axis
+    without a lock follows the body."""
     base_mode_in_custom0: bool = False
     """HIGH_LATENCY2.custom0 is HEARTBEAT.base_mode, as a signed byte."""
     title: str = ""
@@ -177,6 +180,9 @@ _PX4_NAMES = {
     )
 }
 
+_OLD_GIMBAL = frozenset({dialect.MAVLINK_MSG_ID_MOUNT_ORIENTATION})
+"""Clients of the gimbal protocol, version 2, read GIMBAL_DEVICE_ATTITUDE_STATUS."""
+
 PX4 = Flavour(
     name="px4",
     autopilot=dialect.MAV_AUTOPILOT_PX4,
@@ -192,6 +198,7 @@ PX4 = Flavour(
     version_type=dialect.FIRMWARE_VERSION_TYPE_DEV,
     bytewise=True,
     relative_frames_are_amsl=True,
+    unstreamed=_OLD_GIMBAL,
     joystick_overrides=True,
 )
 
@@ -259,6 +266,7 @@ ARDUPILOT = Flavour(
     packed_files=True,
     text_version=True,
     sik_radio=True,
+    gimbal_keeps_horizon=True,
     base_mode_in_custom0=True,
     # ArduCopter sends home when it is set; programs take one that arrives later for news (dronekit2's own tests).
     unstreamed=frozenset({dialect.MAVLINK_MSG_ID_HOME_POSITION}),
@@ -278,6 +286,7 @@ STANDARD = Flavour(
     version_type=PX4.version_type,
     bytewise=True,
     relative_frames_are_amsl=True,
+    unstreamed=_OLD_GIMBAL,
     relative_takeoff=True,  # MAVSDK's "pure" path sends the height above ground (conformance F 156)
 )
 

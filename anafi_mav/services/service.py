@@ -17,9 +17,11 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Action, ActionGroup, Command
+from anafi_mav.services.definition_link import DefinitionLink
 from anafi_mav.services.files import Folder, ServedFile
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.memory import Memory
+from anafi_mav.services.pose import VehiclePose
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
@@ -50,6 +52,10 @@ class Host(Protocol):
     memory: Memory
     download_folder: Path | None
     """Folder for copies of the drone's media after a landing; None: they are not copied."""
+    has_picture_pose: bool
+    """True when the configuration allows pose from the live video."""
+    definition: DefinitionLink
+    """Camera definition of the component."""
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -114,8 +120,16 @@ class Host(Protocol):
     def times(self, at: float | None = None) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
 
-    def is_streamed(self, id: int) -> bool:
-        """Return True when the component streams this message on some channel."""
+    @property
+    def needs_pictures(self) -> bool:
+        """True while a client requests pose more often than events are reported."""
+
+    @property
+    def needs_video(self) -> bool:
+        """True while a client has a stream whose fields are in the live video only."""
+
+    def show_picture(self, pose: VehiclePose, shot: float, now: float) -> None:
+        """Send the pose that a picture reports; `shot`: when it was taken (s, monotonic)."""
 
     def mark_updated(self, id: int, at: float) -> None:
         """Send a streamed message for a value that no event reports.

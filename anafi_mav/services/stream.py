@@ -9,34 +9,43 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import msgspec
+from msgspec.structs import replace
 
 from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import PX4, Flavour
+from anafi_mav.services.pose import VehiclePose, reported_pose
 from anafi_mav.vehicle.vehicle import Vehicle
+
+FASTEST = 1.0 / 30.0
+"""s. A message that is also repeated leaves no more often, whatever updates it; a picture comes as often."""
 
 
 class Times(msgspec.Struct, frozen=True):
-    """Time at which the newest field of a message was true, and the flavour it is made for.
+    """Time at which the newest field of a message was true, its flavour, and its pose.
 
     The time counts from the start of the gateway.
     """
 
     boot_ns: int
+    boot_us: int
+    boot_ms: int
+    """An uint32 that wraps after 49.7 days, as on every autopilot."""
     flavour: Flavour = PX4
-
-    @property
-    def boot_ms(self) -> int:
-        """An uint32 that wraps after 49.7 days, as on every autopilot."""
-        return self.boot_ns // 1_000_000 & 0xFFFFFFFF
-
-    @property
-    def boot_us(self) -> int:
-        return self.boot_ns // 1000
+    moment: VehiclePose | None = None
+    """The pose at that time, as a picture or the events report it; None: as the events report it now."""
 
     def for_flavour(self, flavour: Flavour) -> Times:
         """Return the same moment for clients of another flavour."""
-        return Times(self.boot_ns, flavour)
+        return replace(self, flavour=flavour)
+
+    def at(self, moment: VehiclePose) -> Times:
+        """Return the same time for messages that are made of this pose."""
+        return replace(self, moment=moment)
+
+    def pose(self, vehicle: Vehicle) -> VehiclePose:
+        """Return the motion that the message is about."""
+        return reported_pose(vehicle) if self.moment is None else self.moment
 
 
 Builder = Callable[[Vehicle, Times], "dialect.MAVLink_message | None"]
@@ -60,10 +69,18 @@ class MessageStream:
     message without `updates` is one in any case."""
     on_change: bool = False
     """A state message that also leaves at once when the vehicle's mode, armed or landed state changes."""
+    fastest: float = FASTEST
+    """s, the shortest interval that a client gets of a message that is also repeated."""
+    from_pictures: bool = False
+    """True when it is made of `Times.pose`, of events or of a picture. A client that requests it by
+    SET_MESSAGE_INTERVAL more often than events arrive opens the live video."""
+    needs_video: bool = False
+    """True when the live video runs for as long as a client has the stream: events do not report its fields. With
+    `from_pictures` that client's pose is made of pictures, too, so that both have one time."""
     flavoured: bool = False
     """True when its content depends on the flavour of the receiver."""
 
     @property
     def is_repeated(self) -> bool:
         """It leaves without an update, too."""
-        return self.repeated or not self.updates
+        return self.repeated or not (self.updates or self.from_pictures)

@@ -20,6 +20,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.mavlink.router import EVERY_COMPONENT
+from anafi_mav.services.camera_definition.param_ext_service import ParamExtService
 from anafi_mav.services.command.calibration_service import CalibrationService
 from anafi_mav.services.command.command_service import SETTLE
 from anafi_mav.services.command.compass_service import CompassService
@@ -30,6 +31,7 @@ from anafi_mav.services.command.orbit_service import OrbitService
 from anafi_mav.services.component import BY_AUTOPILOT, COMMANDS, Component, joined
 from anafi_mav.services.event.event_service import EventService
 from anafi_mav.services.ftp.log_service import LogService
+from anafi_mav.services.gimbal.gimbal_service import GimbalService
 from anafi_mav.services.ground_station.banner_service import BannerService
 from anafi_mav.services.ground_station.identity_service import IdentityService
 from anafi_mav.services.ground_station.node_status_service import NodeStatusService
@@ -78,6 +80,7 @@ AUTOPILOT_SERVICES: tuple[type[Service], ...] = (
     CalibrationService,
     CompassService,
     OrbitService,
+    GimbalService,
     TelemetryService,
     ParameterService,
     LinkLossService,
@@ -106,7 +109,7 @@ AUTOPILOT_SERVICES: tuple[type[Service], ...] = (
 )
 """Services of component 1, beside commands, messages and files themselves."""
 
-CAMERA_SERVICES: tuple[type[Service], ...] = (MediaService, DownloadService)
+CAMERA_SERVICES: tuple[type[Service], ...] = (ParamExtService, MediaService, DownloadService)
 """Services of component 100."""
 
 AUTOPILOT = dialect.MAV_COMP_ID_AUTOPILOT1
@@ -151,9 +154,14 @@ class System:
         allow_kill: bool,
         state: Path | None = None,
         download_folder: Path | None = None,
+        has_picture_pose: bool = True,
     ) -> None:
-        """`state`: folder of stored state. `download_folder`: for copies of the drone's media after a landing."""
+        """`state`: folder of stored state.
+
+        `download_folder`: for copies of the drone's media after a landing; None: they are not copied.
+        """
         self.sysid = sysid
+        self.has_picture_pose = has_picture_pose
         self.drone = drone
         self.clock = clock
         self.memory = Memory(state)
@@ -335,7 +343,8 @@ class System:
 
     def times(self, at: float | None = None) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
-        return Times(round(((self.clock.monotonic() if at is None else at) - self._started) * 1e9))
+        ns = round(((self.clock.monotonic() if at is None else at) - self._started) * 1e9)
+        return Times(ns, ns // 1_000, ns // 1_000_000 & 0xFFFFFFFF)
 
     # The heart.
 
@@ -345,7 +354,7 @@ class System:
         base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         if vehicle.armed:
             base |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
-        mode = FlightMode.MISSION if self._mission_over.is_set else vehicle.mode
+        mode = FlightMode.MISSION if self._mission_over.at is not None else vehicle.mode
         health = vehicle.health.value
         self._autopilot.send_by_flavour(
             lambda flavour: dialect.MAVLink_heartbeat_message(
@@ -431,7 +440,7 @@ class System:
         """
         vehicle = self.vehicle
         hovers = vehicle.armed and vehicle.mode in (FlightMode.HOLD, FlightMode.GUIDED)
-        if self._mission_over.is_set:
+        if self._mission_over.at is not None:
             if not hovers:
                 self._mission_over.cancel()
         elif hovers and last is not None and last[0] is FlightMode.MISSION:

@@ -55,6 +55,8 @@ SHUTDOWN_TIME, REBOOT_TIME = 1.0, 10.0
 
 HIGHEST = 10_000.0
 """m above or below the sea that a drone may stand at; the ground of the earth does not reach as far."""
+MAX_LATENCY = 2.0
+"""s that a camera may take for a picture; at more, a program gives up before the first one."""
 MAX_RATE = 200.0
 """Hz. The motion is computed 60 times a second; what is sent more often is sent again."""
 
@@ -78,6 +80,8 @@ class DroneSpec:
     """None: no web server."""
     rtsp_port: int | None = RTSP_PORT
     """None: no video."""
+    video_latency: float = 0.0
+    """s from a picture to its first packet: exposure and encoder."""
     versions: tuple[int, int] = (1, 3)
     """Lowest and highest ARSDK protocol version offered."""
     telemetry_rate: float = RATE
@@ -108,6 +112,8 @@ class DroneSpec:
         lowest, highest = self.versions
         if not 1 <= lowest <= highest <= 3:
             raise ConfigError("versions", f"expected the lowest and the highest of 1 to 3, got {self.versions}")
+        if not 0.0 <= self.video_latency <= MAX_LATENCY:
+            raise ConfigError("video_latency", f"expected up to {MAX_LATENCY:g} s, got {self.video_latency:g}")
         if not 0.0 < self.telemetry_rate <= MAX_RATE:
             raise ConfigError("telemetry_rate", f"expected up to {MAX_RATE:g} Hz, got {self.telemetry_rate:g}")
         if self.storage is not None and not 0 <= self.storage < 1 << 63:
@@ -177,7 +183,8 @@ class SimulatedDrone:
             luck,
             lambda name, args: log.add(clock(), "video", name, args),
             lambda: self._audible,
-            lambda data, deliver: video_air(data, False, deliver) if self._audible else None,
+            lambda data, deliver: video_air(data, False, deliver) if self._shows_pictures else None,
+            latency=spec.video_latency,
         )
         self._session: DeviceSession | None = None
         self._next_pose = 0.0
@@ -419,6 +426,11 @@ class SimulatedDrone:
             self._server.mute = mute or (self.skycontroller is None and not self.powered)
         if self._web is not None:
             self._web.mute = not self._audible
+
+    @property
+    def _shows_pictures(self) -> bool:
+        """True when datagrams of the video leave the drone."""
+        return self._audible and not self.faults.no_pictures
 
     @property
     def _audible(self) -> bool:

@@ -20,6 +20,7 @@ from anafi_mav.vehicle.base.bounds import LOWEST, amsl_to_ato, check_estimate, c
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.base.velocity_loop import MotionEstimate, VelocityController
@@ -78,7 +79,7 @@ class FollowFlight:
             raise Refused(texts.FOLLOW, texts.TILT_UNKNOWN)
         if vehicle.sticks_follow_camera:
             raise Refused(texts.FOLLOW, texts.STICKS_FOLLOW_CAMERA)
-        if vehicle.roll.inverted:
+        if vehicle.roll.sign is RollSign.INVERTED:
             raise Refused(texts.FOLLOW, texts.ROLL_INVERTED)
         await vehicle.take_over()
         await vehicle.drone.piloting.cancel_return_home()
@@ -158,7 +159,7 @@ class FollowFlight:
             reason = texts.PILOT
         elif vehicle.sticks_follow_camera:
             reason = texts.STICKS_FOLLOW_CAMERA
-        elif vehicle.roll.inverted:
+        elif vehicle.roll.sign is RollSign.INVERTED:
             reason = texts.ROLL_INVERTED
         if reason is not None:
             self.end()
@@ -221,5 +222,4 @@ class FollowFlight:
 
     def _watch(self, patience: float) -> None:
         """Schedule the end of the mode after `patience` s without a report of the target."""
-        delay = max(self._heard_at + patience - self._clock.monotonic(), 0.0)
-        self._silence.set_in(delay)
+        self._silence.set(self._heard_at + patience)

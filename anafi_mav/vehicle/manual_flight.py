@@ -129,7 +129,7 @@ class ManualFlight:
             return
         self.state, self._pilot = TRANSITIONS[self.state][Event.DEFLECTED], sender
         self._said = self._clock.monotonic()
-        if not self._silence.is_set:
+        if self._silence.at is None:
             self._watch()
         vehicle.drone.piloting.pilot(
             PilotingCommand(
@@ -201,8 +201,8 @@ class ManualFlight:
         """Centre the sticks if a client held them."""
         held = self.state is State.HELD
         self.state, self._pilot = TRANSITIONS[self.state][event], None
-        self._silence.cancel()
         if held:
+            self._silence.cancel()
             with contextlib.suppress(LinkLost):
                 self._vehicle.drone.piloting.pilot(None)
 
@@ -215,5 +215,4 @@ class ManualFlight:
 
     def _watch(self) -> None:
         """Come back when they have been silent for too long."""
-        delay = max(self._said + SILENCE - self._clock.monotonic(), 0.0)
-        self._silence.set_in(delay)
+        self._silence.set(self._said + SILENCE)

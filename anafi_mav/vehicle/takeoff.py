@@ -259,9 +259,10 @@ class Takeoff:
     # What ends it.
 
     def forget(self) -> None:
-        """No take-off waits to be armed any more."""
-        self._pending = None
-        self._lapsing.cancel()
+        """Cancel the take-off that waits for arming, if there is one."""
+        if self._pending is not None:
+            self._pending = None
+            self._lapsing.cancel()
 
     def end(self) -> list[asyncio.Task[None]]:
         """Abort the background part of the take-off: another flight task is active now.

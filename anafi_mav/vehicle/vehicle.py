@@ -50,6 +50,7 @@ from anafi_mav.vehicle.base.link_loss import LossPolicy
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.right import Extent, Right
+from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.fence.rally import RallyPoints
@@ -79,12 +80,6 @@ UNENDABLE = (
 
 LANDS_AFTER_RETURN = 2.0
 """s after a return that the drone ends by landing within which the landing begins."""
-
-POSITION_OLD = 3.0
-"""s without a GPS location, which an ANAFI reports once a second, after which the last one is no position in flight."""
-
-LOCATIONS_MISSED = 3
-"""A drone that reports its location more rarely (a slowed simulator) may miss as many."""
 
 
 ESTIMATED = texts.TAKEOFF_AMSL_ESTIMATED.fill(error=ESTIMATE_ERROR)
@@ -128,7 +123,7 @@ class Vehicle(Aircraft):
         changed: Callable[[], None],
         end_others: Callable[[], list[asyncio.Task[None]]],
     ) -> None:
-        super().__init__(drone, text=text, changed=changed)
+        super().__init__(drone, clock, text=text, changed=changed)
         self.gcs_loss = LossPolicy()
         """Reaction to the loss of all ground stations (a parameter)."""
         self.rally = RallyPoints()
@@ -137,11 +132,6 @@ class Vehicle(Aircraft):
         self.intended: FlightMode | None = None
         """The mode that a client last asked for by name or number."""
         self.allow_kill = allow_kill
-        self._clock = clock
-        self._located_at = -math.inf
-        """When the newest GPS location arrived."""
-        self._location_every = 0.0
-        """s between it and the one before."""
         self._lands_next: tuple[int, float] | None = None
         """A return has finished that the drone ends by landing: the count of orders then, and until when it is due."""
         self._end_others = end_others
@@ -188,20 +178,6 @@ class Vehicle(Aircraft):
         if state in LANDING:
             return Landed.LANDING
         return Landed.IN_AIR if state in AIRBORNE else Landed.UNKNOWN
-
-    @property
-    def position_is_old(self) -> bool:
-        """True in flight when GPS locations have stopped although the drone reports a fix."""
-        gps = self.drone.gps.state
-        if not gps.fixed or gps.location is None or self.flying_state is None or self.on_ground:
-            return False
-        patience = max(POSITION_OLD, LOCATIONS_MISSED * self._location_every)
-        return self._clock.monotonic() - self._located_at > patience
-
-    @property
-    def place(self) -> GeoPoint | None:
-        """Return the drone's position; None without a fix, and in flight while the newest is old."""
-        return None if self.position_is_old else super().place
 
     @property
     def mode(self) -> FlightMode:
@@ -667,7 +643,7 @@ class Vehicle(Aircraft):
     def standing_warnings(self) -> list[OperatorText]:
         """Texts that stay true for a while: a client that connects later gets them with its banner."""
         warnings = [ESTIMATED] if self.height.estimated and not self.on_ground else []
-        return [*warnings, texts.ROLL_SIGN_INVERTED] if self.roll.inverted else warnings
+        return [*warnings, texts.ROLL_SIGN_INVERTED] if self.roll.sign is RollSign.INVERTED else warnings
 
     @property
     def takeoff_record(self) -> TakeoffRecord | None:

@@ -1,8 +1,8 @@
-"""The media of each drone over HTTP, with the paths of the drone's own web server behind "/drone/<sysid>".
+"""The media of each drone over HTTP.
 
-So a client of Parrot's media API reads them here as well, while the gateway is the drone's one controller: lists come
-from the kept one, and files are read with those that MAVLink FTP reads, at most two at a time. Ranges are served
-whatever the drone's own server can.
+The paths are those of the drone's own web server, behind "/drone/<sysid>". So a client of Parrot's media API reads
+them here as well, while the gateway is the drone's one controller: the list is the kept one, and at most two files are
+read from a drone at a time, those of MAVLink FTP included. Ranges are served whatever the drone's own server can.
 
 Files are deleted for programs of this computer only, never for a browser, not even for a page of this server.
 """
@@ -79,7 +79,7 @@ class MediaRoutes:
         return web.json_response({**told, "md5": await drone.media.md5(resource)})
 
     async def _file(self, request: web.Request, drone: Drone) -> web.StreamResponse:
-        """Send a file or the one range that the client wants (RFC 9110 §14), as fast as the client reads."""
+        """Send a file, or the one range of it that the client wants (RFC 9110 §14)."""
         resource = await _resource(request, drone)
         first, end, status = 0, resource.size, 200
         headers = {"Accept-Ranges": "bytes"}

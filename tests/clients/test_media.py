@@ -6,6 +6,7 @@ import asyncio
 import re
 import shutil
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -41,6 +42,7 @@ async def test_conf_116_mavsdk_lists_downloads_and_removes_media(tmp_path: Path)
 async def test_conf_113_mavproxy_lists_downloads_and_removes_media(tmp_path: Path) -> None:
     async with world(web=True) as w:
         photo = add_photo(w.drone)
+        added = w.drone.log[-1].t
         path = f"/media/{DAY}/{photo.id}"
         words = (sys.executable, "-u", MAVPROXY, f"--master=tcp:{w.address}:5760", f"--state-basedir={tmp_path}")
         async with program(*words, stdin=asyncio.subprocess.PIPE, env={"HOME": str(tmp_path)}) as mavproxy:
@@ -55,9 +57,14 @@ async def test_conf_113_mavproxy_lists_downloads_and_removes_media(tmp_path: Pat
                 since = len(mavproxy.lines)
                 mavproxy.say(command)
                 if pattern:
-                    await mavproxy.line(lambda line: re.search(pattern, line) is not None, since=since, timeout=20.0)
-            while w.drone.firmware.payload.media.resource(photo.id) is not None:
-                await asyncio.sleep(0.05)
+                    expected = partial(re.search, pattern)
+                    await mavproxy.line(lambda line, find=expected: bool(find(line)), since=since, timeout=20.0)
+            await w.drone.wait_log(
+                lambda entry: entry.name == "mediastore.counters" and entry.args["photo_media_count"] == 0,
+                timeout=20.0,
+                since=added,
+            )
+            assert w.drone.firmware.payload.media.resource(photo.id) is None
             mavproxy.say("ftp list /")
             await mavproxy.line(lambda line: "D media" in line, timeout=10.0)
         assert (tmp_path / "copy.jpg").read_bytes() == photo.content()

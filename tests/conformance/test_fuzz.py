@@ -198,6 +198,22 @@ async def test_random_frames_on_the_ground(flavour: str, times: int, fuzz_seed: 
         assert mistakes == []
 
 
+async def test_fields_named_id_are_not_taken_for_message_ids(mistakes: list[str]) -> None:
+    """A field `id` hides pymavlink's attribute of that name: STATUSTEXT with id 76 is no COMMAND_LONG."""
+    named = [kind for kind in newer.mavlink_map.values() if "id" in kind.fieldnames]
+    assert newer.MAVLink_distance_sensor_message in named
+    frames = []
+    for kind, number in itertools.product(named, range(128)):
+        payload = bytearray(LONGEST)
+        payload[offset(kind, "id")] = number
+        frames.append(framed(kind.id, bytes(payload[: kind.unpacker.size]), number))
+    async with world() as w:
+        began = w.drone.log[-1].t
+        await throw(w, frames)
+        assert motions(w, began) == []
+        assert mistakes == []
+
+
 MAY_FLY: dict[str, dict[int, str]] = {
     "hold": {},  # setpoints fly a PX4 in mode Offboard, sticks in mode Position, targets in mode Follow Me
     "brake": {},  # neither do they fly an ArduPilot in Brake

@@ -20,7 +20,7 @@ from anafi_mav.sim.world.quirks import Quirk
 from anafi_mav.sim.world.wind import WindSpec
 from anafi_mav.texts import ROLL_SIGN_INVERTED as INVERTED
 from anafi_mav.texts import ROLL_SIGN_VERIFIED as VERIFIED
-from anafi_mav.vehicle.base.roll_sign import Sign
+from anafi_mav.vehicle.base.roll_sign import RollSign
 
 SET_MODE, ORBIT = dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_CMD_DO_ORBIT
 ACCEPTED, REJECTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_TEMPORARILY_REJECTED
@@ -128,7 +128,7 @@ async def test_inverted_roll_is_kept_for_the_same_firmware_only(tmp_path: Path, 
         state=str(tmp_path),
     )
     async with Simulator([DroneSpec(address=drone, home=HOME, http_port=None)], speed=3.0, seed=1) as simulator:
-        remember_roll(tmp_path, simulator.drones[0], Sign.LEFT, firmware)
+        remember_roll(tmp_path, simulator.drones[0], RollSign.INVERTED, firmware)
         async with Gateway(config) as gateway:
             w = World(simulator, gateway, address)
             await w.connect()

@@ -42,9 +42,9 @@ class Ftp:
     """One client's conversation."""
 
     def __init__(self, client: Client, sender: tuple[int, int] | None = None, component: int = 1) -> None:
-        """`sender`: another system and component that speak over the same connection. `component`: the server's."""
-        self.component = component
+        """`sender`: another system and component that speak over the same connection; `component`: whose files."""
         self.client = client
+        self.component = component
         self.ids = sender or (client.sysid, client.compid)
         self.seq = 0
         self._out = dialect.MAVLink(None, *self.ids)

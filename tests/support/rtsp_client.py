@@ -1,4 +1,4 @@
-"""A plain RTSP client for the tests of the simulated cameras: requests by hand, pictures as they arrive."""
+"""A plain RTSP client for tests of video servers: requests by hand, pictures as they arrive."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contextlib import asynccontextmanager
 
 from anafi_mav.arsdk.video import rtcp, rtsp
 from anafi_mav.arsdk.video.rtp_h264 import Picture, PictureReceiver
-from anafi_mav.arsdk.video.rtsp import MessageReader, Response, RtspRequest
+from anafi_mav.arsdk.video.rtsp import InterleavedData, MessageReader, Response, RtspRequest
 from anafi_mav.arsdk.video.sdp import SessionDescription, parse_description
 
 LIMIT = 10.0
@@ -34,8 +34,7 @@ class Eye(asyncio.DatagramProtocol):
 
         class Reports(asyncio.DatagramProtocol):
             def datagram_received(self, data: bytes, address: object) -> None:
-                eye.reports += rtcp.decode_reports(data)
-                eye._more.set()
+                eye.heard(data, address)
 
         rtp, _ = await loop.create_datagram_endpoint(lambda: self, local_addr=("127.0.0.1", 0))
         reports, _ = await loop.create_datagram_endpoint(Reports, local_addr=("127.0.0.1", 0))
@@ -48,6 +47,10 @@ class Eye(asyncio.DatagramProtocol):
         got = self._receiver.receive(data, now)
         self.pictures += got
         self.arrived += [now] * len(got)
+        self._more.set()
+
+    def heard(self, data: bytes, address: object) -> None:
+        self.reports += rtcp.decode_reports(data)
         self._more.set()
 
     async def look(self, count: int) -> list[Picture]:
@@ -88,9 +91,13 @@ class Viewer:
         self.session = ""
         self.reader = reader
         self.writer = writer
-        self._messages = MessageReader()
+        self.ended = asyncio.Event()
+        """The server has closed the connection, which is noticed after `setup_inside` only."""
+        self._messages = MessageReader(interleaved=True)
         self._eyes: list[Eye] = []
         self._cseq = 0
+        self._pump: asyncio.Task[None] | None = None
+        self._answers: asyncio.Queue[Response] = asyncio.Queue()
 
     async def ask(self, method: str, path: str = "live", **headers: str) -> Response:
         """A request and its answer; `_` in a header's name is a dash."""
@@ -104,6 +111,8 @@ class Viewer:
         return response
 
     async def answer(self) -> Response:
+        if self._pump is not None:
+            return await asyncio.wait_for(self._answers.get(), LIMIT)
         while True:
             data = await asyncio.wait_for(self.reader.read(4096), LIMIT)
             assert data, "the server hung up"
@@ -128,6 +137,27 @@ class Viewer:
         self.session, _ = rtsp.parse_session(response.header("Session") or "")
         return eye
 
+    async def setup_inside(self, path: str) -> Eye:
+        """Set up a stream inside the connection, which is read by itself from now on."""
+        eye = Eye()
+        response = await self.ask("SETUP", path, Transport="RTP/AVP/TCP;unicast;interleaved=0-1")
+        assert response.status == 200, response
+        assert "interleaved=0-1" in (response.header("Transport") or "")
+        self.session, _ = rtsp.parse_session(response.header("Session") or "")
+
+        async def pump() -> None:
+            while data := await self.reader.read(1 << 16):
+                for event in self._messages.feed(data):
+                    if isinstance(event, InterleavedData):
+                        (eye.heard if event.channel else eye.datagram_received)(event.data, None)
+                    else:
+                        assert isinstance(event, Response)
+                        self._answers.put_nowait(event)
+            self.ended.set()
+
+        self._pump = asyncio.create_task(pump())
+        return eye
+
     async def play(self, path: str = "live", **headers: str) -> Response:
         response = await self.ask("PLAY", path, **headers)
         assert response.status == 200, response
@@ -136,6 +166,8 @@ class Viewer:
     def close(self) -> None:
         for eye in self._eyes:
             eye.close()
+        if self._pump is not None:
+            self._pump.cancel()
         self.writer.close()
 
 

@@ -7,7 +7,7 @@ import socket
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -142,6 +142,8 @@ async def world(
     drone_address: str | None = None,
     web: bool = False,
     udp: bool = False,
+    video_latency: float = 0.0,
+    pose: Literal["video", "events"] = "video",
 ) -> AsyncIterator[World]:
     """One simulated drone, one gateway with a TCP endpoint, and its clients, connected and ready.
 
@@ -158,6 +160,7 @@ async def world(
         http_port=WEB_PORT if web else None,
         telemetry_rate=telemetry_rate,
         skycontroller=skycontroller,
+        video_latency=video_latency,
     )
     config = Config(
         endpoints=(
@@ -167,6 +170,7 @@ async def world(
         ),
         drones=(DroneConfig(name="alpha", sysid=sysid, address=drone_address, http_port=WEB_PORT),),
         allow_kill=allow_kill,
+        pose=pose,
     )
     flavours.note(*config.endpoints)
     async with Simulator([spec], speed=speed, seed=1) as simulator, Gateway(config) as gateway:

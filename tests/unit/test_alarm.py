@@ -12,9 +12,9 @@ async def test_alarm_calls_once_at_its_time() -> None:
     alarm = Alarm(lambda: called.append(loop.time()))
     start = loop.time()
     alarm.set(start + 3.0)
-    assert alarm.is_set
+    assert alarm.at == start + 3.0
     await asyncio.sleep(20.0)
-    assert not alarm.is_set
+    assert alarm.at is None
     assert len(called) == 1
     assert start + 3.0 <= called[0] < start + 20.0
 
@@ -47,14 +47,14 @@ async def test_cancelled_alarm_does_not_call() -> None:
     alarm.cancel()
     await asyncio.sleep(5.0)
     assert called == []
-    assert not alarm.is_set
+    assert alarm.at is None
 
 
 async def test_alarm_may_be_set_again_by_its_callback() -> None:
     times: list[float] = []
 
     def call() -> None:
-        assert not alarm.is_set
+        assert alarm.at is None
         times.append(asyncio.get_running_loop().time())
         if len(times) < 3:
             alarm.set_in(1.0)
@@ -63,4 +63,4 @@ async def test_alarm_may_be_set_again_by_its_callback() -> None:
     alarm.set_in(1.0)
     await asyncio.sleep(20.0)
     assert len(times) == 3
-    assert not alarm.is_set
+    assert alarm.at is None

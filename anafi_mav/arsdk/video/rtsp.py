@@ -163,10 +163,10 @@ def encode(message: Message) -> bytes:
 
 
 class MessageReader:
-    """Cuts a stream of bytes into messages, and into the packets between them where those are expected."""
+    """Cuts a stream of bytes into messages, and into the packets between them."""
 
     def __init__(self, *, interleaved: bool = False) -> None:
-        """With `interleaved` packets of RTP and RTCP may stand between the messages."""
+        """Create a reader; with `interleaved` packets of RTP and RTCP may stand between messages."""
         self._interleaved = interleaved
         self._buffer = bytearray()
         self._head: tuple[Message, int] | None = None

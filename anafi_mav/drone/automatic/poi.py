@@ -73,7 +73,8 @@ class Poi(Commanding[PoiState]):
             same = math.isclose(message.latitude, latitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG) and math.isclose(
                 message.longitude, longitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG
             )
-            return True if same and message.status in (PoiStatus.RUNNING, PoiStatus.PENDING) else None
+            accepted = same and message.mode == mode and message.status in (PoiStatus.RUNNING, PoiStatus.PENDING)
+            return True if accepted else None
 
         command = ardrone3.StartPilotedPOIV2(latitude, longitude, altitude, mode)
         await self._commander.begin(command, (ardrone3.PilotedPOIV2,), judge, timeout, ardrone3.StopPilotedPOI())

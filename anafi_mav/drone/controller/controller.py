@@ -196,7 +196,7 @@ class Controller(Element[ControllerState]):
             self._commander.send(self._grab_message())
             self._commander.send(skyctrl.SetPilotingSource(Source.CONTROLLER))
             self._stand_by(self._hand_back())
-        if not self._watching.is_set:
+        if self._watching.at is None:
             self._watching.set_in(LOOK_EVERY)
         return True
 

@@ -67,6 +67,16 @@ class Camera(Commanding[CamerasState]):
     NOTHING = CamerasState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {**camera_classic.REDUCERS, **camera_modern.REDUCERS}
 
+    FREQUENT: ClassVar[frozenset[type[Message]]] = frozenset(
+        {*camera_classic.FREQUENT, *camera_modern.FREQUENT},
+    )
+    """Events that come several times a second, or with each picture, and report no setting."""
+
+    @property
+    def active_id(self) -> int:
+        """Id of the camera that takes the pictures: a thermal mode changes it."""
+        return min(self.state.active, default=MAIN)
+
     def __getitem__(self, id: int) -> CameraState:
         """The state of this camera, an empty one when the drone has not reported it."""
         return self.state.cameras.get(id, CameraState())
@@ -357,18 +367,21 @@ class Camera(Commanding[CamerasState]):
         """
         speech, now = self._known(id)
         self._require(getattr(now, field), f"camera {id}: {field.replace('_', ' ')}")
-        command, answer = ask(speech, now)
-        if isinstance(command, camera2.Configure) and command.config == camera2.Config():
-            raise LocalProtocolError("nothing to change")
+        _, answer = ask(speech, now)
+        async with self._setting_lock(answer):
+            # A command carries several settings: those it leaves alone are as the change before this one left them.
+            command, _ = ask(speech, self[id])
+            if isinstance(command, camera2.Configure) and command.config == camera2.Config():
+                raise LocalProtocolError("nothing to change")
 
-        def judge(message: Any) -> CameraState | None:
-            mine = speech.camera_of(message) == id
-            # A state of camera2 can be about something else, such as the end of a photo.
-            if isinstance(command, camera2.Configure) and message.config is None:
-                mine = False
-            return self[id] if mine else None
+            def judge(message: Any) -> CameraState | None:
+                mine = speech.camera_of(message) == id
+                # A state of camera2 can be about something else, such as the end of a photo.
+                if isinstance(command, camera2.Configure) and message.config is None:
+                    mine = False
+                return self[id] if mine else None
 
-        return await self._change(command, answer, judge)
+            return await self._commander.confirm(command, (answer,), judge, ANSWER_TIMEOUT)
 
     async def _capture(
         self,

@@ -56,6 +56,7 @@ from anafi_mav.drone.payload.camera_enums import (
     ev_step,
     nearest,
     parrot,
+    quantities,
     quantity,
     word,
     words,
@@ -102,14 +103,27 @@ def _capabilities(state: CamerasState, m: wire.CameraCapabilities) -> CamerasSta
         white_balances=words(WhiteBalance, members(m.white_balance_modes, WhiteBalanceMode)),
         white_balance_lockable=m.white_balance_lock_supported == Supported.SUPPORTED,
         styles=words(Style, members(m.styles, CameraStyle)),
+        temperatures=quantities(members(m.custom_white_balance_temperatures, WhiteBalanceTemperature)),
+        hyperlapses=tuple(int(ratio) for ratio in quantities(members(m.hyperlapse_values, HyperlapseValue))),
+        brackets=words(Bracketing, members(m.bracketing_presets, BracketingPreset)),
+        bursts=words(Burst, members(m.burst_values, BurstValue)),
+        streamings=words(Streaming, members(m.streaming_modes, CameraStreamingMode)),
+        meterings=words(Metering, members(m.auto_exposure_metering_modes, AutoExposureMeteringMode)),
+        time_lapse_bounds=_from(m.timelapse_interval_min),
+        gps_lapse_bounds=_from(m.gpslapse_interval_min),
     )
+
+
+def _from(shortest: float) -> tuple[float, float] | None:
+    """Return the bounds of an interval whose upper one the drone does not report."""
+    return (shortest, math.inf) if math.isfinite(shortest) else None
 
 
 def _recording_option(state: CamerasState, m: wire.RecordingCapabilities) -> CamerasState:
     option = RecordingOption(
         words(RecordingMode, members(m.recording_modes, CameraRecordingMode)),
         words(Resolution, members(m.resolutions, wire.Resolution)),
-        tuple(sorted(fps for one in members(m.framerates, Framerate) if (fps := quantity(one)))),
+        quantities(members(m.framerates, Framerate)),
         m.hdr == Supported.SUPPORTED,
     )
     if m.list_flags & FIRST:
@@ -143,7 +157,14 @@ def _exposure(state: CamerasState, m: wire.ExposureSettings) -> CamerasState:
         quantity(m.max_iso_sensitivity),
         word(Metering, m.metering_mode),
     )
-    return changed(state, m.cam_id, exposure=settings)
+    return changed(
+        state,
+        m.cam_id,
+        exposure=settings,
+        shutters=quantities(members(m.manual_shutter_speed_capabilities, ShutterSpeed)),
+        isos=quantities(members(m.manual_iso_sensitivity_capabilities, IsoSensitivity)),
+        max_isos=quantities(members(m.max_iso_sensitivities_capabilities, IsoSensitivity)),
+    )
 
 
 def _style(state: CamerasState, m: wire.Style) -> CamerasState:
@@ -280,6 +301,13 @@ _STORED = frozenset(
         RecordingResult.STOPPED_STORAGE_TOO_SLOW,
         RecordingResult.STOPPED_RECONFIGURED,
     }
+)
+
+FREQUENT: tuple[type[Message], ...] = (
+    wire.ZoomLevel,
+    wire.PhotoProgress,
+    wire.RecordingProgress,
+    wire.NextPhotoDelay,
 )
 
 PHOTO_EVENTS: tuple[type[Message], ...] = (wire.PhotoProgress, wire.PhotoState)

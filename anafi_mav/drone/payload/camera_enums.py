@@ -254,6 +254,11 @@ def quantity(value: OpenEnum | None) -> float | None:
         return None
 
 
+def quantities(values: Iterable[OpenEnum]) -> tuple[float, ...]:
+    """Return the numbers that these values stand for, ascending, each once."""
+    return tuple(sorted({number for value in values if (number := quantity(value))}))
+
+
 def nearest(values: type[ParrotT], wanted: float) -> ParrotT:
     """The value whose number is nearest, by ratio."""
     if not (math.isfinite(wanted) and wanted > 0.0):

@@ -37,6 +37,7 @@ from anafi_mav.drone.payload.camera_enums import (
     ev_step,
     nearest,
     parrot,
+    quantities,
     quantity,
     word,
     words,
@@ -216,6 +217,15 @@ def _rules(rules: tuple[wire.CapabilitiesRule, ...], style: StyleSettings | None
         "evs": tuple(ev for step in sorted(set(union("ev_compensations"))) if (ev := ev_of(step)) is not None),
         "white_balances": words(WhiteBalance, union("white_balance_modes")),
         "styles": words(Style, union("image_styles")),
+        "temperatures": quantities(union("white_balance_temperatures")),
+        "bursts": words(Burst, union("photo_burst_values")),
+        "brackets": words(Bracketing, union("photo_bracketing_presets")),
+        "megapixels": tuple(sorted({size for one in union("photo_resolutions") if (size := _number_of_pixels(one))})),
+        "bitrates": tuple(sorted(set(union("video_recording_bitrates")))),
+        "shutters": quantities(union("exposure_manual_shutter_speeds")),
+        "isos": quantities(union("exposure_manual_iso_sensitivities")),
+        "max_isos": quantities(union("exposure_maximum_iso_sensitivities")),
+        "meterings": words(Metering, union("exposure_meterings")),
         "photos": tuple(
             PhotoOption(
                 words(PhotoMode, rule.photo_modes),
@@ -230,13 +240,17 @@ def _rules(rules: tuple[wire.CapabilitiesRule, ...], style: StyleSettings | None
             RecordingOption(
                 words(RecordingMode, rule.video_recording_modes),
                 words(Resolution, rule.video_recording_resolutions or ()),
-                tuple(sorted({fps for one in rule.video_recording_framerates or () if (fps := quantity(one))})),
+                quantities(rule.video_recording_framerates or ()),
                 wire.DynamicRange.HDR8 in (rule.video_recording_dynamic_ranges or ()),
             )
             for rule in rules
             if rule.video_recording_modes
         ),
-        **_given(zoom_speed_bounds=bounds("zoom_max_speed_range")),
+        **_given(
+            zoom_speed_bounds=bounds("zoom_max_speed_range"),
+            time_lapse_bounds=bounds("photo_time_lapse_interval_range"),
+            gps_lapse_bounds=bounds("photo_gps_lapse_interval_range"),
+        ),
     }
     if style is not None:
         levels = {}
@@ -287,6 +301,14 @@ REDUCERS: Mapping[type[Message], Reducer] = {
     wire.Recording: _recording,
     mains.State: _antiflicker,
 }
+
+FREQUENT: tuple[type[Message], ...] = (
+    wire.ZoomLevel,
+    wire.Exposure,
+    wire.NextPhotoInterval,
+    wire.Photo,
+    wire.Recording,
+)
 
 _DONE = (wire.PhotoStopReason.USER_REQUEST, wire.PhotoStopReason.CAPTURE_DONE)
 

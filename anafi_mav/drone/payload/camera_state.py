@@ -112,6 +112,14 @@ class CameraState(msgspec.Struct, frozen=True):
     # -- pictures
     photo: PhotoSettings | None = None
     photos: tuple[PhotoOption, ...] = ()
+    bursts: frozenset[Burst] = frozenset()
+    brackets: frozenset[Bracketing] = frozenset()
+    time_lapse_bounds: tuple[float, float] | None = None
+    """s; the upper one is infinite where the drone reports the lower one only."""
+    gps_lapse_bounds: tuple[float, float] | None = None
+    """m; likewise."""
+    megapixels: tuple[float, ...] = ()
+    """Photo resolutions to choose from; Ai only."""
     photo_available: bool | None = None
     """True when a photo can be taken now."""
     taking: bool | None = None
@@ -123,6 +131,10 @@ class CameraState(msgspec.Struct, frozen=True):
     # -- films
     recording: RecordingSettings | None = None
     recordings: tuple[RecordingOption, ...] = ()
+    hyperlapses: tuple[int, ...] = ()
+    """Ratios to choose from. Not on the Ai."""
+    bitrates: tuple[int, ...] = ()
+    """bit/s to choose from; Ai only."""
     recording_available: bool | None = None
     recording_now: bool | None = None
     recording_since_ms: int | None = None
@@ -153,6 +165,11 @@ class CameraState(msgspec.Struct, frozen=True):
     """Values that `ev` accepts."""
     exposure: ExposureSettings | None = None
     exposures: frozenset[ExposureMode] | None = None
+    shutters: tuple[float, ...] = ()
+    """s; times to choose from in the present mode of the camera."""
+    isos: tuple[float, ...] = ()
+    max_isos: tuple[float, ...] = ()
+    meterings: frozenset[Metering] = frozenset()
     shutter_s: float | None = None
     """At present, in steps; the exact times are in the video's metadata only."""
     iso: float | None = None
@@ -161,6 +178,8 @@ class CameraState(msgspec.Struct, frozen=True):
     exposure_lockable: bool | None = None
     white_balance: WhiteBalance | None = None
     white_balances: frozenset[WhiteBalance] | None = None
+    temperatures: tuple[float, ...] = ()
+    """K to choose from."""
     temperature_k: float | None = None
     """Of white balance CUSTOM."""
     white_balance_locked: bool | None = None
@@ -173,6 +192,7 @@ class CameraState(msgspec.Struct, frozen=True):
     styles: frozenset[Style] | None = None
     streaming: Streaming | None = None
     """Not on the Ai."""
+    streamings: frozenset[Streaming] | None = None
     alignment: Mapping[str, Range] = {}
     """Corrections against the other camera by axis ("yaw", "pitch", "roll"), deg."""
 

@@ -103,6 +103,24 @@ class GimbalState(msgspec.Struct, frozen=True):
     errors: frozenset[Error] | None = None
     stabilized: bool | None = None
 
+    def bounds(self, axis: Axis, frame: FrameOfReference) -> tuple[float, float]:
+        """Return the range of one axis in a frame, deg; infinite while not reported."""
+        known = self.relative_bounds if frame == FrameOfReference.RELATIVE else self.absolute_bounds
+        return known.get(axis, (-math.inf, math.inf))
+
+    def is_at_end(self, axis: Axis, direction: float) -> bool:
+        """True when an axis stands at the end of its range in a direction, + or -.
+
+        The range of yaw is that from the body, whichever frame it holds.
+        """
+        attitude = self.attitude
+        if attitude is None:
+            return False
+        frame = FrameOfReference.RELATIVE if axis == Axis.YAW else attitude.frames[axis]
+        low, high = self.bounds(axis, frame)
+        angle = attitude.angle(axis, frame)
+        return angle >= high - ARRIVED_DEG if direction > 0.0 else angle <= low + ARRIVED_DEG
+
 
 def _ranges(message: gimbal.MaxSpeed | gimbal.Offsets) -> dict[Axis, Range]:
     values = {
@@ -174,6 +192,11 @@ class Gimbal(Commanding[Gimbals]):
         """The state of this gimbal, an empty one when the drone has not reported it."""
         return self.state.get(id, GimbalState())
 
+    @property
+    def main(self) -> GimbalState:
+        """State of the gimbal that carries the cameras."""
+        return self[MAIN]
+
     # -- where to look
 
     def aim(self, *, yaw: Aim | None = None, pitch: Aim | None = None, roll: Aim | None = None, id: int = MAIN) -> None:
@@ -229,14 +252,65 @@ class Gimbal(Commanding[Gimbals]):
         answer = self._commander.expect((gimbal.Attitude,), judge)
         return await self._insist(id, self._command(targets, ControlMode.POSITION, id), answer, timeout)
 
+    async def steer(
+        self,
+        *,
+        yaw: Aim | None = None,
+        pitch: Aim | None = None,
+        roll: Aim | None = None,
+        id: int = MAIN,
+        timeout: float = ANSWER_TIMEOUT,
+    ) -> GimbalAttitude:
+        """Point the gimbal at angles (deg); return once it turns towards them, or is there.
+
+        For operators, who do not wait for the end of a turn. The drone turns on by itself. Raises `CommandRejected`
+        when a newer target replaces this one.
+        """
+        targets = self._targets({Axis.YAW: yaw, Axis.PITCH: pitch, Axis.ROLL: roll}, id)
+        return await self._begin(targets, ControlMode.POSITION, id, timeout)
+
+    async def sweep(
+        self,
+        *,
+        yaw: Aim | None = None,
+        pitch: Aim | None = None,
+        roll: Aim | None = None,
+        id: int = MAIN,
+        timeout: float = ANSWER_TIMEOUT,
+    ) -> GimbalAttitude:
+        """Turn with these rates (deg/s); return once the gimbal turns, or cannot turn further.
+
+        The drone turns on until the next target, see `turn`.
+        """
+        rates = {Axis.YAW: yaw, Axis.PITCH: pitch, Axis.ROLL: roll}
+        shares = {axis: self._share(axis, aim, id) for axis, aim in rates.items() if aim is not None}
+        return await self._begin(shares, ControlMode.VELOCITY, id, timeout)
+
+    async def _begin(self, targets: Mapping[Axis, Aim], mode: ControlMode, id: int, timeout: float) -> GimbalAttitude:
+        state = self[id]
+        for axis in targets:
+            if axis in (state.locked or ()):
+                raise CommandRejected(f"gimbal axis {axis.name.lower()} is locked")
+        judge = _Turning(id, targets, state, is_rate=mode == ControlMode.VELOCITY)
+        answer = self._commander.expect((gimbal.Attitude,), judge)
+        return await self._insist(id, self._command(targets, mode, id), answer, timeout)
+
+    def halt(self, id: int = MAIN) -> None:
+        """Send a stop of all axes once, without waiting."""
+        self._order(id, self._stop_command(id))
+
     async def stop(self, id: int = MAIN, timeout: float = ANSWER_TIMEOUT) -> GimbalAttitude:
         """Stop all axes; return the attitude once the gimbal stands."""
+        command = self._stop_command(id)
+        answer = self._commander.expect((gimbal.Attitude,), _Standing(id))
+        return await self._insist(id, command, answer, timeout)
+
+    def _stop_command(self, id: int) -> gimbal.SetTarget:
         axes = self._axes(id)
         attitude = self[id].attitude
         frames = {} if attitude is None else attitude.frames
         still = {axis: Aim(0.0, frames.get(axis, FrameOfReference.RELATIVE)) for axis in axes}
-        answer = self._commander.expect((gimbal.Attitude,), _Standing(id))
-        return await self._insist(id, self._command(still, ControlMode.VELOCITY, id), answer, timeout)
+        return self._command(still, ControlMode.VELOCITY, id)
 
     async def reset_orientation(self, id: int = MAIN, timeout: float = 2 * ANSWER_TIMEOUT) -> GimbalAttitude:
         """Turn to the drone's reference orientation; return the attitude once the gimbal rests."""
@@ -340,10 +414,7 @@ class Gimbal(Commanding[Gimbals]):
                 raise NotSupported(f"gimbal axis {axis.name.lower()}")
             if not math.isfinite(aim.value) or aim.frame == FrameOfReference.NONE:
                 raise LocalProtocolError(f"no target for the gimbal: {aim}")
-            state = self[id]
-            known = state.relative_bounds if aim.frame == FrameOfReference.RELATIVE else state.absolute_bounds
-            low, high = known.get(axis, (-math.inf, math.inf))
-            targets[axis] = Aim(clip(aim.value, low, high), aim.frame)
+            targets[axis] = Aim(clip(aim.value, *self[id].bounds(axis, aim.frame)), aim.frame)
         return targets
 
     def _share(self, axis: Axis, aim: Aim, id: int) -> Aim:
@@ -374,6 +445,48 @@ class Gimbal(Commanding[Gimbals]):
         idle = Aim(0.0, FrameOfReference.NONE)
         yaw, pitch, roll = (targets.get(axis, idle) for axis in (Axis.YAW, Axis.PITCH, Axis.ROLL))
         return gimbal.SetTarget(id, mode, yaw.frame, yaw.value, pitch.frame, pitch.value, roll.frame, roll.value)
+
+
+class _Turning:
+    """A judge: the attitude at which every axis turns as commanded, or has no further to turn.
+
+    The first attitude may be older than the command, so that the movement is measured from the last one before it.
+    """
+
+    def __init__(
+        self,
+        id: int,
+        targets: Mapping[Axis, Aim],
+        state: GimbalState,
+        *,
+        is_rate: bool,
+    ) -> None:
+        self._id = id
+        self._targets = targets
+        self._state = state
+        self._is_rate = is_rate
+        self._start = state.attitude
+
+    def __call__(self, message: gimbal.Attitude) -> GimbalAttitude | None:
+        attitude = _attitude(message) if message.gimbal_id == self._id else None
+        if attitude is None:
+            return None
+        if self._start is None:
+            self._start = attitude
+            return None
+        turned = all(self._turned(axis, aim, self._start, attitude) for axis, aim in self._targets.items())
+        return attitude if turned else None
+
+    def _turned(self, axis: Axis, aim: Aim, start: GimbalAttitude, now: GimbalAttitude) -> bool:
+        before, after = start.angle(axis, aim.frame), now.angle(axis, aim.frame)
+        way = aim.value if self._is_rate else _turn(after, aim.value)
+        if way == 0.0 or (not self._is_rate and abs(way) <= ARRIVED_DEG):
+            return True
+        if replace(self._state, attitude=now).is_at_end(axis, way):
+            return True
+        if self._is_rate:
+            return _turn(before, after) * way > 0.0 and abs(_turn(before, after)) > STILL_DEG
+        return abs(_turn(before, aim.value)) - abs(way) > STILL_DEG
 
 
 class _Standing:

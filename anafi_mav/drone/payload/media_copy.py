@@ -1,7 +1,7 @@
-"""Copies of the drone's media in folders of this computer: `<day>/<file>`, with a sidecar for each.
+"""Copies of the drone's media in folders of this computer.
 
-A sidecar is `<file>.json`: what the file is, when and where it was made and how the camera was held. A file with a
-sidecar is complete, so that the next copy of the same media passes over it.
+A copy is `<day>/<file>`. Its sidecar is `<file>.json`: what the file is, when and where it was made, and the attitude
+of the camera. A file that was copied before is not copied again.
 """
 
 from __future__ import annotations
@@ -50,7 +50,9 @@ async def copy(
     progress: Callable[[int, int], None] | None = None,
     interrupted: Callable[[AnafiMavError, float], None] = lambda error, pause: None,
 ) -> Path | None:
-    """Copy a file to `<folder>/<day>` and write its sidecar; return its path, None for one that is there already.
+    """Copy a file to `<folder>/<day>` and write its sidecar.
+
+    Returns its path, None when it was copied before.
 
     After an interruption it continues: `interrupted` is called with the error and the pause in s. It gives up after
     `TRIES` attempts without a byte. A file with other content under the same name stays, and the copy gets the
@@ -145,7 +147,10 @@ def _write_sidecar(path: Path, resource: Resource, md5: str | None) -> None:
 
 
 def sidecar(name: str, resource: Resource, md5: str, xmp: dict[str, str]) -> dict[str, Any]:
-    """Return the content of a sidecar: SI units, degrees, heights above mean sea level; null: unknown."""
+    """Return the content of a sidecar; None: unknown.
+
+    s, m, degrees, heights above mean sea level.
+    """
     place, source = resource.gps, "drone"
     if place is None or not place.is_known:
         place, source = _place_in(xmp), "photo"

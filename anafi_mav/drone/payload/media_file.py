@@ -141,7 +141,10 @@ async def fetch(
 
 
 def _open_part(part: Path) -> BinaryIO:
-    """Open a part to write behind its end, and lock it. Raises `CommandRejected` while another download has it."""
+    """Open a part to write behind its end, and lock it.
+
+    Raises `CommandRejected` while another download has it.
+    """
     file = part.open("ab")
     try:
         try:

@@ -21,6 +21,7 @@ from anafi_mav.arsdk.video.rtp_h264 import CLOCK_RATE, Picture, PictureReceiver
 from anafi_mav.arsdk.video.rtp_reception import Reception
 from anafi_mav.arsdk.video.rtsp import Response, RtspTransport
 from anafi_mav.arsdk.video.sdp import MediaDescription, SessionDescription
+from anafi_mav.drone.video.picture_clock import PictureClock
 from anafi_mav.drone.video.route import DatagramPair, VideoRoute
 from anafi_mav.drone.video.rtsp_client import RtspClient
 from anafi_mav.errors import AnafiMavError, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
@@ -89,6 +90,7 @@ class VideoStream:
         """Known before the first picture comes."""
         self.counters: Counter[str] = Counter()
         self.receiver = PictureReceiver()
+        self.clock = PictureClock()
         self._route = route
         self._title = title
         self._wanted = wanted
@@ -183,8 +185,13 @@ class VideoStream:
 
     def _hear(self, data: bytes) -> None:
         for report in decode_reports(data):
-            if isinstance(report, SenderReport) and self._reception is not None:
-                self._reception.hear(report, self._loop.time())
+            if not isinstance(report, SenderReport):
+                continue
+            now = self._loop.time()
+            if self.receiver.window.ssrc in (None, report.ssrc):
+                self.clock.on_report(report.timestamp, now)
+            if self._reception is not None:
+                self._reception.hear(report, now)
 
     async def _report(self, channels: DatagramPair) -> None:
         while True:

@@ -1,4 +1,4 @@
-"""Streams of a drone's cameras: which exist, which one is shown, and the commands that change it.
+"""Streams of a drone's cameras, the shown one, and the command that changes it.
 
 An ANAFI sends one stream to the gateway. On Thermal and USA the thermal camera's mode and rendering decide what it
 shows, whoever sets them. On the Ai the gateway chooses among the stereo camera's pictures and the main camera's.
@@ -73,7 +73,7 @@ def offered_streams(model: Model) -> tuple[OfferedStream, ...]:
 
 
 class StreamChoice:
-    """The streams of one drone. What it shows is the drone's own state, not a wish of ours."""
+    """The streams of one drone. The shown one is read from the drone's own state."""
 
     def __init__(self, model: Callable[[], Model], thermal: Thermal, camera: Camera, video: Video) -> None:
         self._model = model
@@ -151,7 +151,10 @@ class StreamChoice:
         return dict.fromkeys((thermal_messages.Mode, thermal_messages.Rendering), lambda message, now: self._on_event())
 
     def link_up(self) -> None:
-        """Take the stream that the drone shows; what was chosen on an earlier connection is forgotten."""
+        """Take the stream that the drone shows.
+
+        A choice on an earlier connection is dropped.
+        """
         self._chosen = StreamKind.VISIBLE
         self._is_linked = True
         self._follow()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 from collections import Counter, deque
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
@@ -57,6 +58,14 @@ class VideoFrame(msgspec.Struct, frozen=True):
     taken: float
     """s on a clock of the drone, whose zero is arbitrary: differences between two are exact, whatever delayed the
     pictures on their way."""
+    timestamp: int
+    """RTP timestamp of the picture, 90 kHz; wraps."""
+    shot: float
+    """s on the loop's clock when the picture was taken, as far as it is known: never after `arrived`, and never before
+    the `shot` of an earlier picture of the stream."""
+    is_clock_known: bool
+    """True when the drone has reported its clock: `shot` is then late by the radio's delay at most. Otherwise the
+    fastest picture counts as one without delay."""
 
     @property
     def attitude(self) -> Attitude | None:
@@ -129,6 +138,8 @@ class Video(Element[VideoState]):
         self._arrivals: deque[float] = deque(maxlen=MAX_RATE)
         self._clock: tuple[int, float] | None = None
         """The timestamp of RTP of the last picture, and when that was taken."""
+        self._newest_shot = -math.inf
+        """`shot` of the last picture: it never goes back."""
 
     # -- the connection
 
@@ -337,7 +348,7 @@ class Video(Element[VideoState]):
                 self._arrivals.popleft()
             span = now - self._arrivals[0]
             rate = (len(self._arrivals) - 1) / span if span > 0.0 else None
-            frame = VideoFrame(metadata, now, taken)
+            frame = VideoFrame(metadata, now, taken, picture.timestamp, *self._shot(picture, now))
             self.state = replace(self.state, frame=frame, rate_hz=rate)
             self._tell(self._frame_callbacks, frame)
         self._tell(self._picture_callbacks, picture)
@@ -353,6 +364,16 @@ class Video(Element[VideoState]):
             taken = picture.metadata.timestamp / 1e6
         self._clock = picture.timestamp, taken
         return taken
+
+    def _shot(self, picture: Picture, now: float) -> tuple[float, bool]:
+        """Return when a picture was taken, s on the loop's clock.
+
+        The second value is `is_clock_known`.
+        """
+        clock = None if self._stream is None else self._stream.clock
+        shot = now if clock is None else clock.on_picture(picture.timestamp, now)
+        self._newest_shot = max(shot, self._newest_shot)
+        return self._newest_shot, clock is not None and clock.has_reports
 
     @staticmethod
     def _tell(callbacks: tuple[Callable[[Any], None], ...], value: object) -> None:

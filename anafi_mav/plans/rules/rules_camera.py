@@ -25,7 +25,7 @@ def _camera(writer: FlightPlanWriter, item: Item, number: int) -> None:
 
 
 def _gimbal(writer: FlightPlanWriter, item: Item, number: int) -> None:
-    only(writer, item, number, "the gimbal is component 154, not this", _GIMBALS)
+    only(writer, item, number, "the gimbal is device 1, not this", _GIMBALS)
 
 
 # What is looked at.
@@ -271,7 +271,7 @@ def _zoom(writer: FlightPlanWriter, item: Item) -> None:
 _EXACT, _NEARLY, _STEPPED = Fidelity.EXACT, Fidelity.APPROXIMATED, Fidelity.STEPPED
 
 _ONE_CAMERA = "Another camera than the main one (0, 1 or 100) is refused."
-_ONE_GIMBAL = "Another gimbal than the one (0, 1 or 154) is refused."
+_ONE_GIMBAL = "Another gimbal device than 0, 1 or 154, which all mean the one, is refused."
 
 CAMERA = (
     Rule(195, _EXACT, "Version 1: a numbered region of interest, and the view mode that looks at it. "

@@ -1,7 +1,7 @@
-"""Guided flight by single commands: speed, height, heading, pause, ROI, home.
+"""Guided flight by single commands: speed, height, heading, pause, home.
 
 What goes to a place is `actions.reposition`; what circles is `orbit_service`. A handler returns when the drone
-confirmed. Conformance A4, B1, B2, D1 and items 78-83, 143.
+confirmed. Regions of interest are in `services.gimbal`. Conformance A4, B1, B2, D1 and items 78-83, 143.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 
 from anafi_mav import texts, units
-from anafi_mav.drone.events import FlyingStateChanged, PoiMode, RthHomeType
+from anafi_mav.drone.events import FlyingStateChanged, RthHomeType
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
@@ -104,7 +104,7 @@ def _effect_of_pause(command: Command) -> Effect:
 
 
 class GuidedService(Service):
-    """Changes the flight under way, and the camera's target."""
+    """Changes the flight under way."""
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
@@ -126,15 +126,6 @@ class GuidedService(Service):
             ),
             dialect.MAV_CMD_DO_PAUSE_CONTINUE: Action(
                 self._pause_or_continue, location=False, altitude=Altitude.UNUSED, effect=_effect_of_pause
-            ),
-            dialect.MAV_CMD_DO_SET_ROI_LOCATION: Action(
-                self._look_at, location=True, altitude=Altitude.AMSL, effect=Effect.CHANGE
-            ),
-            dialect.MAV_CMD_DO_SET_ROI_NONE: Action(
-                self._look_anywhere, location=False, altitude=Altitude.UNUSED, effect=Effect.STOP
-            ),
-            dialect.MAV_CMD_DO_SET_ROI: Action(
-                self._legacy_roi, location=True, altitude=Altitude.BY_FRAME, effect=Effect.CHANGE
             ),
             dialect.MAV_CMD_DO_SET_HOME: Action(
                 self._set_home, location=True, altitude=Altitude.AMSL, effect=Effect.CHANGE
@@ -267,40 +258,6 @@ class GuidedService(Service):
             self._paused = None
         else:
             raise Refused(texts.PAUSE, texts.PARAM1_BINARY, lasting=True)
-
-    # Regions of interest.
-
-    async def _look_at(self, command: Command) -> None:
-        """Run MAV_CMD_DO_SET_ROI_LOCATION: nose and camera follow the place.
-
-        They do so until something else is flown (Parrot's piloted POI, which needs a hovering drone and waits for
-        it). An unset height is that of the take-off point.
-        """
-        where = place(command)
-        if where is None:
-            raise Refused(texts.ROI, texts.NO_PLACE, lasting=True)
-        await self._look(where, height(self.host.vehicle, command) or 0.0)
-
-    async def _look_anywhere(self, command: Command) -> None:
-        """MAV_CMD_DO_SET_ROI_NONE."""
-        await self.host.drone.poi.stop()
-
-    async def _legacy_roi(self, command: Command) -> None:
-        """MAV_CMD_DO_SET_ROI: param1 MAV_ROI; none or a location. At 0/0 MAVProxy means none."""
-        kind = command.params[0]
-        if kind == dialect.MAV_ROI_NONE or (command.x == 0.0 and command.y == 0.0):
-            await self._look_anywhere(command)
-        elif kind == dialect.MAV_ROI_LOCATION or math.isnan(kind):
-            await self._look_at(command)
-        else:
-            raise Refused(texts.ROI, texts.ROI_KINDS, lasting=True)
-
-    async def _look(self, where: GeoPoint, ato: float) -> None:
-        vehicle = self.host.vehicle
-        check_on_earth(where, texts.ROI)
-        if not vehicle.in_air:
-            raise Refused(texts.ROI, texts.NOT_IN_AIR)
-        await self.host.drone.poi.start(where.latitude, where.longitude, ato, PoiMode.LOCKED_GIMBAL)
 
     # Home.
 

@@ -26,6 +26,7 @@ from anafi_mav.vehicle.base.bounds import SLOWEST, check_height, check_on_earth,
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.base.velocity_loop import VelocityController, tilt_limit
@@ -125,7 +126,7 @@ class OrbitService(Service):
             raise Refused(texts.ORBIT, texts.PILOT)
         if vehicle.sticks_follow_camera:
             raise Refused(texts.ORBIT, texts.STICKS_FOLLOW_CAMERA)
-        if vehicle.roll.inverted:
+        if vehicle.roll.sign is RollSign.INVERTED:
             raise Refused(texts.ORBIT, texts.ROLL_INVERTED)
         start = entry(circle, here)
         for point in outline(circle, here):
@@ -238,7 +239,7 @@ class OrbitService(Service):
             self._give_up(texts.PILOT, Severity.WARNING)
         elif vehicle.sticks_follow_camera:
             self._give_up(texts.STICKS_FOLLOW_CAMERA, Severity.WARNING)
-        elif vehicle.roll.inverted:
+        elif vehicle.roll.sign is RollSign.INVERTED:
             self._give_up(texts.ROLL_INVERTED, Severity.WARNING)
         elif sticks is None:
             self._give_up(texts.POSITION_UNKNOWN, Severity.WARNING)

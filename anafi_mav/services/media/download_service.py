@@ -65,7 +65,10 @@ class DownloadService(Service):
             task.cancel()
 
     async def _copy(self, folder: Path) -> None:
-        """Copy what is not there yet. One damaged file does not end it, a lost drone and a full disk do."""
+        """Copy the files that are not copied yet.
+
+        A damaged file does not end it, a lost drone and a full disk do.
+        """
         drone, copied = self.host.drone, 0
         problem: Exception | None = None
         try:

@@ -1,7 +1,7 @@
-"""The drone's photos and videos as a folder: `<day>/<file>`, read from the drone while a client reads them.
+"""The drone's photos and videos as a folder of MAVLink FTP.
 
-A day is "2026-11-22" by the drone's clock. Nothing is kept here but checksums: `drone.media` keeps the list and the
-pieces that were read last.
+A file is `<day>/<file>` and is read from the drone while a client reads it. A day is "2026-11-22" by the drone's clock.
+Nothing is kept here but checksums: `drone.media` keeps the list and the pieces that were read last.
 """
 
 from __future__ import annotations
@@ -99,12 +99,12 @@ def busy(drone: Drone) -> texts.OperatorText | None:
     """Return the reason why media must not be deleted now; None when they may be."""
     cameras = drone.camera.state
     if cameras.is_recording:
-        return texts.CAMERA_RECORDING
+        return texts.CAMERA_RECORDS
     return texts.CAMERA_SAVING if cameras.is_taking else None
 
 
 def when_listed(drone: Drone, then: Callable[[Listing], T]) -> T | Awaitable[T]:
-    """Apply `then` to the list of media: at once when it is kept, else when the drone has sent it."""
+    """Apply `then` to the list of media, at once when it is kept."""
     kept = drone.media.kept_listing
     return _after_listing(drone, then) if kept is None else then(kept)
 

@@ -12,7 +12,7 @@ from anafi_mav import texts
 from anafi_mav.drone import events
 from anafi_mav.drone.piloting.state import Attitude, Velocity
 from anafi_mav.services.service import Service
-from anafi_mav.vehicle.base.roll_sign import Sign
+from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 
@@ -20,22 +20,22 @@ KEY = "roll_sign"
 """Name of the record in the drone's file."""
 
 
-def written(firmware: str, sign: Sign) -> Mapping[str, Any]:
+def written(firmware: str, sign: RollSign) -> Mapping[str, Any]:
     """Make the record of a verdict, as plain JSON values."""
-    return {"firmware": firmware, "inverted": sign is Sign.LEFT}
+    return {"firmware": firmware, "inverted": sign is RollSign.INVERTED}
 
 
-def read(kept: Any, firmware: str | None) -> Sign:
+def read(kept: Any, firmware: str | None) -> RollSign:
     """Return the verdict that a record holds for a firmware.
 
     Returns UNKNOWN for a record of another firmware, or an invalid one.
     """
     if not isinstance(kept, dict) or not firmware or kept.get("firmware") != firmware:
-        return Sign.UNKNOWN
+        return RollSign.UNKNOWN
     inverted = kept.get("inverted")
     if not isinstance(inverted, bool):
-        return Sign.UNKNOWN
-    return Sign.LEFT if inverted else Sign.RIGHT
+        return RollSign.UNKNOWN
+    return RollSign.INVERTED if inverted else RollSign.NORMAL
 
 
 class RollSignService(Service):
@@ -44,7 +44,7 @@ class RollSignService(Service):
     def link_up(self) -> None:
         check = self.host.vehicle.roll
         check.recall(read(self.host.memory.settings.get(KEY), self.host.drone.identity.firmware))
-        if check.inverted:
+        if check.sign is RollSign.INVERTED:
             self.host.text(Severity.WARNING, texts.ROLL_SIGN_INVERTED)
 
     def subscriptions(self) -> Subscriptions:
@@ -81,7 +81,7 @@ class RollSignService(Service):
 
     def _report(self) -> None:
         sign, firmware = self.host.vehicle.roll.sign, self.host.drone.identity.firmware
-        if sign is Sign.LEFT:
+        if sign is RollSign.INVERTED:
             self.host.text(Severity.CRITICAL, texts.ROLL_SIGN_INVERTED)
         else:
             self.host.text(Severity.INFO, texts.ROLL_SIGN_VERIFIED)

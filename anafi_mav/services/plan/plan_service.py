@@ -52,8 +52,6 @@ class PlanService(Service):
         self._mission = MissionKind(self._home_item, self._version)
         self._protocol = MissionProtocol([self._mission, FenceKind(), RallyKind()])
         self._alarm = Alarm(self._expire)
-        self._due = 0.0
-        """When the timer ends."""
         self._item_commands: Mapping[int, MessageHandler] = {}
 
     def take_tables(self, item_commands: Mapping[int, MessageHandler]) -> None:
@@ -203,12 +201,10 @@ class PlanService(Service):
         A timer that ends too early is let run, for the deadline goes on with each item of an upload; it looks again.
         """
         deadline = self._protocol.deadline()
-        if self._alarm.is_set and deadline is not None and self._due <= deadline:
-            return
-        self._alarm.cancel()
-        if deadline is not None:
-            self._alarm.set_in(max(deadline - self.host.clock.monotonic(), 0.0))
-            self._due = deadline
+        if deadline is None:
+            self._alarm.cancel()
+        elif self._alarm.at is None or deadline < self._alarm.at:
+            self._alarm.set(deadline)
 
     def _expire(self) -> None:
         self._perform(self._protocol.expire(self.host.clock.monotonic()))

@@ -33,6 +33,9 @@ _GROUPS: Mapping[int, Sequence[int]] = {
         dialect.MAVLINK_MSG_ID_DISTANCE_SENSOR,
         dialect.MAVLINK_MSG_ID_BATTERY_STATUS,
         dialect.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
+        dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS,
+        dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS,
+        dialect.MAVLINK_MSG_ID_MOUNT_ORIENTATION,
     ),
 }
 

@@ -19,7 +19,7 @@ from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.service import Host, Query, Service
 from anafi_mav.services.stream import MessageStream, Times
-from anafi_mav.services.telemetry.telemetry_flight import amsl, target
+from anafi_mav.services.telemetry.telemetry_flight import target
 from anafi_mav.services.telemetry.telemetry_status import percent, sensor_bits
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
@@ -72,12 +72,13 @@ def high_latency(vehicle: Vehicle, times: Times, climb: float) -> dialect.MAVLin
     `climb` is the fastest climb or descent since the last message (m/s). Without a target the drone's own position is
     sent as the target. Throttle, airspeed and wind are not reported and have no "unknown": 0.
     """
-    place, state, height = vehicle.place, vehicle.drone.piloting.state, amsl(vehicle)
-    if place is None or height is None or state.attitude is None or state.velocity is None:
+    pose = times.pose(vehicle)
+    place, height = pose.place, pose.amsl(vehicle)
+    if place is None or height is None or pose.attitude is None or pose.velocity is None:
         return None
     gps = vehicle.drone.gps.state
     horizontal = [a for a in (gps.latitude_accuracy, gps.longitude_accuracy) if a is not None]
-    heading = _half_degrees(state.attitude.yaw)
+    heading = _half_degrees(pose.attitude.yaw)
     goal = target(vehicle)
     goal_height = None if goal is None else vehicle.height.amsl(goal.altitude)
     return dialect.MAVLink_high_latency2_message(
@@ -95,7 +96,7 @@ def high_latency(vehicle: Vehicle, times: Times, climb: float) -> dialect.MAVLin
         throttle=0,
         airspeed=0,
         airspeed_sp=0,
-        groundspeed=units.saturate(math.hypot(state.velocity.north, state.velocity.east) * 5.0, 8, signed=False),
+        groundspeed=units.saturate(math.hypot(pose.velocity.north, pose.velocity.east) * 5.0, 8, signed=False),
         windspeed=0,
         wind_heading=0,
         eph=UNKNOWN_U8 if not horizontal else min(max(horizontal) * 10, UNKNOWN_U8 - 1),

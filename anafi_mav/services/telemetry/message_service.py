@@ -19,9 +19,11 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.streams import Streams
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import flavour_of
+from anafi_mav.services.pose import VehiclePose, reported_pose
 from anafi_mav.services.service import Answer, Host, MessageHandler, Query, Request, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.services.telemetry import data_streams
+from anafi_mav.services.telemetry.pose_sources import PoseSources
 from anafi_mav.services.telemetry.update_tracker import UpdateTracker
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 
@@ -47,8 +49,11 @@ A component has those of its own messages. MAVSDK falls back on them, MAVProxy k
 LOG_EVERY = 5.0
 """s before it is logged again that a message cannot be made."""
 
-FASTEST = 0.1
-"""s between looks at messages that are repeated without news: a shorter interval is no shorter for them."""
+REPEATED = 0.1
+"""s between two repetitions of a message without updates; an update leaves at once, as often as `fastest` allows."""
+
+VIDEO_BELOW = 0.1
+"""s. A pose that is requested more often than ten times a second is one that events cannot give."""
 
 LONGEST = 2**31 - 1
 """us. An interval is reported as an INT32; a longer one is reported as the largest INT32."""
@@ -75,6 +80,19 @@ class MessageService(Service):
         """The time (s, monotonic) in the last message of each kind: it never goes back."""
         self._failed: dict[int, float] = {}
         """When it was last logged that a message cannot be made."""
+        self._sources: PoseSources[Channel] = PoseSources()
+        self._poses: tuple[int, ...] = ()
+        """The messages that can be made of pictures."""
+        self._of_video: tuple[int, ...] = ()
+        """The messages whose fields are in the video only."""
+        self._picture: VehiclePose | None = None
+        """The newest picture's."""
+        self._stamped_pictures = -math.inf
+        """The time (s, monotonic) of that picture."""
+        self._without: set[int] = set()
+        """Messages whose fields the pictures lack: events are their source."""
+        self._held: dict[int, float] = {}
+        """Of messages that were among these: the time (s) after which a picture is newer than the last event."""
 
     def take_tables(self, streams: Mapping[int, MessageStream], requests: Mapping[int, Request]) -> None:
         """Adopt the streams and the request handlers of all services of the component.
@@ -92,6 +110,8 @@ class MessageService(Service):
             if stream.on_change:
                 self._on_change.append(id)
         self._repeated = tuple(id for id, stream in streams.items() if stream.is_repeated)
+        self._poses = tuple(id for id, stream in streams.items() if stream.from_pictures)
+        self._of_video = tuple(id for id, stream in streams.items() if stream.needs_video and not stream.from_pictures)
 
     def queries(self) -> Mapping[int, Query]:
         return {
@@ -121,6 +141,14 @@ class MessageService(Service):
 
     def link_down(self) -> None:
         self._tracker.reset(self.host.clock.monotonic())
+        self._sources.link_down()
+        self._picture = None
+        self._without.clear()
+        self._held.clear()
+
+    def channel_closed(self, channel: Channel) -> None:
+        self._sources.close(channel)
+        self._intervals.channel_closed()
 
     def subscriptions(self) -> Subscriptions:
         return dict.fromkeys(self._events, self._on_update)
@@ -134,9 +162,44 @@ class MessageService(Service):
         if self._tracker.mark(id, at):
             asyncio.get_running_loop().call_soon(self._send_updated)
 
-    def is_streamed(self, id: int) -> bool:
-        """Return True when this message is streamed on some channel."""
-        return any(self._intervals.interval(channel, id) is not None for channel in self.host.channels)
+    @property
+    def needs_pictures(self) -> bool:
+        """True while a client wants pose from pictures."""
+        return self._sources.is_wanted(self.host.channels)
+
+    @property
+    def needs_video(self) -> bool:
+        """True while a client has a stream whose fields are in the video only."""
+        channels = self.host.channels
+        return any(self._intervals.interval(channel, id) is not None for id in self._of_video for channel in channels)
+
+    def show_picture(self, pose: VehiclePose, shot: float, now: float) -> None:
+        """Send the pose that a picture reports to the channels that want it.
+
+        `shot`: when the picture was taken (s, monotonic).
+        """
+        if self._picture is not None and self._stamped_pictures >= shot:
+            return  # what is known of the drone's clock has changed: the picture seems no newer than the last
+        self._picture, self._stamped_pictures = pose, shot
+        self._sources.on_picture(now)
+        newest_event = max((self._stamped.get(id, -math.inf) for id in self._poses), default=-math.inf)
+        channels = self._sources.on_pictures(self.host.channels, shot, newest_event, now)
+        if channels:
+            times = self.host.times(shot).at(pose)
+            for id, due in self._intervals.due_on(channels, self._poses, shot):
+                self._show(id, due, times, shot)
+
+    def _show(self, id: int, to: Sequence[Channel], times: Times, shot: float) -> None:
+        """Send a message made of a picture.
+
+        Where the picture lacks its fields, events remain its source.
+        """
+        if id not in self._without:
+            if shot > self._held.get(id, -math.inf) and not self._leave(id, to, times):
+                self._without.add(id)
+        elif self._table[id].build(self.host.vehicle, times) is not None:
+            self._without.discard(id)
+            self._held[id] = self._stamped.get(id, -math.inf)
 
     def tick(self, now: float) -> None:
         self._tracker.pass_time(now)
@@ -152,9 +215,21 @@ class MessageService(Service):
 
     def _send_updated(self) -> None:
         ids, at = self._tracker.take()
-        due = self._intervals.due_on(self.host.channels, ids, at)
-        for id, channels in due:
-            self._leave(id, channels, self._stamp(id, at))
+        everyone = self.host.channels
+        channels = self._sources.on_events(everyone, at)
+        if channels is everyone:
+            due = self._intervals.due_on(everyone, ids, at)
+        else:
+            others = tuple(id for id in ids if not self._is_pictured(id))
+            poses = tuple(id for id in ids if self._is_pictured(id))
+            due = [*self._intervals.due_on(everyone, others, at), *self._intervals.due_on(channels, poses, at)]
+        moment: VehiclePose | None = None
+        for id, to in due:
+            times = self._stamp(id, at)
+            if self._table[id].from_pictures:  # one moment for all of them
+                moment = moment or reported_pose(self.host.vehicle)
+                times = times.at(moment)
+            self._leave(id, to, times)
 
     def _times(self, id: int) -> Times:
         """When the newest of the fields of a message was true.
@@ -165,25 +240,45 @@ class MessageService(Service):
             return self._stamp(id, self.host.clock.monotonic())
         return self._stamp(id, self._tracker.at(id) or self._linked_at)
 
+    def _times_for(self, channel: Channel, id: int) -> Times:
+        """As `_times`, for an answer on one channel: of the picture where pictures are the source."""
+        if not self._is_pictured(id):
+            return self._times(id)
+        now, newest = self.host.clock.monotonic(), self._sources.newest(channel)
+        has_pictures = self._sources.has_pictures(channel, self.host.channels, now)
+        if has_pictures and self._picture is not None and newest == self._stamped_pictures:
+            return self.host.times(newest).at(self._picture)
+        at = max(self._tracker.at(id) or self._linked_at, newest)
+        self._sources.on_answer(channel, at)
+        return self._stamp(id, at)
+
+    def _is_pictured(self, id: int) -> bool:
+        """Return True when this message is made of pictures where a channel has them."""
+        return self._table[id].from_pictures and id not in self._without
+
     def _stamp(self, id: int, at: float) -> Times:
         """The time for a message of this kind; an event that was handled late does not put it back."""
         at = self._stamped[id] = max(at, self._stamped.get(id, at))
         return self.host.times(at)
 
-    def _leave(self, id: int, to: Sequence[Channel], times: Times) -> None:
+    def _leave(self, id: int, to: Sequence[Channel], times: Times) -> bool:
+        """Send a message; return False when a value that it needs is unknown."""
         stream = self._table[id]
         try:
             if stream.flavoured:
                 vehicle = self.host.vehicle
                 self.host.send_by_flavour(lambda flavour: stream.build(vehicle, times.for_flavour(flavour)), to)
-            elif (message := stream.build(self.host.vehicle, times)) is not None:
-                self.host.send(message, to)
+                return True
+            if (message := stream.build(self.host.vehicle, times)) is None:
+                return False
+            self.host.send(message, to)
         except Exception as error:
             # A value of the drone's that nobody foresaw. The other messages, and the heartbeat, go on without it.
             now = self.host.clock.monotonic()
             if now - self._failed.get(id, -math.inf) >= LOG_EVERY:
                 self._failed[id] = now
                 logger.error("%s: message %d cannot be made: %r", self.host.drone.name, id, error)
+        return True
 
     def _data_stream(self, inbound: Inbound) -> None:
         """REQUEST_DATA_STREAM, from clients of flavours with `data_streams`."""
@@ -195,10 +290,13 @@ class MessageService(Service):
             if id in self._table:
                 self._ask(inbound.channel, id, 1.0 / rate if rate else None)
 
-    def _ask(self, channel: Channel, id: int, interval: float | None) -> None:
-        if interval is not None and self._table[id].is_repeated:
-            interval = max(interval, FASTEST)
+    def _ask(self, channel: Channel, id: int, interval: float | None, *, wants_pictures: bool = False) -> None:
+        stream = self._table[id]
+        if interval is not None and stream.is_repeated:
+            interval = max(interval, stream.fastest)
         self._intervals.set(channel, id, interval)
+        if stream.from_pictures:
+            self._sources.request(channel, id, wanted=wants_pictures and self.host.has_picture_pose)
 
     # Requests: answered at once, every time.
 
@@ -219,7 +317,7 @@ class MessageService(Service):
         stream = self._table.get(int(id)) if id == int(id) else None
         if stream is None:
             return dialect.MAV_RESULT_UNSUPPORTED
-        times = self._times(int(id)).for_flavour(flavour_of(inbound.channel))
+        times = self._times_for(inbound.channel, int(id)).for_flavour(flavour_of(inbound.channel))
         message = stream.build(self.host.vehicle, times)
         return dialect.MAV_RESULT_TEMPORARILY_REJECTED if message is None else message
 
@@ -238,10 +336,13 @@ class MessageService(Service):
             return dialect.MAV_RESULT_UNSUPPORTED
         if math.isnan(interval) or interval == 0:
             self._intervals.reset(inbound.channel, int(id))
+            self._sources.request(inbound.channel, int(id), wanted=False)
         elif interval == -1:
             self._ask(inbound.channel, int(id), None)
         elif interval > 0 and math.isfinite(interval):
-            self._ask(inbound.channel, int(id), min(interval, LONGEST) / 1e6)
+            interval = min(interval, LONGEST) / 1e6
+            wants_pictures = interval < VIDEO_BELOW or self._table[int(id)].needs_video
+            self._ask(inbound.channel, int(id), interval, wants_pictures=wants_pictures)
         else:
             return dialect.MAV_RESULT_DENIED
         return dialect.MAV_RESULT_ACCEPTED
@@ -264,14 +365,17 @@ class MessageService(Service):
         microseconds = 0
         if int(id) in self._table:
             asked = self._intervals.interval(inbound.channel, int(id))
-            microseconds = -1 if asked is None else min(round(max(asked, self._source(int(id))) * 1e6), LONGEST)
+            source = self._source(inbound.channel, int(id))
+            microseconds = -1 if asked is None else min(round(max(asked, source) * 1e6), LONGEST)
         return dialect.MAVLink_message_interval_message(int(id), microseconds)
 
-    def _source(self, id: int) -> float:
-        """Return the mean time (s) between updates for this message, as far as it is known.
-
-        Returns 0 when the message is also repeated without updates.
-        """
+    def _source(self, channel: Channel, id: int) -> float:
+        """Return the mean time (s) between two updates of this message; 0 when unknown."""
+        now = self.host.clock.monotonic()
+        if self._is_pictured(id) and self._sources.has_pictures(channel, self.host.channels, now):
+            rate = self.host.drone.video.state.rate_hz
+            return 1.0 / rate if rate else 0.0
+        interval = self._tracker.interval(id, now)
         if self._table[id].is_repeated:
-            return 0.0
-        return self._tracker.interval(id, self.host.clock.monotonic()) or 0.0
+            return REPEATED if interval is None else 1.0 / (1.0 / REPEATED + 1.0 / interval)
+        return interval or 0.0

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 
 from anafi_mav import units
 from anafi_mav.drone import events
@@ -24,6 +25,9 @@ from anafi_mav.vehicle.vehicle import Vehicle
 NAN = math.nan
 UNKNOWN_U8, UNKNOWN_U16, UNKNOWN_I32 = 0xFF, 0xFFFF, 0x7FFFFFFF
 NO_AXIS = -128
+
+INPUT_FASTEST = 0.01
+"""s between two ANAFI_CONTROLLER_INPUT: anafi_ros publishes the Skycontroller's sticks a hundred times a second."""
 
 
 def _u8(value: int | None) -> int:
@@ -195,7 +199,7 @@ STREAMS: Mapping[int, MessageStream] = {
     ),
     dialect.MAVLINK_MSG_ID_ANAFI_HOME: _state(home, Home.REDUCERS),
     dialect.MAVLINK_MSG_ID_ANAFI_CHECKLIST: _state(checklist, Alerts.REDUCERS),
-    dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_INPUT: _state(controller_input, _INPUT),
+    dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_INPUT: replace(_state(controller_input, _INPUT), fastest=INPUT_FASTEST),
     dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_ATTITUDE: MessageStream(
         controller_attitude, (events.ControllerAttitudeChanged,)
     ),

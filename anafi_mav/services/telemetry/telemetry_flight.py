@@ -12,8 +12,6 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from msgspec.structs import replace
-
 from anafi_mav import geo, units
 from anafi_mav.drone import events
 from anafi_mav.drone.events import MoveToStatus
@@ -31,17 +29,9 @@ MOVING = 0.5
 """m/s. Slower than this the course over ground is noise and is reported as unknown."""
 
 
-def _attitude(vehicle: Vehicle) -> Attitude | None:
-    """Return the attitude with right wing down +, also of a drone known to report roll inverted."""
-    state = vehicle.drone.piloting.state.attitude
-    if state is None or not vehicle.roll.inverted:
-        return state
-    return replace(state, roll=-state.roll)
-
-
 def attitude(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """ATTITUDE. ARSDK reports no body rates: NaN."""
-    state = _attitude(vehicle)
+    state = times.pose(vehicle).attitude
     if state is None:
         return None
     return dialect.MAVLink_attitude_message(
@@ -51,23 +41,11 @@ def attitude(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
 
 def attitude_quaternion(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """ATTITUDE_QUATERNION, (w, x, y, z)."""
-    state = _attitude(vehicle)
+    state = times.pose(vehicle).attitude
     if state is None:
         return None
     w, x, y, z = units.quaternion_from_euler(state.roll, state.pitch, state.yaw)
     return dialect.MAVLink_attitude_quaternion_message(times.boot_ms, w, x, y, z, NAN, NAN, NAN)
-
-
-def amsl(vehicle: Vehicle) -> float | None:
-    """Return the height above sea level, m.
-
-    It is ATO over the latched take-off point, without a latch the plain GPS altitude.
-    """
-    ato = vehicle.drone.piloting.state.altitude
-    height = None if ato is None else vehicle.height.amsl(ato)
-    if height is None and (location := vehicle.drone.gps.state.location) is not None:
-        return location.altitude
-    return height
 
 
 def global_position_int(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
@@ -77,31 +55,32 @@ def global_position_int(vehicle: Vehicle, times: Times) -> dialect.MAVLink_messa
 
     0/0 is no substitute for an unknown position: it is a place.
     """
-    place, state, height = vehicle.place, vehicle.drone.piloting.state, amsl(vehicle)
-    if place is None or height is None or state.altitude is None or state.velocity is None:
+    pose = times.pose(vehicle)
+    place, height = pose.place, pose.amsl(vehicle)
+    if place is None or height is None or pose.altitude is None or pose.velocity is None:
         return None
     return dialect.MAVLink_global_position_int_message(
         times.boot_ms,
         units.deg_e7(place.latitude),
         units.deg_e7(place.longitude),
         units.millimetres(height),
-        units.millimetres(state.altitude),
-        units.centimetres(state.velocity.north),
-        units.centimetres(state.velocity.east),
-        units.centimetres(state.velocity.down),
-        UNKNOWN_U16 if state.attitude is None else units.centidegrees(state.attitude.yaw),
+        units.millimetres(pose.altitude),
+        units.centimetres(pose.velocity.north),
+        units.centimetres(pose.velocity.east),
+        units.centimetres(pose.velocity.down),
+        UNKNOWN_U16 if pose.attitude is None else units.centidegrees(pose.attitude.yaw),
     )
 
 
 def local_position_ned(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """LOCAL_POSITION_NED: metres north, east and down of where the drone last took off."""
-    place, origin, state = vehicle.place, vehicle.origin, vehicle.drone.piloting.state
-    if place is None or origin is None or state.altitude is None or state.velocity is None:
+    pose, origin = times.pose(vehicle), vehicle.origin
+    place, velocity = pose.place, pose.velocity
+    if place is None or origin is None or pose.altitude is None or velocity is None:
         return None
     north, east = geo.offset(origin.latitude, origin.longitude, place.latitude, place.longitude)
-    velocity = state.velocity
     return dialect.MAVLink_local_position_ned_message(
-        times.boot_ms, north, east, -state.altitude, velocity.north, velocity.east, velocity.down
+        times.boot_ms, north, east, -pose.altitude, velocity.north, velocity.east, velocity.down
     )
 
 
@@ -122,11 +101,11 @@ def odometry(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
 
     The velocity is along the drone's axes. Rates and covariances are not reported: NaN.
     """
-    place, origin, state = vehicle.place, vehicle.origin, vehicle.drone.piloting.state
-    leaning = _attitude(vehicle)
+    pose, origin = times.pose(vehicle), vehicle.origin
+    place, leaning = pose.place, pose.attitude
     if place is None or origin is None:
         return None
-    if state.altitude is None or state.velocity is None or leaning is None:
+    if pose.altitude is None or pose.velocity is None or leaning is None:
         return None
     north, east = geo.offset(origin.latitude, origin.longitude, place.latitude, place.longitude)
     return dialect.MAVLink_odometry_message(
@@ -135,9 +114,9 @@ def odometry(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
         dialect.MAV_FRAME_BODY_FRD,
         north,
         east,
-        -state.altitude,
+        -pose.altitude,
         list(units.quaternion_from_euler(leaning.roll, leaning.pitch, leaning.yaw)),
-        *_to_body(state.velocity, leaning),
+        *_to_body(pose.velocity, leaning),
         NAN,
         NAN,
         NAN,
@@ -148,10 +127,11 @@ def odometry(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
 
 def altitude(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """ALTITUDE: all relative heights are above the take-off point."""
-    ato = vehicle.drone.piloting.state.altitude
+    pose = times.pose(vehicle)
+    ato, ground = pose.altitude, pose.height
     if ato is None:
         return None
-    height, ground = amsl(vehicle), vehicle.drone.piloting.state.height
+    height = pose.amsl(vehicle)
     return dialect.MAVLink_altitude_message(
         times.boot_us, ato, NAN if height is None else height, ato, ato, NAN, NAN if ground is None else ground
     )
@@ -162,16 +142,17 @@ def vfr_hud(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
 
     No airspeed is measured: NaN. Nor does an ANAFI report its throttle, but that field knows only 0.
     """
-    state, height = vehicle.drone.piloting.state, amsl(vehicle)
-    if state.velocity is None or state.attitude is None:
+    pose = times.pose(vehicle)
+    height = pose.amsl(vehicle)
+    if pose.velocity is None or pose.attitude is None:
         return None
     return dialect.MAVLink_vfr_hud_message(
         NAN,
-        math.hypot(state.velocity.north, state.velocity.east),
-        round(units.wrap_360(state.attitude.yaw * units.DEG_PER_RAD)) % 360,
+        math.hypot(pose.velocity.north, pose.velocity.east),
+        round(units.wrap_360(pose.attitude.yaw * units.DEG_PER_RAD)) % 360,
         0,
         NAN if height is None else height,
-        -state.velocity.down,
+        -pose.velocity.down,
     )
 
 
@@ -313,17 +294,23 @@ def gps_global_origin(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message
 _POSITION = (events.GpsLocationChanged, events.AltitudeChanged, events.SpeedChanged)
 
 STREAMS: Mapping[int, MessageStream] = {
-    dialect.MAVLINK_MSG_ID_ATTITUDE: MessageStream(attitude, (events.AttitudeChanged,), every=0.1),
+    dialect.MAVLINK_MSG_ID_ATTITUDE: MessageStream(attitude, (events.AttitudeChanged,), every=0.1, from_pictures=True),
     dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: MessageStream(
-        attitude_quaternion, (events.AttitudeChanged,), every=0.1
+        attitude_quaternion, (events.AttitudeChanged,), every=0.1, from_pictures=True
     ),
-    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: MessageStream(global_position_int, _POSITION, every=0.2),
-    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: MessageStream(local_position_ned, _POSITION, every=0.2),
-    dialect.MAVLINK_MSG_ID_ODOMETRY: MessageStream(odometry, (events.AttitudeChanged, *_POSITION)),
+    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: MessageStream(
+        global_position_int, _POSITION, every=0.2, from_pictures=True
+    ),
+    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: MessageStream(
+        local_position_ned, _POSITION, every=0.2, from_pictures=True
+    ),
+    dialect.MAVLINK_MSG_ID_ODOMETRY: MessageStream(odometry, (events.AttitudeChanged, *_POSITION), from_pictures=True),
     dialect.MAVLINK_MSG_ID_ALTITUDE: MessageStream(
-        altitude, (events.AltitudeChanged, events.AltitudeAboveGroundChanged), every=0.2
+        altitude, (events.AltitudeChanged, events.AltitudeAboveGroundChanged), every=0.2, from_pictures=True
     ),
-    dialect.MAVLINK_MSG_ID_VFR_HUD: MessageStream(vfr_hud, (events.SpeedChanged, events.AltitudeChanged), every=0.2),
+    dialect.MAVLINK_MSG_ID_VFR_HUD: MessageStream(
+        vfr_hud, (events.SpeedChanged, events.AltitudeChanged), every=0.2, from_pictures=True
+    ),
     dialect.MAVLINK_MSG_ID_GPS_RAW_INT: MessageStream(
         gps_raw_int, (events.GpsLocationChanged, events.NumberOfSatelliteChanged, events.GPSFixStateChanged), every=0.5
     ),

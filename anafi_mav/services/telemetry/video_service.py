@@ -1,28 +1,33 @@
 """Telemetry that only the live video has.
 
-Exposure, gains, white balance, fields of view, goodput. The video costs the radio some Mbit/s, so it runs while a
-client has a stream of ANAFI_CAMERA_EXPOSURE and not longer. When it runs for another reason, e.g. because a viewer
-watches it, its telemetry is sent all the same.
+Exposure, gains, white balance, fields of view, goodput, and the pose 30 times a second. The video costs the radio some
+Mbit/s, so it runs while a client needs it and not longer: a stream of ANAFI_CAMERA_EXPOSURE or ANAFI_PICTURE, or a
+pose message at more than ten times a second. When it runs for another reason, e.g. because a viewer watches it,
+exposure and link are sent all the same.
 """
 
 from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from anafi_mav import texts, units
+from anafi_mav.drone import events
 from anafi_mav.drone.payload.camera import Camera
 from anafi_mav.drone.status.link import Link, LinkState
 from anafi_mav.drone.video.video import VideoFrame
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
+from anafi_mav.services.pose import picture_pose
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.stream import MessageStream, Times
+from anafi_mav.services.telemetry.height_track import HeightTrack
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
 
 NAN = math.nan
-UNKNOWN_U8, UNKNOWN_I16, UNKNOWN_U32 = 0xFF, 0x7FFF, 0xFFFFFFFF
+UNKNOWN_U8, UNKNOWN_I16, UNKNOWN_U16, UNKNOWN_U32, UNKNOWN_U64 = 0xFF, 0x7FFF, 0xFFFF, 0xFFFFFFFF, (1 << 64) - 1
 
 RETRY = 10.0
 """s until a video that did not come is tried again."""
@@ -95,11 +100,38 @@ def link(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     )
 
 
+def _quaternion(quat: Sequence[float] | None) -> list[float]:
+    return [NAN] * 4 if quat is None else list(quat)
+
+
+def picture(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
+    """Return ANAFI_PICTURE of a picture; None without one."""
+    frame = None if times.moment is None else times.moment.frame
+    if frame is None:
+        return None
+    said = frame.metadata
+    return dialect.MAVLink_anafi_picture_message(
+        UNKNOWN_U64 if said.timestamp is None else said.timestamp,
+        times.boot_ms,
+        frame.timestamp,
+        _quaternion(said.quat),
+        _quaternion(said.drone_quat),
+        _number(said.hfov, units.DEG_PER_RAD),
+        _number(said.vfov, units.DEG_PER_RAD),
+        min(round((frame.arrived - frame.shot) * 1e3), UNKNOWN_U16 - 1),
+        dialect.ANAFI_PICTURE_CLOCK_REPORT if frame.is_clock_known else dialect.ANAFI_PICTURE_CLOCK_ARRIVAL,
+    )
+
+
 class VideoTelemetryService(Service):
-    """Watches the video for as long as a client wants to know what only it says."""
+    """Watches the video for as long as a client needs what only its pictures report."""
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
+        self._altitudes = HeightTrack()
+        """Above the take-off point."""
+        self._heights = HeightTrack()
+        """Above the ground below."""
         self._undo: Callable[[], None] | None = None
         self._watch: asyncio.Task[None] | None = None
         self._retry_at = 0.0
@@ -107,10 +139,27 @@ class VideoTelemetryService(Service):
     def streams(self) -> Mapping[int, MessageStream]:
         return {
             dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE: MessageStream(
-                camera_exposure, tuple(Camera.REDUCERS), repeated=True
+                camera_exposure, tuple(Camera.REDUCERS), repeated=True, needs_video=True
             ),
+            dialect.MAVLINK_MSG_ID_ANAFI_PICTURE: MessageStream(picture, from_pictures=True, needs_video=True),
             dialect.MAVLINK_MSG_ID_ANAFI_LINK: MessageStream(link, tuple(Link.REDUCERS), repeated=True),
         }
+
+    def subscriptions(self) -> Subscriptions:
+        return {events.AltitudeChanged: self._on_altitude, events.AltitudeAboveGroundChanged: self._on_height}
+
+    def _on_altitude(self, message: events.AltitudeChanged, now: float) -> None:
+        self._note(self._altitudes, self.host.drone.piloting.state.altitude, now)
+
+    def _on_height(self, message: events.AltitudeAboveGroundChanged, now: float) -> None:
+        self._note(self._heights, self.host.drone.piloting.state.height, now)
+
+    @staticmethod
+    def _note(track: HeightTrack, height: float | None, now: float) -> None:
+        if height is None:
+            track.clear()
+        else:
+            track.add(now, height)
 
     def link_up(self) -> None:
         self._undo = self.host.drone.video.subscribe(self._frame)
@@ -121,12 +170,16 @@ class VideoTelemetryService(Service):
             self._undo = None
         self._watch = None  # cancelled with all that the host has spawned
         self._retry_at = 0.0
+        self._altitudes.clear()
+        self._heights.clear()
 
     def tick(self, now: float) -> None:
-        wanted = self.host.is_streamed(dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE)
+        wanted = self.host.needs_video or self.host.needs_pictures
         if self._watch is not None and (self._watch.done() or not wanted):
             self._watch.cancel()
             self._watch = None
+        if not wanted:
+            self._retry_at = 0.0
         if wanted and self._watch is None and now >= self._retry_at:
             self._retry_at = now + RETRY
             self._watch = self.host.spawn(self._stay())
@@ -136,8 +189,17 @@ class VideoTelemetryService(Service):
             async with self.host.drone.video.watching():
                 await asyncio.Event().wait()  # until it is cancelled
         except AnafiMavError as error:
-            self.host.warn_throttled(texts.NO_EXPOSURE.fill(error=error))
+            if self.host.needs_pictures:
+                self.host.warn_throttled(texts.NO_PICTURES.fill(error=error))
+            else:
+                self.host.warn_throttled(texts.NO_EXPOSURE.fill(error=error))
 
     def _frame(self, frame: VideoFrame) -> None:
         self.host.mark_updated(dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE, frame.arrived)
         self.host.mark_updated(dialect.MAVLINK_MSG_ID_ANAFI_LINK, frame.arrived)
+        if self.host.needs_pictures:
+            speed = frame.metadata.speed
+            climb = 0.0 if speed is None else -speed.down
+            altitude, height = self._altitudes.at(frame.shot, climb), self._heights.at(frame.shot, climb)
+            pose = picture_pose(self.host.vehicle, frame, altitude, height)
+            self.host.show_picture(pose, frame.shot, frame.arrived)

@@ -2,7 +2,9 @@
 
 Each axis turns in the frame of reference last commanded. All angles in degrees with Parrot's signs: pitch up, roll
 clockwise seen from behind, yaw clockwise from above; absolute is to the horizon and to north. An axis that cannot be
-turned moves with the body, or with the picture that the electronics keep level.
+turned moves with the body, or with the picture that the electronics keep level. Yaw turns no further from the nose
+than its range, in either frame: an absolute yaw target is to north, and the body drags the axis along at the end of its
+range (assumed; Parrot publishes no range of yaw).
 
 A velocity target is a share (-1..1) of the speed setting and holds until the next target or the end of the range.
 """
@@ -40,6 +42,8 @@ class _AxisState:
     target: float = 0.0
     rate: float | None = None
     """Share of the speed of a velocity target; None: towards `target`."""
+    is_ranged_by_body: bool = False
+    """Its range counts from the body in the absolute frame, too; otherwise it is the same in both frames."""
 
     @property
     def fixed(self) -> bool:
@@ -54,7 +58,7 @@ class _AxisState:
         target, reach = self.target, speed * seconds
         if self.rate is not None:
             target, reach = math.copysign(math.inf, self.rate), abs(self.rate) * speed * seconds
-        self.angle = clip(clip(target, self.angle - reach, self.angle + reach), self.low, self.high)
+        self.angle = self._bounded(clip(target, self.angle - reach, self.angle + reach))
 
     def aim(self, mode: ControlMode, frame: FrameOfReference, value: float, body: float) -> None:
         """Take a target; `body` is the drone's own angle on this axis, for a change of frame."""
@@ -62,11 +66,29 @@ class _AxisState:
             return
         if frame is not self.frame:
             self.angle += body if frame is FrameOfReference.ABSOLUTE else -body
+            if self.is_ranged_by_body:
+                self.angle = _wrap(self.angle)
             self.frame = frame
         if mode is ControlMode.VELOCITY:
             self.rate = clip(value, -1.0, 1.0)
         else:
-            self.rate, self.target = None, clip(value, self.low, self.high)
+            self.rate, self.target = None, self._bounded(self._near(value))
+
+    def drag(self, body: float) -> None:
+        """Keep the axis within its range from the body, whose own angle is `body`."""
+        if self.is_ranged_by_body and self.frame is FrameOfReference.ABSOLUTE and not self.fixed:
+            self.angle = body + clip(_wrap(self.angle - body), self.low, self.high)
+            self.target = self._near(self.target)
+
+    def _near(self, value: float) -> float:
+        """Return a target as the axis reaches it by the shorter way."""
+        turns_round = self.is_ranged_by_body and self.frame is FrameOfReference.ABSOLUTE
+        return self.angle + _wrap(value - self.angle) if turns_round else value
+
+    def _bounded(self, angle: float) -> float:
+        if self.is_ranged_by_body and self.frame is FrameOfReference.ABSOLUTE:
+            return angle  # `drag` bounds it
+        return clip(angle, self.low, self.high)
 
     def both(self, body: float) -> tuple[float, float]:
         """(relative to the body, absolute)."""
@@ -89,7 +111,7 @@ class Gimbal:
         self._limits = speed
         self._speed = speed.default
         self._axes = {
-            Axis.YAW: _AxisState(*model.yaw, frame=FrameOfReference.RELATIVE),
+            Axis.YAW: _AxisState(*model.yaw, frame=FrameOfReference.RELATIVE, is_ranged_by_body=True),
             Axis.PITCH: _AxisState(*model.pitch),
             Axis.ROLL: _AxisState(*model.roll),
         }
@@ -171,6 +193,7 @@ class Gimbal:
 
     def attitude(self, pose: Pose) -> gimbal.Attitude:
         yaw_axis, pitch_axis, roll_axis = self._axes.values()
+        yaw_axis.drag(pose.yaw * DEG_PER_RAD)
         yaw = yaw_axis.both(pose.yaw * DEG_PER_RAD)
         pitch = pitch_axis.both(pose.pitch * DEG_PER_RAD)
         roll = roll_axis.both(pose.roll * DEG_PER_RAD)
@@ -214,11 +237,14 @@ class Gimbal:
     def states_report(self, pose: Pose) -> list[Message]:
         """Return this part's messages of the AllStates answer."""
         bounds = self._per_axis(lambda axis: (self._axes[axis].low, self._axes[axis].high))
+        to_north = self._per_axis(
+            lambda axis: (-180.0, 180.0) if axis is Axis.YAW else (self._axes[axis].low, self._axes[axis].high)
+        )
         turning = sum(1 << axis for axis, state in self._axes.items() if not state.fixed)
         return [
             gimbal.GimbalCapabilities(self.id, self._model, turning),
             gimbal.RelativeAttitudeBounds(self.id, *bounds),
-            gimbal.AbsoluteAttitudeBounds(self.id, *bounds),
+            gimbal.AbsoluteAttitudeBounds(self.id, *to_north),
             self._max_speed(),
             self.attitude(pose),
             gimbal.AxisLockState(self.id, 0),

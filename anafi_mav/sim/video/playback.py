@@ -124,19 +124,22 @@ class Track:
         """Stop playing."""
         self._number = None
 
-    def send(self, now: float, metadata: FrameMetadata | None) -> None:
-        """The next picture, taken `now`."""
+    def send(self, taken: float, metadata: FrameMetadata | None) -> None:
+        """The next picture, `taken` now or a little earlier."""
         if self._number is None or self._sockets is None:
             return
         units = self._pictures.units(self._number)
         self._number += 1
         self._sent += 1
-        rtp, reports = self._sockets
-        for datagram in self._sender.send(units, self.timestamp(now), metadata, self._profile):
+        rtp, _ = self._sockets
+        for datagram in self._sender.send(units, self.timestamp(taken), metadata, self._profile):
             self._air(datagram, _Letterbox(rtp, self._clients[0]))
-        if now >= self._next_report:
+
+    def report(self, now: float) -> None:
+        """Send a sender report when one is due."""
+        if self._number is not None and self._sockets is not None and now >= self._next_report:
             self._next_report = now + REPORT_PERIOD
-            sender = self._sender
+            sender, (_, reports) = self._sender, self._sockets
             report = SenderReport(sender.ssrc, int(now * 1e6), self.timestamp(now), sender.packets, sender.octets)
             self._air(rtcp.encode_sender_report(report, self._name), _Letterbox(reports, self._clients[1]))
 

@@ -100,8 +100,11 @@ class VideoServer:
         hears: Callable[[], bool],
         send: Send,
         session_timeout: int = SESSION_TIMEOUT,
+        latency: float = 0.0,
     ) -> None:
+        """`latency`: s from a picture to its first packet."""
         self._firmware = firmware
+        self._latency = latency
         self._profile = video.profile(firmware.model)
         self._chance = chance
         self._note = note
@@ -385,12 +388,20 @@ class VideoServer:
                 # Of what a recording shows nothing but the place is kept: its pictures say nothing.
                 if session.resource.seconds is None and stream.title not in said:
                     said[stream.title] = video.metadata(self._firmware, stream)
-                track.send(now, said.get(stream.title) if session.resource.seconds is None else None)
+                track.report(now)
+                self._send_picture(track, now, said.get(stream.title) if session.resource.seconds is None else None)
             if session.resource.seconds is not None:
                 session.position += PERIOD
                 if session.position >= session.until - 0.5 / FRAME_RATE:
                     session.position = session.until
                     self._stop(session, "finished")
+
+    def _send_picture(self, track: Track, taken: float, metadata: FrameMetadata | None) -> None:
+        """Send a picture once it is encoded."""
+        if self._latency > 0.0:
+            asyncio.get_running_loop().call_later(self._latency, track.send, taken, metadata)
+        else:
+            track.send(taken, metadata)
 
 
 _HANDLERS: dict[str, Callable[[VideoServer, RtspRequest, str], Awaitable[tuple[list[tuple[str, str]], bytes]]]] = {

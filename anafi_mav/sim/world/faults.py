@@ -66,6 +66,8 @@ class Faults:
 
     Those that depend on the file are checked when the plan is started.
     """
+    no_pictures: bool = False
+    """The live video shows nothing, as while a camera changes its mode; its sessions stay open."""
     storage_full: bool = False
     """No room for a photo more."""
     quirks: frozenset[Quirk] = frozenset()

@@ -58,9 +58,10 @@ class BatteryModel:
 
 @dataclass(frozen=True)
 class GimbalModel:
-    """Ranges of one gimbal in deg, the same relative to the body and to the horizon.
+    """Ranges of one gimbal in deg.
 
-    (0, 0) is an axis that does not turn.
+    Those of pitch and roll are the same to the body and to the horizon, that of yaw is to the body. (0, 0) is an axis
+    that does not turn.
     """
 
     pitch: tuple[float, float]

@@ -9,10 +9,12 @@ of them needs to know the others.
 from __future__ import annotations
 
 import asyncio
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Mapping
 
 from anafi_mav import texts
+from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import FlyingState, PilotingStyleStyle
 from anafi_mav.texts import OperatorText
@@ -25,6 +27,12 @@ from anafi_mav.vehicle.base.right import Right
 from anafi_mav.vehicle.base.roll_sign import RollCheck
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.fence_watch import FenceWatch, OutsideFence
+
+POSITION_OLD = 3.0
+"""s without a GPS location, which an ANAFI reports once a second, after which the last one is no position in flight."""
+
+LOCATIONS_MISSED = 3
+"""A drone that reports its location more rarely (a slowed simulator) may miss as many."""
 
 STOP_WAIT = 0.5
 """s that a stopping command waits for the action that it replaces.
@@ -50,7 +58,12 @@ class Aircraft(ABC):
     """One drone that can be flown. All methods run on the event loop's thread."""
 
     def __init__(
-        self, drone: Drone, *, text: Callable[[Severity, OperatorText], None], changed: Callable[[], None]
+        self,
+        drone: Drone,
+        clock: Clock,
+        *,
+        text: Callable[[Severity, OperatorText], None],
+        changed: Callable[[], None],
     ) -> None:
         self.drone = drone
         self.height = HeightReference()
@@ -78,6 +91,11 @@ class Aircraft(ABC):
         self.paused = False
         """A client has paused: setpoints of every client are ignored until a command or another mode ends it."""
         self._selected = FlightMode.HOLD
+        self._clock = clock
+        self._located_at = -math.inf
+        """When the newest GPS location arrived."""
+        self._location_every = 0.0
+        """s between it and the one before."""
 
     # What it is.
 
@@ -135,10 +153,19 @@ class Aircraft(ABC):
         return self._selected
 
     @property
-    def place(self) -> GeoPoint | None:
-        """Position of the drone by its newest GPS location; None without a fix."""
+    def position_is_old(self) -> bool:
+        """True in flight when GPS locations have stopped although the drone reports a fix."""
         gps = self.drone.gps.state
-        if not gps.fixed or gps.location is None:
+        if not gps.fixed or gps.location is None or self.flying_state is None or self.on_ground:
+            return False
+        patience = max(POSITION_OLD, LOCATIONS_MISSED * self._location_every)
+        return self._clock.monotonic() - self._located_at > patience
+
+    @property
+    def place(self) -> GeoPoint | None:
+        """Position of the drone; None without a fix, and in flight while the newest location is old."""
+        gps = self.drone.gps.state
+        if not gps.fixed or gps.location is None or self.position_is_old:
             return None
         return GeoPoint(gps.location.latitude, gps.location.longitude)
 

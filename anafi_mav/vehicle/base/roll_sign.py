@@ -51,12 +51,12 @@ G = 9.81
 """m/s2."""
 
 
-class Sign(enum.Enum):
+class RollSign(enum.Enum):
     """Knowledge of the sign of AttitudeChanged.roll."""
 
     UNKNOWN = "unknown"
-    RIGHT = "positive with the right wing down, as assumed"
-    LEFT = "positive with the left wing down"
+    NORMAL = "positive with the right wing down, as assumed"
+    INVERTED = "positive with the left wing down"
 
 
 @dataclass(frozen=True)
@@ -76,9 +76,9 @@ class _Interval:
 class RollCheck:
     """The evidence on one drone's sign of roll, from moves of any kind."""
 
-    def __init__(self, sign: Sign = Sign.UNKNOWN) -> None:
+    def __init__(self, sign: RollSign = RollSign.UNKNOWN) -> None:
         self.sign = sign
-        self._fits = {Sign.RIGHT: 0, Sign.LEFT: 0}
+        self._fits = {RollSign.NORMAL: 0, RollSign.INVERTED: 0}
         self._rolls: list[float] = []
         """rad, reported since the present interval began, and the last one before."""
         self._yaw = 0.0
@@ -87,19 +87,9 @@ class RollCheck:
         self._recent: list[_Interval] = []
         """Intervals without a gap that ended within `SPAN`."""
 
-    @property
-    def trusted(self) -> bool:
-        """True when loops may use the roll that the drone reports."""
-        return self.sign is Sign.RIGHT
-
-    @property
-    def inverted(self) -> bool:
-        """True when the drone reports roll with the opposite sign."""
-        return self.sign is Sign.LEFT
-
-    def recall(self, sign: Sign) -> None:
+    def recall(self, sign: RollSign) -> None:
         """Begin with what is known of this drone and firmware."""
-        self.sign, self._fits = sign, {Sign.RIGHT: 0, Sign.LEFT: 0}
+        self.sign, self._fits = sign, {RollSign.NORMAL: 0, RollSign.INVERTED: 0}
         self.forget_motion()
 
     def forget_motion(self) -> None:
@@ -146,19 +136,19 @@ class RollCheck:
             return False
         if abs(push) < LEAST_CHANGE or abs(response) < LEAST_RESPONSE:
             return False
-        self._fits[Sign.RIGHT if push * response > 0.0 else Sign.LEFT] += 1
+        self._fits[RollSign.NORMAL if push * response > 0.0 else RollSign.INVERTED] += 1
         return self._judge()
 
     def _judge(self) -> bool:
-        right, left = self._fits[Sign.RIGHT], self._fits[Sign.LEFT]
-        ahead = Sign.RIGHT if right > left else Sign.LEFT
-        if right + left < (SAMPLES if self.sign in (Sign.UNKNOWN, ahead) else OVERTURN):
+        right, left = self._fits[RollSign.NORMAL], self._fits[RollSign.INVERTED]
+        ahead = RollSign.NORMAL if right > left else RollSign.INVERTED
+        if right + left < (SAMPLES if self.sign in (RollSign.UNKNOWN, ahead) else OVERTURN):
             return False
         if max(right, left) < ODDS * min(right, left):
             if right + left >= MOST:
-                self._fits = {Sign.RIGHT: right // 2, Sign.LEFT: left // 2}
+                self._fits = {RollSign.NORMAL: right // 2, RollSign.INVERTED: left // 2}
             return False
         # Counting begins again, so that a wrong verdict does not last.
-        self._fits = {Sign.RIGHT: 0, Sign.LEFT: 0}
+        self._fits = {RollSign.NORMAL: 0, RollSign.INVERTED: 0}
         before, self.sign = self.sign, ahead
         return self.sign is not before

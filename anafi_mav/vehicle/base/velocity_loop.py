@@ -27,7 +27,7 @@ from dataclasses import dataclass
 
 from anafi_mav import geo, units
 from anafi_mav.drone import Limits, PilotingCommand
-from anafi_mav.vehicle.base.roll_sign import RollCheck, Sign
+from anafi_mav.vehicle.base.roll_sign import RollCheck, RollSign
 
 G = 9.81
 
@@ -143,7 +143,7 @@ class MotionEstimate:
     """Estimated motion of the drone, from its reports, and the effect of the air on it."""
 
     def __init__(self, roll: RollCheck | None = None) -> None:
-        self._roll = roll or RollCheck(Sign.RIGHT)
+        self._roll = roll or RollCheck(RollSign.NORMAL)
         self.yaw: float | None = None
         """rad, clockwise from north, as last reported; None: unknown."""
         self.height: float | None = None
@@ -246,7 +246,7 @@ class MotionEstimate:
     @property
     def trusts_tilt(self) -> bool:
         """True when the sign of the reported roll is verified."""
-        return self._roll.trusted
+        return self._roll.sign is RollSign.NORMAL
 
     def push(self) -> tuple[float, float]:
         """m/s2 north and east that the drone's tilt gives."""

@@ -106,9 +106,11 @@ class ArmWait:
 
     def end(self) -> bool:
         """Stop waiting for arming; returns True if a wait was active."""
-        waited, self._client = self._alarm.is_set, None
+        self._client = None
+        if self._alarm.at is None:
+            return False
         self._alarm.cancel()
-        return waited
+        return True
 
     def _lapse(self) -> None:
         self.end()

@@ -25,6 +25,7 @@ from anafi_mav.vehicle.base.bounds import TooLow
 from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, reason_of, text_of
+from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.silence import SILENCE
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
@@ -84,8 +85,6 @@ class OffboardFlight:
         self._lift = SetpointTakeoff()
         self._stream = OffboardStream()
         self._silence = Alarm(self._expired)
-        self._watched_until = math.inf
-        """The silence that the alarm is set for."""
         self._engaging: asyncio.Task[None] | None = None
         self._alone = False
         """True while a single setpoint is being engaged."""
@@ -135,7 +134,7 @@ class OffboardFlight:
         if not self._stream.receive(sender, setpoint, now, lasts(setpoint, self.guided_timeout if guided else None)):
             return texts.OTHER_PROGRAM
         deadline = self._stream.deadline()
-        if not self._silence.is_set or (deadline is not None and deadline < self._watched_until):
+        if self._silence.at is None or (deadline is not None and deadline < self._silence.at):
             self._watch()  # the pilot's newest setpoint may last for less time than the one before
         if stands:
             return self._on_ground(sender, setpoint, now, guided=guided)
@@ -145,7 +144,7 @@ class OffboardFlight:
             self._watch()
             self._vehicle.select(FlightMode.OFFBOARD, self)
         if pilot:
-            self._fly()
+            self._fly(now)
         elif guided:
             return self._begin_guided(sender, setpoint, now, follows=follows)
         return None
@@ -255,7 +254,7 @@ class OffboardFlight:
 
     def _objection(self, sender: Hashable, setpoint: MotionSetpoint) -> OperatorText | None:
         """Why a position cannot be flown to; None when it can, or is being flown to."""
-        if self._vehicle.roll.inverted and setpoint.needs_loop:
+        if self._vehicle.roll.sign is RollSign.INVERTED and setpoint.needs_loop:
             return texts.ROLL_INVERTED
         if setpoint.position == NOTHING:
             return None
@@ -281,7 +280,7 @@ class OffboardFlight:
         self._require_freedom(texts.OFFBOARD)
         candidate = self._stream.candidate(client, self._clock.monotonic())
         if candidate is None:
-            reason = texts.ROLL_INVERTED if self._vehicle.roll.inverted else texts.NO_SETPOINTS
+            reason = texts.ROLL_INVERTED if self._vehicle.roll.sign is RollSign.INVERTED else texts.NO_SETPOINTS
             raise Refused(texts.OFFBOARD, reason)
         if self._stream.state is State.ENGAGED and candidate == self._stream.pilot:
             return  # it flies already, and goes on without a jolt
@@ -407,7 +406,7 @@ class OffboardFlight:
         else:
             self.motion.on_attitude(attitude.roll, attitude.pitch, attitude.yaw, now)
         if isinstance(self._stream.setpoint, AttitudeSetpoint):
-            self._fly()
+            self._fly(now)
 
     def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
         if (velocity := self._vehicle.drone.piloting.state.velocity) is None:
@@ -415,7 +414,7 @@ class OffboardFlight:
         else:
             self.motion.on_velocity(velocity.north, velocity.east, velocity.down, now)
         if isinstance(self._stream.setpoint, MotionSetpoint):
-            self._fly()
+            self._fly(now)
 
     def _on_altitude(self, message: events.AltitudeChanged, now: float) -> None:
         if (altitude := self._vehicle.drone.piloting.state.altitude) is None:
@@ -438,9 +437,9 @@ class OffboardFlight:
         if self._vehicle.in_air:
             self._vehicle.drone.piloting.hover()  # ends a moveTo or moveBy of ours, which would ignore sticks
         self._vehicle.select(mode, self)
-        self._fly()
+        self._fly(self._clock.monotonic())
 
-    def _fly(self) -> None:
+    def _fly(self, now: float) -> None:
         """Do what the pilot's newest setpoint asks for at this moment."""
         vehicle, setpoint = self._vehicle, self._stream.setpoint
         limits = vehicle.drone.piloting.limits
@@ -452,14 +451,13 @@ class OffboardFlight:
             reason = texts.PILOT
         elif vehicle.sticks_follow_camera:
             reason = texts.STICKS_FOLLOW_CAMERA
-        elif vehicle.roll.inverted and isinstance(setpoint, MotionSetpoint) and setpoint.needs_loop:
+        elif vehicle.roll.sign is RollSign.INVERTED and isinstance(setpoint, MotionSetpoint) and setpoint.needs_loop:
             reason = texts.ROLL_INVERTED
         if reason is not None:
             self.end()
             vehicle.select(FlightMode.HOLD)
             vehicle.text(Severity.WARNING, texts.OFFBOARD_ENDED.fill(reason=reason))
             return
-        now = self._clock.monotonic()
         if isinstance(setpoint, AttitudeSetpoint):
             self._hold(self._attitude(setpoint, limits, now), now)
             return
@@ -569,12 +567,11 @@ class OffboardFlight:
 
     def _watch(self) -> None:
         """Come back when those that matter have been silent for too long."""
-        self._silence.cancel()
         deadline = self._stream.deadline()
-        if deadline is not None:
-            self._watched_until = deadline
-            delay = max(deadline - self._clock.monotonic(), 0.0)
-            self._silence.set_in(delay)
+        if deadline is None:
+            self._silence.cancel()
+        else:
+            self._silence.set(deadline)
 
 
 def _at_once(client: Hashable, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:

@@ -32,7 +32,7 @@ def router() -> Router[str, str]:
     for name in ("a", "b", "c"):
         router.add(name)
     router.add_host(OURS, 1, "autopilot")
-    router.spoke(OURS, 1)
+    router.own_sources.add((OURS, 1))
     return router
 
 

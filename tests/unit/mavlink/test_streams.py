@@ -143,4 +143,18 @@ def test_groups_are_bounded() -> None:
     channels = [one]
     for number in range(1000):
         streams.due_on(channels, (ATTITUDE, number), float(number))
-    assert len(streams._quiet) <= 256
+    assert all(len(audience.quiet) <= 256 for audience in streams._audiences)
+
+
+def test_lists_of_channels_asked_about_in_turn_share_intervals() -> None:
+    streams, one, other = Streams[Key]({ATTITUDE: 1.0}), Key(), Key()
+    both, first, second = [one, other], [one], [other]
+    assert streams.due_on(both, (ATTITUDE,), 0.0) == [(ATTITUDE, both)]
+    assert streams.due_on(first, (ATTITUDE,), 0.1) == []
+    assert streams.due_on(second, (ATTITUDE,), 0.6) == [(ATTITUDE, [other])]
+    assert streams.due_on(both, (ATTITUDE,), 0.7) == [(ATTITUDE, [one])]
+    for number in range(20):
+        streams.due_on([one], (ATTITUDE,), float(number))
+    assert len(streams._audiences) <= 4
+    streams.channel_closed()
+    assert streams._audiences == []

@@ -19,7 +19,6 @@ NAMED_TUPLE = {"_asdict", "_replace", "_fields"}
 """Public in spite of their names."""
 
 OTHERS = {
-    "support/rtsp_client.py": {"_more": "a class in this module"},
     "support/video_server.py": {"_updated": "a class in this module"},
     "clients/dronekit_ground.py": {"_capabilities": "dronekit has no event for them"},
     "interop/olympe_base.py": {"_name_": "Olympe's enums"},

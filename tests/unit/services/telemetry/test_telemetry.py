@@ -33,7 +33,7 @@ from anafi_mav.services.telemetry.update_tracker import UpdateTracker
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.vehicle import Landed
 
-NOW = Times(1_234_567_890)
+NOW = Times(1_234_567_890, 1_234_567, 1_234)
 
 
 def bundled(tracker: UpdateTracker, sources: str, at: float) -> tuple[int, ...]:
@@ -124,6 +124,8 @@ async def test_default_intervals_are_those_of_the_rows() -> None:
         "ALTITUDE": 0.2,
         "VFR_HUD": 0.2,
         "DISTANCE_SENSOR": 0.2,
+        "GIMBAL_DEVICE_ATTITUDE_STATUS": 0.1,
+        "MOUNT_ORIENTATION": 0.2,
         "GPS_RAW_INT": 0.5,
         "EXTENDED_SYS_STATE": 0.5,
         "ATTITUDE_TARGET": 0.5,
@@ -134,6 +136,7 @@ async def test_default_intervals_are_those_of_the_rows() -> None:
         "BATTERY_STATUS": 1.0,
         "MISSION_CURRENT": 1.0,
         "FENCE_STATUS": 1.0,
+        "GIMBAL_MANAGER_STATUS": 1.0,
         "RC_CHANNELS": 1.0,
         "RADIO_STATUS": 1.0,
         "SYSTEM_TIME": 1.0,

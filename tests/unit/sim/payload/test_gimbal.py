@@ -203,3 +203,26 @@ def test_an_ai_has_two_and_the_first_turns_every_way() -> None:
     bench.send(target(yaw=90.0, pitch=-170.0, frames=(RELATIVE, ABSOLUTE, NONE)))
     bench.run(5.0)
     assert (look(bench).yaw_relative, look(bench).pitch_absolute) == pytest.approx((48.0, -116.0))
+
+
+def test_absolute_yaw_is_to_north_and_ends_at_the_range_of_the_body() -> None:
+    bench = Bench("ai")
+    bench.take_off()
+    while math.degrees(bench.pose.yaw) < 90.0:
+        bench.sticks(0.1, yaw=50)
+    bench.run(2.0)
+    heading = math.degrees(bench.pose.yaw)
+    bench.send(target(yaw=heading - 30.0, frames=(ABSOLUTE, NONE, NONE)))
+    bench.run(2.0)
+    assert (look(bench).yaw_absolute, look(bench).yaw_relative) == pytest.approx((heading - 30.0, -30.0), abs=0.01)
+    bench.sticks(1.0, yaw=-15)  # the nose turns left under the camera, which keeps its direction
+    bench.run(2.0)
+    turned = math.degrees(bench.pose.yaw)
+    assert turned < heading - 5.0
+    assert look(bench).yaw_absolute == pytest.approx(heading - 30.0, abs=0.01)
+    bench.send(target(yaw=turned - 100.0, frames=(ABSOLUTE, NONE, NONE)))
+    bench.run(3.0)
+    assert look(bench).yaw_relative == pytest.approx(-48.0)
+    bench.send(target(VELOCITY, yaw=0.1, frames=(ABSOLUTE, NONE, NONE)))
+    bench.run(1.0)
+    assert look(bench).yaw_relative == pytest.approx(-39.0, abs=1.0)  # 0.1 of 90 deg/s, at once

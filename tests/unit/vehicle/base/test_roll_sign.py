@@ -12,7 +12,7 @@ from anafi_mav.drone import Limits
 from anafi_mav.drone.piloting.sticks import percent
 from anafi_mav.services.monitor.roll_sign_service import read, written
 from anafi_mav.sim.world.motion import STEP
-from anafi_mav.vehicle.base.roll_sign import OVERTURN, SAMPLES, RollCheck, Sign
+from anafi_mav.vehicle.base.roll_sign import OVERTURN, SAMPLES, RollCheck, RollSign
 from anafi_mav.vehicle.base.velocity_loop import (
     CAUTIOUS_GAIN,
     CAUTIOUS_TILT,
@@ -54,23 +54,22 @@ class Flight:
 
 
 @pytest.mark.parametrize("yaw", [0.0, 90.0, 200.0])
-@pytest.mark.parametrize(("sign", "verdict"), [(1, Sign.RIGHT), (-1, Sign.LEFT)])
+@pytest.mark.parametrize(("sign", "verdict"), [(1, RollSign.NORMAL), (-1, RollSign.INVERTED)])
 @pytest.mark.parametrize("wind", [0.0, 3.0, -3.0])
 def test_roll_check_after_twenty_equal_changes_knows_the_sign(
-    yaw: float, sign: int, verdict: Sign, wind: float
+    yaw: float, sign: int, verdict: RollSign, wind: float
 ) -> None:
     """10 degrees push with 9.81 * tan 10 = 1.73 m/s2, their mean with level 0.86: each sample changes by 1.73."""
     check = RollCheck()
     flight = Flight(check, yaw)
     flight.lean(0.0)
     samples = 0
-    while check.sign is Sign.UNKNOWN:
+    while check.sign is RollSign.UNKNOWN:
         samples += 1
         assert samples <= 2 * SAMPLES + 2
         flight.lean((10.0, 0.0, -10.0, 0.0)[samples % 4], sign=sign, wind=wind)
     assert check.sign is verdict
     assert samples > SAMPLES
-    assert (check.trusted, check.inverted) == (verdict is Sign.RIGHT, verdict is Sign.LEFT)
 
 
 @pytest.mark.parametrize("wind", [-3.0, -1.0, 3.0])
@@ -80,13 +79,13 @@ def test_roll_check_of_steady_lean_in_wind_stays_undecided(wind: float) -> None:
     flight = Flight(check)
     for _ in range(200):
         flight.lean(8.0, wind=wind)
-    assert check.sign is Sign.UNKNOWN
+    assert check.sign is RollSign.UNKNOWN
 
 
 def test_roll_check_of_small_leans_learns_nothing() -> None:
     check = RollCheck()
     Flight(check).rock(400, 3.9)
-    assert check.sign is Sign.UNKNOWN
+    assert check.sign is RollSign.UNKNOWN
 
 
 def test_roll_check_with_odds_below_three_to_one_waits() -> None:
@@ -95,7 +94,7 @@ def test_roll_check_with_odds_below_three_to_one_waits() -> None:
     for _ in range(40):
         flight.rock(8)
         flight.rock(8, sign=-1)
-    assert check.sign is Sign.UNKNOWN
+    assert check.sign is RollSign.UNKNOWN
 
 
 def test_roll_check_leaves_out_intervals_with_a_gap() -> None:
@@ -107,7 +106,7 @@ def test_roll_check_leaves_out_intervals_with_a_gap() -> None:
         flight.now += 1.0
     check.forget_motion()
     assert not check.on_velocity(1.0, 1.0, flight.now)
-    assert check.sign is Sign.UNKNOWN
+    assert check.sign is RollSign.UNKNOWN
 
 
 def test_roll_check_while_the_drone_turns_fast_learns_nothing() -> None:
@@ -116,29 +115,29 @@ def test_roll_check_while_the_drone_turns_fast_learns_nothing() -> None:
     for index in range(200):
         flight.yaw = math.radians(30.0 * index)
         flight.lean((10.0, 0.0, -10.0, 0.0)[index % 4])
-    assert check.sign is Sign.UNKNOWN
+    assert check.sign is RollSign.UNKNOWN
 
 
 def test_roll_check_reverses_after_three_times_the_samples() -> None:
-    check = RollCheck(Sign.LEFT)
+    check = RollCheck(RollSign.INVERTED)
     flight = Flight(check)
     flight.rock(OVERTURN // 2)
-    assert check.sign is Sign.LEFT
+    assert check.sign is RollSign.INVERTED
     assert flight.rock(2 * OVERTURN) == 1
-    assert check.sign is Sign.RIGHT
+    assert check.sign is RollSign.NORMAL
 
 
 @pytest.mark.parametrize("kept", [None, 3, {}, {"firmware": "1.8.2"}, {"firmware": "1.8.2", "inverted": "no"}])
 def test_invalid_roll_record_is_not_read(kept: object) -> None:
-    assert read(kept, "1.8.2") is Sign.UNKNOWN
+    assert read(kept, "1.8.2") is RollSign.UNKNOWN
 
 
-@pytest.mark.parametrize("sign", [Sign.RIGHT, Sign.LEFT])
-def test_roll_record_counts_for_its_firmware_only(sign: Sign) -> None:
+@pytest.mark.parametrize("sign", [RollSign.NORMAL, RollSign.INVERTED])
+def test_roll_record_counts_for_its_firmware_only(sign: RollSign) -> None:
     kept = written("1.8.2", sign)
     assert read(kept, "1.8.2") is sign
-    assert read(kept, "1.8.3") is Sign.UNKNOWN
-    assert read(kept, None) is Sign.UNKNOWN
+    assert read(kept, "1.8.3") is RollSign.UNKNOWN
+    assert read(kept, None) is RollSign.UNKNOWN
 
 
 # The loop until the sign is known.
@@ -204,4 +203,4 @@ def test_step_in_virtual_time_with_unverified_roll_settles(model: str, inverted:
         if step % (4 * STEPS) > 3.25 * STEPS:
             speeds.append(abs(pose.ve - wanted))
     assert max(speeds) < 0.8
-    assert roll_check.sign is (Sign.LEFT if inverted else Sign.RIGHT)
+    assert roll_check.sign is (RollSign.INVERTED if inverted else RollSign.NORMAL)

@@ -1,0 +1,1 @@
+"""Settings of the camera: their table, their definition file, and extended parameters."""

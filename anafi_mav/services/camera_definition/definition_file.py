@@ -1,0 +1,110 @@
+"""The camera definition as a file: MAVLink's XML format. No I/O.
+
+MAVLink camera_def.md. What the readers of the format require beyond it: a default for each parameter, which must be one
+of its options (MAVSDK camera_definition.cpp); one option at least (QGroundControl VehicleCameraControl.cc).
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from typing import NamedTuple
+
+from anafi_mav.services.camera_definition.camera_setting import Option
+from anafi_mav.services.camera_definition.catalogue import Catalogue, CatalogueEntry, Restriction
+from anafi_mav.services.camera_definition.param_ext_codec import ExtType
+from anafi_mav.services.checksum import crc32
+
+VENDOR = "Parrot"
+
+
+class DefinitionFile(NamedTuple):
+    """A definition file and the version by which clients know it."""
+
+    content: bytes
+    version: int
+
+
+def definition_file(catalogue: Catalogue, model: str) -> DefinitionFile:
+    """Return the definition of a drone's camera.
+
+    `model` is the camera's name in CAMERA_INFORMATION. The version is a hash of the content: QGroundControl and MAVSDK
+    keep a file for each name and version for good.
+    """
+    version = crc32(_content(catalogue, model, 0))
+    folded = (version ^ version >> 16) & 0xFFFF or 1  # 0 means that there is no definition
+    return DefinitionFile(_content(catalogue, model, folded), folded)
+
+
+def _content(catalogue: Catalogue, model: str, version: int) -> bytes:
+    root = ET.Element("mavlinkcamera")
+    head = ET.SubElement(root, "definition", version=str(version))
+    ET.SubElement(head, "model").text = model
+    ET.SubElement(head, "vendor").text = VENDOR
+    parameters = ET.SubElement(root, "parameters")
+    exclusions, restrictions = catalogue.exclusions(), catalogue.restrictions()
+    for entry in catalogue.entries:
+        element = _parameter(parameters, entry, catalogue)
+        if not entry.options:
+            continue
+        options = ET.SubElement(element, "options")
+        for option in entry.options:
+            item = _option(options, "option", option, entry.setting.kind)
+            key = (entry.setting.name, option.value)
+            if hidden := exclusions.get(key):
+                block = ET.SubElement(item, "exclusions")
+                for name in hidden:
+                    ET.SubElement(block, "exclude").text = name
+            _ranges(item, [one for one in restrictions if (one.setting, one.value) == key], catalogue)
+    ET.indent(root, " ")
+    content: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
+    return content + b"\n"
+
+
+def _parameter(parent: ET.Element, entry: CatalogueEntry, catalogue: Catalogue) -> ET.Element:
+    setting, kind = entry.setting, entry.setting.kind
+    attributes = {"name": setting.name, "type": kind.xml, "default": kind.text(_default(entry))}
+    if not setting.is_listed:
+        attributes["control"] = "0"
+    if entry.limits is not None:
+        attributes["min"], attributes["max"] = kind.text(entry.limits.low), kind.text(entry.limits.high)
+        if entry.limits.step is not None:
+            attributes["step"] = kind.text(entry.limits.step)
+    if setting.decimals is not None:
+        attributes["decimalPlaces"] = str(setting.decimals)
+    if setting.unit:
+        attributes["unit"] = setting.unit
+    element = ET.SubElement(parent, "parameter", attributes)
+    ET.SubElement(element, "description").text = setting.title
+    changed = [name for name in setting.changes if name in catalogue.index]
+    if changed:
+        updates = ET.SubElement(element, "updates")
+        for name in changed:
+            ET.SubElement(updates, "update").text = name
+    return element
+
+
+def _default(entry: CatalogueEntry) -> float:
+    """Return the possible value that is nearest to the default of the table."""
+    wanted = entry.setting.kind.normalise(entry.setting.default)
+    if entry.limits is not None:
+        return min(max(wanted, entry.limits.low), entry.limits.high)
+    return min((option.value for option in entry.options), key=lambda value: abs(value - wanted))
+
+
+def _option(parent: ET.Element, tag: str, option: Option, kind: ExtType) -> ET.Element:
+    return ET.SubElement(parent, tag, name=option.text, value=kind.text(option.value))
+
+
+def _ranges(item: ET.Element, restrictions: list[Restriction], catalogue: Catalogue) -> None:
+    if not restrictions:
+        return
+    block = ET.SubElement(item, "parameterranges")
+    for one in restrictions:
+        attributes = {"parameter": one.target}
+        if one.conditions:
+            attributes["condition"] = " AND ".join(
+                f"{name}={catalogue[name].setting.kind.text(value)}" for name, value in one.conditions
+            )
+        limited = ET.SubElement(block, "parameterrange", attributes)
+        for option in one.options:
+            _option(limited, "roption", option, catalogue[one.target].setting.kind)

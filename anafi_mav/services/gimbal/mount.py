@@ -1,0 +1,44 @@
+"""Modes, angles and places of the mount protocol, replaced by gimbal v2. No I/O."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Awaitable, Callable
+from typing import TypeAlias
+
+from anafi_mav import geo
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.commands import Command
+from anafi_mav.services.gimbal.targets import Frames
+from anafi_mav.vehicle.base.geo_point import GeoPoint
+
+Handler: TypeAlias = Callable[[Command], Awaitable[None]]
+
+MODES = (
+    dialect.MAV_MOUNT_MODE_NEUTRAL,
+    dialect.MAV_MOUNT_MODE_MAVLINK_TARGETING,
+    dialect.MAV_MOUNT_MODE_GPS_POINT,
+    dialect.MAV_MOUNT_MODE_SYSID_TARGET,
+    dialect.MAV_MOUNT_MODE_HOME_LOCATION,
+)
+"""MAV_MOUNT_MODE that an ANAFI has; it neither retracts its gimbal nor turns it by a radio's channels."""
+
+HORIZON = Frames(0, locks_horizon=True, heading=None)
+"""A mount keeps pitch and roll to the horizon, and yaw to the nose."""
+
+DEGREES = 180.0
+"""A larger coordinate of DO_MOUNT_CONTROL is in degE7: common.xml says so, and some clients send deg."""
+
+
+def point(latitude: float, longitude: float) -> GeoPoint | None:
+    """Return the place of a DO_MOUNT_CONTROL; None when it has none."""
+    if not math.isfinite(latitude) or not math.isfinite(longitude):
+        return None
+    scale = 1e7 if max(abs(latitude), abs(longitude)) > DEGREES else 1.0
+    return GeoPoint(latitude / scale, longitude / scale)
+
+
+def direction(here: GeoPoint, there: GeoPoint, climb: float) -> tuple[float, float]:
+    """Return bearing from north and elevation (rad) of a straight path that climbs so far (m)."""
+    north, east = geo.offset(*here.point, *there.point)
+    return math.atan2(east, north), math.atan2(climb, math.hypot(north, east))

@@ -1,0 +1,213 @@
+"""The relay on real sockets, before a video server of ours that does what a test tells it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack, asynccontextmanager
+from dataclasses import dataclass
+
+import pytest
+from support.rtsp_client import LIMIT, Viewer, viewer
+from support.scripted_device import ScriptedDevice
+from support.video_server import KEY, PPS, SLICE, SPS, VideoServer, refused
+
+from anafi_mav.arsdk.video import rtcp
+from anafi_mav.arsdk.video.rtcp import Goodbye, SenderReport
+from anafi_mav.clock import SystemClock
+from anafi_mav.drone import Drone
+from anafi_mav.errors import ConfigError
+from anafi_mav.relay import server as server_module
+from anafi_mav.relay import source as source_module
+from anafi_mav.relay.server import RelayServer
+from anafi_mav.relay.source import DroneSource
+
+LIVE = "1/visible"
+
+
+@dataclass
+class Studio:
+    relay: RelayServer
+    server: VideoServer
+    drone: Drone
+
+
+@asynccontextmanager
+async def studio(server: VideoServer | None = None) -> AsyncIterator[Studio]:
+    """A connected drone with its own video server, and the relay."""
+    async with AsyncExitStack() as stack:
+        server = await stack.enter_async_context(server or VideoServer())
+        device = await stack.enter_async_context(ScriptedDevice())
+        drone = device.drone(rtsp_port=server.port)
+        await drone.connect()
+        stack.push_async_callback(drone.close)
+        relay = RelayServer("127.0.0.1", 0, SystemClock())
+        relay.add(DroneSource(1, "alpha", drone))
+        await relay.start()
+        stack.push_async_callback(relay.close)
+        yield Studio(relay, server, drone)
+
+
+async def setup(client: Viewer, transport: str) -> object:
+    return await (client.setup_inside if transport == "TCP" else client.setup)(f"{LIVE}/video")
+
+
+@pytest.mark.parametrize("transport", ["UDP", "TCP"])
+async def test_viewer_sees_the_drones_pictures(transport: str) -> None:
+    async with studio() as held, viewer(held.relay.port) as client:
+        description = await client.describe(LIVE)
+        (media,) = description.media
+        assert (description.name, media.control, media.sps, media.pps) == ("alpha", "video", SPS, PPS)
+        eye = await (client.setup_inside if transport == "TCP" else client.setup)(f"{LIVE}/video")
+        answer = await client.play(LIVE)
+        pictures = await eye.first(35)
+        assert pictures[0].units == (SPS, PPS, KEY)
+        assert {picture.units for picture in pictures} == {(SPS, PPS, KEY), (SLICE,)}
+        assert all(picture.complete for picture in pictures)
+        first = f"seq={eye.sequences[0]};rtptime={pictures[0].timestamp}"
+        assert (answer.header("RTP-Info") or "").endswith(first)
+        await eye.until(lambda: any(isinstance(one, SenderReport) for one in eye.reports))
+        assert (await client.ask("TEARDOWN", LIVE)).status == 200
+        assert held.relay.viewers == 0
+        assert held.server.playing == 1  # it lingers
+
+
+async def test_drone_has_one_session_for_all_viewers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(source_module, "LINGER", 0.2)
+    async with studio() as held:
+        async with AsyncExitStack() as stack:
+            eyes = []
+            for path in ("1/visible", "alpha/visible", "1/visible"):
+                client = await stack.enter_async_context(viewer(held.relay.port))
+                await client.describe(path)
+                eyes.append(await client.setup(f"{path}/video"))
+                await client.play(path)
+            for eye in eyes:
+                (first, *_) = await eye.first(3)
+                assert first.is_key
+            assert held.relay.viewers == 3
+            assert held.server.methods().count("PLAY") == 1
+        # All have hung up: the session at the drone ends.
+        await held.server.until(lambda: held.server.methods()[-1] == "TEARDOWN")
+        assert held.relay.viewers == 0
+        async with viewer(held.relay.port) as client:  # and begins for the next one
+            await client.describe(LIVE)
+        assert held.server.methods().count("PLAY") == 2
+
+
+async def test_new_viewer_gets_pictures_since_the_last_key_at_once() -> None:
+    async with studio() as held, viewer(held.relay.port) as first, viewer(held.relay.port) as second:
+        await first.describe(LIVE)
+        eye = await first.setup(f"{LIVE}/video")
+        await first.play(LIVE)
+        await eye.first(10)
+        held.server.quiet = True  # no picture follows: what the second one sees was kept
+        other = await second.setup_inside(f"{LIVE}/video")
+        await second.play(LIVE)
+        kept = await other.first(10)
+        assert kept[0].units == (SPS, PPS, KEY)
+        assert kept[-1].timestamp - kept[0].timestamp == (len(kept) - 1) * 90
+
+
+async def test_slow_viewer_does_not_delay_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    big = SLICE[:1] + bytes(60_000)
+    monkeypatch.setattr("support.video_server.SLICE", big)
+    async with studio() as held, viewer(held.relay.port) as slow, viewer(held.relay.port) as quick:
+        await slow.describe(LIVE)
+        response = await slow.ask("SETUP", f"{LIVE}/video", Transport="RTP/AVP/TCP;interleaved=0-1")
+        slow.session = (response.header("Session") or "").partition(";")[0]
+        slow.writer.transport.pause_reading()  # it reads nothing any more
+        slow.writer.write(f"PLAY {slow.base}{LIVE} RTSP/1.0\r\nCSeq: 9\r\nSession: {slow.session}\r\n\r\n".encode())
+        eye = await quick.setup_inside(f"{LIVE}/video")
+        await quick.play(LIVE)
+        pictures = await eye.first(150)
+        assert all(picture.complete for picture in pictures[1:])
+        steps = {b - a for a, b in zip(eye.sequences, eye.sequences[1:], strict=False)}
+        assert steps <= {1, -65535}
+        (one,) = [c for c in held.relay._connections.values() if c._watch and c._watch.counts["dropped pictures"]]
+        assert one._outlet is not None
+        assert one._outlet.waiting < server_module.MAX_UNREAD + (2 << 20)
+
+
+async def test_video_that_does_not_start_is_refused_with_the_reason() -> None:
+    server = VideoServer()
+    server.answers["DESCRIBE"] = refused("454 Session Not Found")
+    async with studio(server) as held, viewer(held.relay.port) as client:
+        answer = await client.ask("DESCRIBE", LIVE)
+        assert answer.status == 503
+        assert "454" in answer.reason
+        await held.drone.close()
+        answer = await client.ask("DESCRIBE", LIVE)
+        assert (answer.status, answer.reason) == (503, "alpha is not connected")
+
+
+async def test_unknown_streams_are_not_found() -> None:
+    async with studio() as held, viewer(held.relay.port) as client:
+        for path in ("1/thermal", "2/visible", "1", "1/visible/extra", "visible", ""):
+            assert (await client.ask("DESCRIBE", path)).status == 404
+        assert (await client.ask("SETUP", "1/thermal", Transport="RTP/AVP/TCP")).status == 404
+        assert held.server.methods() == []
+
+
+async def test_viewers_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server_module, "MAX_VIEWERS", 1)
+    monkeypatch.setattr(server_module, "MAX_CONNECTIONS", 3)
+    async with studio() as held, viewer(held.relay.port) as one, viewer(held.relay.port) as two:
+        await one.describe(LIVE)
+        await one.setup(f"{LIVE}/video")
+        answer = await two.ask("SETUP", f"{LIVE}/video", Transport="RTP/AVP/TCP")
+        assert (answer.status, answer.reason) == (453, "too many viewers")
+        await one.setup(f"{LIVE}/video")  # its own place is free for it
+        async with viewer(held.relay.port) as three, viewer(held.relay.port) as four:
+            assert (await three.ask("OPTIONS", LIVE)).status == 200
+            assert await asyncio.wait_for(four.reader.read(), LIMIT) == b""
+
+
+async def test_silent_viewer_of_datagrams_is_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server_module, "SESSION_TIMEOUT", 1.5)
+    monkeypatch.setattr(server_module, "TICK", 0.2)
+    async with studio() as held, viewer(held.relay.port) as silent, viewer(held.relay.port) as reports:
+        eyes = []
+        for client in (silent, reports):
+            await client.describe(LIVE)
+            eyes.append(await client.setup(f"{LIVE}/video"))
+            await client.play(LIVE)
+
+        async def keep_reporting() -> None:
+            transport = list(held.relay._connections.values())[1]._outlet
+            assert transport is not None
+            ports = transport.transport.server_ports
+            assert ports is not None
+            while True:
+                data = rtcp.encode_receiver_report(rtcp.ReceiverReport(7), "viewer")
+                eyes[1].report(data, ports[1])
+                await asyncio.sleep(0.3)
+
+        task = asyncio.create_task(keep_reporting())
+        await eyes[0].until(lambda: any(isinstance(one, Goodbye) for one in eyes[0].reports))
+        assert await asyncio.wait_for(silent.reader.read(), LIMIT) == b""
+        await eyes[1].look(60)
+        task.cancel()
+
+
+async def test_port_in_use_is_named() -> None:
+    async with studio() as held:
+        with pytest.raises(ConfigError) as caught:
+            await RelayServer("127.0.0.1", held.relay.port, SystemClock()).start()
+        assert caught.value.key_path == "video.rtsp_port"
+        assert str(held.relay.port) in caught.value.problem
+        with pytest.raises(ConfigError) as caught:
+            await RelayServer("192.0.2.1", 0, SystemClock()).start()
+        assert caught.value.key_path == "video.listen"
+
+
+async def test_garbage_of_a_viewer_ends_its_connection_only() -> None:
+    async with studio() as held, viewer(held.relay.port) as client, viewer(held.relay.port) as other:
+        await client.describe(LIVE)
+        eye = await client.setup_inside(f"{LIVE}/video")
+        await client.play(LIVE)
+        client.writer.write(b"$\x01\x00\x04\xff\xff\xff\xff$\x07\x00\x00")  # reports that are none
+        await eye.look(3)
+        other.writer.write(b"\x16\x03\x01\x00\r\n\r\n")
+        assert (await asyncio.wait_for(other.reader.read(), LIMIT)).startswith(b"RTSP/1.0 400 ")
+        await eye.look(3)
