@@ -32,6 +32,7 @@ from anafi_mav.mavlink.node import Node
 from anafi_mav.relay.server import RelayServer
 from anafi_mav.relay.source import DroneSource
 from anafi_mav.services.flavours import FLAVOURS
+from anafi_mav.services.gateway_uris import GatewayUris
 from anafi_mav.services.system import System
 from anafi_mav.state_lock import FILE, NO_LOCKS, HeldDrone, Holder, StateLock, state_folder
 from anafi_mav.subject import DRONE
@@ -212,8 +213,13 @@ class Gateway:
         self.config = config
         self._clock: Clock = clock or SystemClock()
         self._node = Node(on_channel=self._on_channel, clock=self._clock, flavours=tuple(FLAVOURS))
-        self.relay = RelayServer(config.video.host, config.video.rtsp_port, self._clock)
-        """The video server."""
+        video = config.video_server
+        self.relay = (
+            None
+            if video is None
+            else RelayServer(video.host, video.rtsp_port, self._clock, public_host=video.public_host)
+        )
+        """The video server; None when it is configured off."""
         self._supervised: list[_Supervised] = []
         self._state: Path | None = None
         self._lock: StateLock | None = None
@@ -249,11 +255,13 @@ class Gateway:
         self._lock_state()
         try:
             await self._node.start(self.config.endpoints)
-            await self.relay.start()
+            if self.relay is not None:
+                await self.relay.start()
             if self.web is not None:
                 await self.web.start()
         except BaseException:
-            await self.relay.close()
+            if self.relay is not None:
+                await self.relay.close()
             await self._node.close()
             self._unlock_state()
             raise
@@ -318,13 +326,22 @@ class Gateway:
                 allow_kill=allow_kill,
                 state=self._state,
                 download_folder=download_folder(self.config.media),
+                uris=self._uris(),
                 has_picture_pose=self.config.pose == "video",
             )
-            self.relay.add(DroneSource(config.sysid, config.name, drone))
+            if self.relay is not None:
+                self.relay.add(DroneSource(config.sysid, config.name, drone))
             supervised = _Supervised(config, drone, system, self._write_lock)
             supervised.task = asyncio.get_running_loop().create_task(supervised.run())
             self._supervised.append(supervised)
         self._write_lock()
+
+    def _uris(self) -> GatewayUris:
+        """Return the addresses of the servers, which are open."""
+        if self.relay is None:
+            return GatewayUris()
+        hint = texts.VIDEO_NEEDS_PUBLIC_HOST if self.relay.is_open_to_network else texts.VIDEO_NEEDS_HOST
+        return GatewayUris(rtsp=self.relay.url_for, rtsp_hint=hint)
 
     async def ready(self, timeout: float) -> bool:
         """Wait until each drone is connected or one attempt has failed.
@@ -344,7 +361,8 @@ class Gateway:
         Clients are not heard any more, or one of them would fly on what has just been stopped.
         """
         self._node.stop_delivering()
-        await self.relay.close()
+        if self.relay is not None:
+            await self.relay.close()
         await asyncio.gather(*(self._leave(s) for s in self._supervised))
         self._supervised.clear()
         if self.web is not None:
@@ -378,7 +396,8 @@ class Gateway:
         """One line per drone and per endpoint, one for the video and one for the web server."""
         lines = [s.line() for s in self._supervised]
         lines += [f"endpoint {endpoint.describe()}" for endpoint in self._node.endpoints]
-        lines.append(f"video {self.relay.describe()}")
+        if self.relay is not None:
+            lines.append(f"video {self.relay.describe()}")
         return lines if self.web is None else [*lines, f"web page {self.web.describe()}"]
 
     def counters(self) -> Counter[str]:

@@ -139,6 +139,7 @@ TAKEOFF = Subject("Takeoff")
 TARGET = Subject("Target")
 TERMINATION = Subject("Termination")
 TURN = Subject("Turn")
+VIDEO_STREAM = Subject("Video stream")
 
 # == Reasons: state of the drone ==
 
@@ -152,6 +153,7 @@ TAKEOFF_POINT_UNKNOWN = Reason("take-off point unknown")
 AMSL_UNKNOWN = Reason("AMSL unknown, no GPS fix")
 TILT_UNKNOWN = Reason("tilt limits unknown")
 FLYING_STATE_UNKNOWN = Reason("flying state unknown")
+CAMERA_RECORDS = Reason("camera is recording")
 EMERGENCY_STOP = Reason("emergency stop")
 ON_GROUND = Reason("drone is on the ground")
 NOT_ON_GROUND = Reason("not on the ground")
@@ -212,6 +214,7 @@ GIMBAL_OF_MISSION = Reason("mission has control")
 # == Reasons: parameters of commands ==
 
 MOTOR_CUT_FORBIDDEN = Reason("set allow_kill: true")
+STREAM_UNKNOWN = Reason("no such stream")
 BY_COMMAND_ONLY = Reason("started by command only")
 NO_CHANGE_MODE = Reason("flag CHANGE_MODE is missing")
 NOT_GUIDED = Reason("not in Guided")
@@ -563,7 +566,7 @@ MEDIA_NOT_INDEXED = OperatorText("Media unavailable: drone indexes its storage")
 MEDIA_UNAVAILABLE = Template("Media unavailable: {error}", error=BELOW)
 FILE_TOO_LARGE = OperatorText("File too large for FTP: use media download")
 FILE_DAMAGED = OperatorText("File damaged: MD5 is not the drone's")
-MEDIA_COPIED = Template("Media copied: {count} files", count=99999)
+MEDIA_COPIED = Template("Media copied: {count} file(s)", count=99999)
 MEDIA_NOT_COPIED = Template("Media not copied: {error}", error=BELOW)
 DELETE = Subject("Delete")
 CAMERA_SAVING = Reason("camera is saving photos")
@@ -587,13 +590,17 @@ TUNE_FAILED = Template("Tune not played: {error}", error=BELOW)
 NO_EXPOSURE = Template("Exposure unknown: no video: {error}", error=BELOW)
 NO_PICTURES = Template("Pose from events: no video: {error}", error=BELOW)
 
+# == Video ==
+
+VIDEO_NEEDS_HOST = OperatorText("Video open to this computer only: set video.host")
+VIDEO_NEEDS_PUBLIC_HOST = OperatorText("Video without URI: set video.public_host")
+
 # == Parameters ==
 
 PARAMETER_NOT_SET = Template("{name} not set: {reason}", name="N" * 16, reason="r" * 23)
 WRONG_TYPE = Reason("wrong type")
 READ_ONLY = Reason("read only")
 OUT_OF_RANGE = Reason("out of range")
-CAMERA_RECORDS = Reason("camera is recording")
 CAMERA_TAKES_PHOTOS = Reason("camera takes photos")
 MISSION_USES_CAMERA = Reason("mission uses camera")
 VALUE_KEPT = Reason("drone keeps its value")

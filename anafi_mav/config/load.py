@@ -205,8 +205,9 @@ def _contradictions(config: Config) -> Iterator[tuple[str, str]]:
     http = config.http_server
     if http is not None and not _is_host(http.host):
         yield "http.host", _wrong(HttpConfig, "host", http.host)
+    video = config.video_server
     for key in ("host", "public_host"):
-        host = getattr(config.video, key)
+        host = None if video is None else getattr(video, key)
         if host is not None and not _is_host(host):
             yield f"video.{key}", _wrong(VideoConfig, key, host)
     yield from _agree("speed", {path: sim.speed for path, sim in simulated.items()})

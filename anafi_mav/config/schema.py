@@ -404,10 +404,10 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         ),
     ] = HttpConfig()
     video: Annotated[
-        VideoConfig,
+        VideoConfig | bool,
         Meta(
-            description="The gateway's video server.",
-            extra=expected("a mapping like {host: 0.0.0.0, rtsp_port: 8555}"),
+            description="The gateway's video server; `off` for none.",
+            extra=expected("a mapping like {host: 0.0.0.0, rtsp_port: 8555}, or off"),
         ),
     ] = VideoConfig()
 
@@ -417,6 +417,13 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         if isinstance(self.http, HttpConfig):
             return self.http
         return HttpConfig() if self.http else None
+
+    @property
+    def video_server(self) -> VideoConfig | None:
+        """The video server as configured; None: off."""
+        if isinstance(self.video, VideoConfig):
+            return self.video
+        return VideoConfig() if self.video else None
 
 
 SECTIONS: dict[str, type[msgspec.Struct]] = {

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import ipaddress
 import logging
 import secrets
 from contextlib import suppress
@@ -62,15 +63,23 @@ CLOSE_WAIT = 1.0
 """s that closing waits for connections to end."""
 
 
+_EVERY_ADDRESS = ("0.0.0.0", "::")
+
+
 class RelayServer:
     """Sources, and the socket that serves them. `start` once, `close` once (twice does no harm)."""
 
-    def __init__(self, host: str, port: int | None, clock: Clock) -> None:
-        """`port` 0 is a free one; None is `DEFAULT_PORT`, or a free one where that is taken."""
+    def __init__(self, host: str, port: int | None, clock: Clock, *, public_host: str | None = None) -> None:
+        """Create a server, not open yet.
+
+        `port` 0 is a free one; None is `DEFAULT_PORT`, or a free one where that is taken. `public_host` stands in
+        every URI in place of the address that a client's link shows.
+        """
         self.host = host
         self.port = 0
         """TCP port while it is open, else 0."""
         self.clock = clock
+        self._public_host = public_host
         self._wanted_port = port
         self._sources: dict[str, DroneSource] = {}
         """By system id, and by name."""
@@ -136,6 +145,31 @@ class RelayServer:
         """Number of sessions that are set up."""
         return sum(connection.is_set_up for connection in self._connections.values())
 
+    @property
+    def is_open_to_network(self) -> bool:
+        """True when other computers can connect."""
+        return not _is_loopback(self.host)
+
+    def url_for(self, local_host: str | None, path: str) -> str | None:
+        """Return the URL of a path for a client that sees this computer as `local_host`.
+
+        None when such a client cannot reach it: the server is closed, open to this computer only, or its address
+        towards the client is not known (`local_host` None).
+        """
+        if not self.port:
+            return None
+        host: str | None = self.host
+        if local_host is None or not _is_loopback(local_host):
+            if not self.is_open_to_network:
+                return None
+            if self._public_host is not None:
+                host = self._public_host
+            elif self.host in _EVERY_ADDRESS:
+                host = local_host
+        elif self.host in _EVERY_ADDRESS:
+            host = local_host
+        return None if host is None else f"rtsp://{f'[{host}]' if ':' in host else host}:{self.port}{path}"
+
     def describe(self) -> str:
         """Return one line for people."""
         count = self.viewers
@@ -172,6 +206,16 @@ class RelayServer:
             now = self.clock.monotonic()
             for connection in tuple(self._connections.values()):
                 connection.tick(now)
+
+
+def _is_loopback(host: str) -> bool:
+    """Return True for an address, or the name, that never leaves this computer."""
+    if host.lower() == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
 
 
 class _Connection:

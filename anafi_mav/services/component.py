@@ -25,6 +25,7 @@ from anafi_mav.services.commands import Action, ActionGroup
 from anafi_mav.services.definition_link import DefinitionLink
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.ftp.ftp_service import FtpService
+from anafi_mav.services.gateway_uris import GatewayUris
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.pose import VehiclePose
 from anafi_mav.services.service import MessageHandler, Service
@@ -58,6 +59,7 @@ class ComponentSystem(Protocol):
     clock: Clock
     memory: Memory
     download_folder: Path | None
+    uris: GatewayUris
     has_picture_pose: bool
     """True when the configuration allows pose from the live video."""
 
@@ -103,6 +105,7 @@ class Component:
         self.clock = system.clock
         self.memory = system.memory
         self.download_folder = system.download_folder
+        self.uris = system.uris
         self.has_picture_pose = system.has_picture_pose
         self.definition = DefinitionLink()
         self._system = system

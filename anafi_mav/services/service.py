@@ -20,6 +20,7 @@ from anafi_mav.services.commands import Action, ActionGroup, Command
 from anafi_mav.services.definition_link import DefinitionLink
 from anafi_mav.services.files import Folder, ServedFile
 from anafi_mav.services.flavours import Flavour
+from anafi_mav.services.gateway_uris import GatewayUris
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.pose import VehiclePose
 from anafi_mav.services.stream import MessageStream, Times
@@ -52,6 +53,8 @@ class Host(Protocol):
     memory: Memory
     download_folder: Path | None
     """Folder for copies of the drone's media after a landing; None: they are not copied."""
+    uris: GatewayUris
+    """What the gateway serves beside MAVLink."""
     has_picture_pose: bool
     """True when the configuration allows pose from the live video."""
     definition: DefinitionLink

@@ -31,6 +31,7 @@ from anafi_mav.services.command.orbit_service import OrbitService
 from anafi_mav.services.component import BY_AUTOPILOT, COMMANDS, Component, joined
 from anafi_mav.services.event.event_service import EventService
 from anafi_mav.services.ftp.log_service import LogService
+from anafi_mav.services.gateway_uris import GatewayUris
 from anafi_mav.services.gimbal.gimbal_service import GimbalService
 from anafi_mav.services.ground_station.banner_service import BannerService
 from anafi_mav.services.ground_station.identity_service import IdentityService
@@ -63,6 +64,7 @@ from anafi_mav.services.telemetry.flight_record_service import FlightRecordServi
 from anafi_mav.services.telemetry.high_latency_service import HighLatencyService
 from anafi_mav.services.telemetry.telemetry_service import CHANGES, TelemetryService
 from anafi_mav.services.telemetry.video_service import VideoTelemetryService
+from anafi_mav.services.video.video_stream_service import VideoStreamService
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.height import TakeoffRecord
 from anafi_mav.vehicle.base.modes import FlightMode
@@ -109,7 +111,7 @@ AUTOPILOT_SERVICES: tuple[type[Service], ...] = (
 )
 """Services of component 1, beside commands, messages and files themselves."""
 
-CAMERA_SERVICES: tuple[type[Service], ...] = (ParamExtService, MediaService, DownloadService)
+CAMERA_SERVICES: tuple[type[Service], ...] = (ParamExtService, MediaService, VideoStreamService, DownloadService)
 """Services of component 100."""
 
 AUTOPILOT = dialect.MAV_COMP_ID_AUTOPILOT1
@@ -154,6 +156,7 @@ class System:
         allow_kill: bool,
         state: Path | None = None,
         download_folder: Path | None = None,
+        uris: GatewayUris = GatewayUris(),  # noqa: B008  # frozen
         has_picture_pose: bool = True,
     ) -> None:
         """`state`: folder of stored state.
@@ -166,6 +169,7 @@ class System:
         self.clock = clock
         self.memory = Memory(state)
         self.download_folder = download_folder
+        self.uris = uris
         self.active = False
         self._node = node
         self._started = started

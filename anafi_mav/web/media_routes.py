@@ -112,6 +112,8 @@ class MediaRoutes:
             if request.transport is not None:
                 request.transport.abort()
             return response
+        except ConnectionError:  # the client has left
+            return response
         await response.write_eof()
         return response
 

@@ -7,15 +7,18 @@ import lzma
 from collections.abc import Iterable, Iterator
 
 import pytest
+from msgspec import structs
 from support.camera_states import MODEL_KEYS
 from support.definition_readers import Described, ReadDefinition, read_definition
-from support.ext_params import fetch, value_of, write
+from support.ext_params import fetch, read, send_set, value_of, write
 from support.ftp import Ftp
 from support.mav import CAMERA, Client
 from support.sim_settings import sim_value
 from support.world import World, world
 
+from anafi_mav.arsdk.messages.camera import CameraEvCompensation, EvCompensation, ExposureSettings, ZoomLevel
 from anafi_mav.mavlink import dialect
+from anafi_mav.sim.world.faults import Impairment
 
 ACCEPTED, UNSUPPORTED, FAILED, IN_PROGRESS = (
     dialect.PARAM_ACK_ACCEPTED,
@@ -143,3 +146,141 @@ async def test_conf_094_every_option_reaches_the_drone(model: str) -> None:
             every = [option.value for option in one.options] or [*ours.options(name, ours.values)]
             for value in every:
                 await ours.reach(name, value)
+
+
+async def test_conf_095_list_and_reads_agree() -> None:
+    async with world() as w:
+        listed = await fetch(w.client)
+        for name in ("CAM_MODE", "CAM_EV", "CAM_ZOOMSPEED"):
+            by_name = await read(w.client, name)
+            by_index = await read(w.client, index=by_name.param_index)
+            assert by_index.param_id == name
+            assert value_of(by_name) == value_of(by_index) == value_of(listed[name])
+            assert by_name.get_srcComponent() == CAMERA
+        mark = w.client.mark()
+        w.client.send(dialect.MAVLink_param_ext_request_read_message(1, CAMERA, b"NO_SUCH_THING", -1))
+        w.client.send(dialect.MAVLink_param_ext_request_read_message(1, CAMERA, b"", 999))
+        await read(w.client, "CAM_EV")
+        assert [m.param_id for _, m in w.client.since(mark, "PARAM_EXT_VALUE")] == ["CAM_EV"]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "kind", "result"),
+    [
+        ("CAM_EV", 0.5, 9, UNSUPPORTED),
+        ("CAM_EV", float("nan"), 9, UNSUPPORTED),
+        ("CAM_ZOOMSPEED", 11.0, 9, UNSUPPORTED),
+        ("CAM_WBMODE", 200.0, 1, UNSUPPORTED),
+        ("CAM_WBMODE", 2.0, 6, UNSUPPORTED),
+        ("CAM_VIDFPS", 120.0, 9, UNSUPPORTED),
+        ("NO_SUCH_THING", 1.0, 1, FAILED),
+    ],
+)
+async def test_conf_095_value_that_is_not_accepted_is_refused(name: str, value: float, kind: int, result: int) -> None:
+    async with world() as w:
+        before = await fetch(w.client)
+        ack = await write(w.client, name, value, kind)
+        assert ack.param_result == result
+        if name in before:
+            assert value_of(ack) == value_of(before[name])
+            assert value_of(await read(w.client, name)) == value_of(before[name])
+
+
+async def test_conf_095_repeated_write_is_not_carried_out_again() -> None:
+    async with world() as w:
+        for _ in range(3):
+            ack = await write(w.client, "CAM_EV", 1.0, 9)
+            assert (ack.param_result, value_of(ack)) == (ACCEPTED, 1.0)
+        assert len(w.commands("camera.set_ev_compensation")) == 1
+
+
+async def test_conf_095_late_answer_is_announced_as_in_progress() -> None:
+    async with world(speed=1.0) as w:
+        w.drone.faults.down = Impairment(delay=1.0)
+        mark = w.client.mark()
+        send_set(w.client, "CAM_EV", 1.0, 9)
+        first = await w.client.wait("PARAM_EXT_ACK", since=mark)
+        assert (first.param_result, value_of(first)) == (IN_PROGRESS, 0.0)
+        again = w.client.mark()
+        send_set(w.client, "CAM_EV", 1.0, 9)
+        repeated = await w.client.wait("PARAM_EXT_ACK", since=again)
+        assert repeated.param_result == IN_PROGRESS
+        last = await w.client.wait("PARAM_EXT_ACK", lambda m: m.param_result != IN_PROGRESS, since=mark)
+        assert (last.param_result, value_of(last)) == (ACCEPTED, 1.0)
+        assert len(w.commands("camera.set_ev_compensation")) == 1
+
+
+async def test_conf_095_silent_drone_is_a_failure() -> None:
+    async with world() as w:
+        w.drone.faults.untold = frozenset({"camera.style"})
+        ack = await write(w.client, "CAM_SATURATION", 2.0, 9)
+        assert (ack.param_result, value_of(ack)) == (FAILED, 0.0)
+        assert (await write(w.client, "CAM_EV", 1.0, 9)).param_result == ACCEPTED
+
+
+@pytest.mark.parametrize("model", ["4k", "ai"])
+async def test_conf_095_recording_keeps_its_settings(model: str) -> None:
+    async with world(model=model) as w:
+        ours = await station(w)
+        await w.gateway.systems[0].drone.camera.start_recording()
+        for name, value in (("CAM_VIDRES", 3.0), ("CAM_MODE", 0.0)):
+            before = ours.values[name]
+            mark = w.client.mark()
+            ack = await write(w.client, name, value, 1)
+            assert (ack.param_result, value_of(ack)) == (FAILED, before)
+            pushed = await w.client.wait("PARAM_EXT_VALUE", lambda m, name=name: m.param_id == name, since=mark)
+            assert value_of(pushed) == before
+        await w.client.wait("STATUSTEXT", lambda m: "camera is recording" in m.text, since=0)
+        assert w.gateway.systems[0].drone.camera[0].recording_now
+        assert (await write(w.client, "CAM_EV", 1.0, 9)).param_result == ACCEPTED
+
+
+async def test_conf_095_two_clients_see_the_drones_last_answer() -> None:
+    async with world(clients=2) as w:
+        first, second = w.clients
+        marks = first.mark(), second.mark()
+        send_set(first, "CAM_EV", 1.0, 9)
+        send_set(second, "CAM_EV", -1.0, 9)
+        for client, mark in zip(w.clients, marks, strict=True):
+            ack = await client.wait("PARAM_EXT_ACK", lambda m: m.param_result in (ACCEPTED, UNSUPPORTED), since=mark)
+            assert ack.param_result == ACCEPTED
+        last = sim_value(w.drone, "CAM_EV")
+        for client, mark in zip(w.clients, marks, strict=True):
+            await client.wait("PARAM_EXT_VALUE", lambda m: value_of(m) == last, since=mark)
+            values = [value_of(m) for _, m in client.since(mark, "PARAM_EXT_VALUE") if m.param_id == "CAM_EV"]
+            assert sorted(values) == [-1.0, 1.0]
+            assert values[-1] == last
+
+
+async def test_conf_096_change_elsewhere_reaches_every_client() -> None:
+    async with world(clients=2) as w:
+        await fetch(w.client)
+        marks = [client.mark() for client in w.clients]
+        w.drone.inject(EvCompensation(cam_id=0, value=CameraEvCompensation.EV_MINUS_1_00))
+        w.drone.inject(ZoomLevel(cam_id=0, level=1.5))
+        for client, mark in zip(w.clients, marks, strict=True):
+            value = await client.wait("PARAM_EXT_VALUE", since=mark)
+            assert (value.param_id, value_of(value)) == ("CAM_EV", -1.0)
+
+
+async def test_conf_096_settings_that_follow_a_change_are_sent_too() -> None:
+    async with world(clients=2) as w:
+        other = w.clients[1]
+        mark = other.mark()
+        assert (await write(w.client, "CAM_VIDMODE", 2.0, 1)).param_result == ACCEPTED
+        for name in ("CAM_VIDMODE", "CAM_VIDRES", "CAM_VIDFPS"):
+            message = await other.wait("PARAM_EXT_VALUE", lambda m, name=name: m.param_id == name, since=mark)
+            assert value_of(message) == pytest.approx(sim_value(w.drone, name), abs=1e-6)
+
+
+async def test_definition_grows_with_reported_shutter_times() -> None:
+    async with world(model="thermal") as w:
+        before = await load(w.client)
+        times = [option.value for option in before.parameters["CAM_SHUTTERSPD"].options]
+        reports = w.drone.firmware.payload.cameras[0].settings_report()
+        (exposure,) = (report for report in reports if isinstance(report, ExposureSettings))
+        few = structs.replace(exposure, manual_shutter_speed_capabilities=0b11)
+        w.drone.inject(few)
+        await w.gateway.systems[0].drone.expect(ExposureSettings, lambda m: True, 5.0)
+        assert (await load(w.client)).version == before.version
+        assert [option.value for option in (await load(w.client)).parameters["CAM_SHUTTERSPD"].options] == times

@@ -40,7 +40,9 @@ ARM, TAKE_OFF, REPOSITION, LAND = (
 @asynccontextmanager
 async def flown(address: str, *endpoints: str) -> AsyncIterator[tuple[Gateway, SimulatedDrone]]:
     """A gateway with these endpoints and a drone of its own at `address`."""
-    config = Config(endpoints=endpoints, drones=(DroneConfig(name="alpha", sysid=1, address=address),), http=False)
+    config = Config(
+        endpoints=endpoints, drones=(DroneConfig(name="alpha", sysid=1, address=address),), http=False, video=False
+    )
     spec = DroneSpec(address=address, home=HOME, http_port=None)
     async with Simulator([spec], speed=4.0, seed=1) as simulator, Gateway(config) as gateway:
         assert await gateway.ready(10.0), gateway.lines()

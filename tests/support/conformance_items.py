@@ -103,6 +103,7 @@ ITEMS: dict[int, Item] = {
     81: Item("DO_REPOSITION's heading in radians; unset keeps it"),
     82: Item("DO_CHANGE_SPEED: types, unchanged, default"),
     83: Item("DO_SET_HOME here and there; HOME_POSITION told"),
+    91: Item("VIDEO_STREAM_INFORMATION of each stream and of all; each URI opens once its stream is shown"),
     104: Item("MANUAL_CONTROL: signs, neutral after 0.5 s of silence"),
     105: Item("Offboard refused without setpoints, Hold within 1 s of their end"),
     106: Item("position targets in every frame and mask; terrain refused"),
@@ -132,6 +133,7 @@ ITEMS: dict[int, Item] = {
     133: Item("DISTANCE_SENSOR, WIND_COV, VIBRATION only with real data", NEITHER),
     134: Item("RC_CHANNELS rssi in the flavour's scale"),
     135: Item("RADIO_STATUS from the link's quality", NEITHER),
+    137: Item("thermal and blended streams flagged on Thermal and USA", NEITHER),
     140: Item("EKF_STATUS_REPORT"),
     141: Item("mission items that are orders: go there, go to that height"),
     142: Item("MISSION_WRITE_PARTIAL_LIST for ArduPilot's clients, refused to PX4's"),
@@ -145,5 +147,5 @@ ITEMS: dict[int, Item] = {
     155: Item("LINK_NODE_STATUS, ONBOARD_COMPUTER_STATUS on request", NEITHER),
     156: Item("the standard flavour connects and takes off", NEITHER),
 }
-"""In scope so far, by number. Missing: 3, 4, 84-103, 128, 136-139, 154 (camera, gimbal),
+"""In scope so far, by number. Missing: 3, 4, 84-90, 92-103, 128, 136, 138, 139, 154 (camera, gimbal),
 123, 124, 144, 145, 151, 152 (fleet)."""

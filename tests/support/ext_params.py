@@ -21,7 +21,9 @@ FINAL = frozenset({dialect.PARAM_ACK_ACCEPTED, dialect.PARAM_ACK_VALUE_UNSUPPORT
 
 def value_of(message: Any) -> float:
     """The value in a PARAM_EXT_VALUE or PARAM_EXT_ACK, from its bytes on the wire."""
-    field = bytes(message._param_value_raw).ljust(4, b"\0")
+    # Behind a header of 10 bytes: count and index in the first of the two, the name of 16 characters, the value.
+    start = 30 if message.get_type() == "PARAM_EXT_VALUE" else 26
+    field = bytes(message.get_msgbuf())[start : start + 4]
     (value,) = struct.unpack_from("<" + CODES[message.param_type], field)
     return float(value)
 

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from anafi_mav.config import Config, DroneConfig
+from anafi_mav.config import Config, DroneConfig, HttpConfig, MediaConfig, VideoConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 from support import flavours
@@ -21,6 +21,9 @@ HOME = (48.8789, 2.3677, 35.0)
 
 WEB_PORT = 8080
 """Of a drone's web server; each drone has an address of its own."""
+
+VIDEO_PORT = 8554
+"""Of a drone's video server; no user needs a right for it."""
 
 UDP_PORT = 14550
 
@@ -142,7 +145,9 @@ async def world(
     drone_address: str | None = None,
     web: bool = False,
     udp: bool = False,
+    video: VideoConfig | None = None,
     video_latency: float = 0.0,
+    media: MediaConfig | None = None,
     pose: Literal["video", "events"] = "video",
 ) -> AsyncIterator[World]:
     """One simulated drone, one gateway with a TCP endpoint, and its clients, connected and ready.
@@ -158,6 +163,7 @@ async def world(
         address=drone_address,
         home=HOME,
         http_port=WEB_PORT if web else None,
+        rtsp_port=VIDEO_PORT,
         telemetry_rate=telemetry_rate,
         skycontroller=skycontroller,
         video_latency=video_latency,
@@ -168,7 +174,12 @@ async def world(
             *([f"tcpin://{address}:5761?flavour={also}"] if also else []),
             *([f"udpin://{address}:{UDP_PORT}?flavour={flavour}"] if udp else []),
         ),
-        drones=(DroneConfig(name="alpha", sysid=sysid, address=drone_address, http_port=WEB_PORT),),
+        drones=(
+            DroneConfig(name="alpha", sysid=sysid, address=drone_address, http_port=WEB_PORT, rtsp_port=VIDEO_PORT),
+        ),
+        video=video or VideoConfig(),
+        media=media or MediaConfig(),
+        http=HttpConfig(port=0),
         allow_kill=allow_kill,
         pose=pose,
     )

@@ -16,7 +16,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Protocol
 
-from anafi_mav.drone.payload.media_file import WRITTEN, Place, Resource, fetch, file_name
+from anafi_mav.drone.payload.media_file import UNKNOWN, WRITTEN, Place, Resource, fetch, file_name
 from anafi_mav.errors import AnafiMavError, CommandTimeout, LinkLost
 
 TRIES = 6
@@ -169,7 +169,7 @@ def sidecar(name: str, resource: Resource, md5: str, xmp: dict[str, str]) -> dic
         else {
             "latitude": place.latitude,
             "longitude": place.longitude,
-            "altitude_amsl": place.altitude,
+            "altitude_amsl": None if place.altitude == UNKNOWN else place.altitude,
             "source": source,
         },
         "camera_attitude": None if None in angles.values() else angles,
@@ -198,7 +198,7 @@ def _place_in(xmp: dict[str, str]) -> Place | None:
         return None
     whole, _, parts = xmp.get("GPSAltitude", "").partition("/")
     height, divisor = _number(whole), _number(parts or "1")
-    altitude = 500.0 if height is None or not divisor else height / divisor
+    altitude = UNKNOWN if height is None or not divisor else height / divisor
     return Place(latitude, longitude, -altitude if xmp.get("GPSAltitudeRef") == "1" else altitude)
 
 

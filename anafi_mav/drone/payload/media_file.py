@@ -30,12 +30,16 @@ UNDATED = "undated"
 """Folder of a file without a readable time."""
 
 
-class Place(msgspec.Struct, frozen=True):
-    """A place: deg, deg, m; Parrot writes 500 for unknown."""
+UNKNOWN = 500.0
+"""Coordinate that the drone does not know."""
 
-    latitude: float = 500.0
-    longitude: float = 500.0
-    altitude: float = 500.0
+
+class Place(msgspec.Struct, frozen=True):
+    """A place: deg, deg, m above mean sea level."""
+
+    latitude: float = UNKNOWN
+    longitude: float = UNKNOWN
+    altitude: float = UNKNOWN
 
     @property
     def is_known(self) -> bool:

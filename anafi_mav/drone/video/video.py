@@ -136,6 +136,8 @@ class Video(Element[VideoState]):
         self._picture_callbacks: tuple[PictureCallback, ...] = ()
         self._stale: asyncio.TimerHandle | None = None
         self._arrivals: deque[float] = deque(maxlen=MAX_RATE)
+        self._sizes: deque[tuple[float, int]] = deque(maxlen=MAX_RATE)
+        """Arrival and bytes of the pictures of the last second."""
         self._clock: tuple[int, float] | None = None
         """The timestamp of RTP of the last picture, and when that was taken."""
         self._newest_shot = -math.inf
@@ -229,6 +231,11 @@ class Video(Element[VideoState]):
             self._picture_callbacks = tuple(other for other in self._picture_callbacks if other is not callback)
 
         return undo
+
+    @property
+    def bits_per_second(self) -> int:
+        """Measured rate of the stream over the last second; 0 without pictures."""
+        return 8 * sum(size for _, size in self._sizes) if self.state.playing else 0
 
     async def next_frame(self, timeout: float = STALE) -> VideoFrame:
         """Return the metadata of the next picture. Raises `CommandTimeout` when none arrives."""
@@ -324,6 +331,7 @@ class Video(Element[VideoState]):
             self._stale.cancel()
             self._stale = None
         self._arrivals.clear()
+        self._sizes.clear()
         self._clock = None
         self.state = replace(self.state, playing=False, frame=None, rate_hz=None)
 
@@ -334,6 +342,9 @@ class Video(Element[VideoState]):
         if self._stale is not None:
             self._stale.cancel()
         self._stale = loop.call_at(now + STALE, self._forget)
+        self._sizes.append((now, sum(map(len, picture.units))))
+        while now - self._sizes[0][0] > RATE_WINDOW:
+            self._sizes.popleft()
         taken = self._taken(picture)
         if not self.state.playing:
             shown = None if self._stream is None else self._stream.shown

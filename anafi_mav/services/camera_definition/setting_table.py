@@ -306,7 +306,10 @@ def bounded(bounds: tuple[float, float] | None) -> ValueLimits | None:
 
 
 def interval(mode: PhotoMode, view: View) -> float | None:
-    """Return the interval of a series; None in another photo mode: the drone has one number for both."""
+    """Return the interval of a series; None in another photo mode.
+
+    The older cameras have one number for both.
+    """
     settings = photo(view)
     return settings.interval if settings.mode is mode else None
 

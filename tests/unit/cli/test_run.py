@@ -174,18 +174,20 @@ async def test_run_prints_each_drone_and_endpoint_before_ready(tmp_path: Path) -
           - {{name: charlie, sysid: 3, address: {nobody}}}
     """
     async with product(tmp_path, config) as p:
-        alpha, bravo, charlie, tcp, udp, page, ready = p.lines
+        alpha, bravo, charlie, tcp, udp, video, page, ready = p.lines
         assert alpha.startswith(f"drone alpha: system 1 at {first}: ANAFI 4K PI04")
         assert bravo.startswith(f"drone bravo: system 245 at {second}: ANAFI 4K PI04")
         assert charlie.startswith(f"drone charlie: system 3 at {nobody}: not connected (")
         assert charlie.endswith("), retrying")
         assert tcp == f"endpoint tcpin://{address}:5760: 0 clients"
         assert udp == f"endpoint udpout://{address}:{port}"
+        assert video.startswith("video rtsp://127.0.0.1:")
+        assert video.endswith("/SYSTEM/STREAM: 0 viewers")
         assert page.startswith("web page http://127.0.0.1:")
         assert ready.startswith("ready")
         # 245 is MAVSDK's own: a warning, and it flies.
         (warning,) = (line for line in p.complaints if "warning" in line)
-        assert warning.startswith("anafi-mav: warning: drones[1].sysid: 245 is what MAVSDK calls itself")
+        assert warning.startswith("anafi-mav: warning: drones[1].sysid: 245 is the default system id of MAVSDK")
 
 
 # End.

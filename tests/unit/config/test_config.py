@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from anafi_mav.config import Config, DroneConfig, HttpConfig, SimConfig, from_text, load, remarks
+from anafi_mav.config import Config, DroneConfig, HttpConfig, SimConfig, VideoConfig, from_text, load, remarks
 from anafi_mav.config.schema import WindConfig
 from anafi_mav.errors import ConfigError
 
@@ -127,6 +127,11 @@ def test_anchors_and_merges_are_no_duplicate_keys() -> None:
 def test_web_server_is_configured_left_out_or_off() -> None:
     assert from_text("http: {host: 0.0.0.0, port: 0}", "f").http_server == HttpConfig(host="0.0.0.0", port=0)
     assert from_text("http: off", "f").http_server is None
+    assert from_text("video: {host: 0.0.0.0, rtsp_port: 0, public_host: gw.example}", "f").video_server == VideoConfig(
+        host="0.0.0.0", rtsp_port=0, public_host="gw.example"
+    )
+    assert from_text("video: off", "f").video_server is None
+    assert from_text("video: on", "f").video_server == from_text("", "f").video_server == VideoConfig()
     assert from_text("http: on", "f").http_server == from_text("", "f").http_server == HttpConfig()
 
 
@@ -136,6 +141,9 @@ def test_web_server_is_configured_left_out_or_off() -> None:
         ("http: 8088", "http: expected a mapping like {host: 127.0.0.1, port: 8088}, or off, got 8088"),
         ("http: {port: 65536}", "http.port: expected a port from 0 to 65535, got 65536"),
         ("http: {host: 1.2.3}", "http.host: expected an IPv4 address or a host name of this computer, like 0.0.0.0"),
+        ("video: 8555", "video: expected a mapping like {host: 0.0.0.0, rtsp_port: 8555}, or off, got 8555"),
+        ("video: {rtsp_port: -1}", "video.rtsp_port: expected a port from 0 to 65535, got -1"),
+        ("video: {public_host: 1.2.3}", "video.public_host: expected an IPv4 address or a host name, like 10.0.0.7"),
         ("http: {address: x}", "http.address: unknown key; expected one of host, port"),
     ],
 )

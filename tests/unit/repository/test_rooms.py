@@ -43,6 +43,7 @@ CORES = [
     *("vehicle/circle.py", "vehicle/follow.py", "vehicle/hold_rule.py", "vehicle/initiator.py"),
     "vehicle/joystick_override.py",
     *("services/capabilities.py", "services/checksum.py", "services/commands.py", "services/component_metadata.py"),
+    "services/gateway_uris.py",
     *("services/camera_definition/camera_setting.py", "services/camera_definition/catalogue.py"),
     *("services/camera_definition/definition_file.py", "services/camera_definition/param_ext_codec.py"),
     "services/camera_definition/setting_fit.py",

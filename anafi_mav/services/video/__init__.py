@@ -1,0 +1,1 @@
+"""Video streams of the camera component."""
