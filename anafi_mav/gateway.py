@@ -39,6 +39,7 @@ from anafi_mav.subject import DRONE
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.flying import ON_GROUND
 from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.web.definition_routes import DefinitionRoutes
 from anafi_mav.web.live_page import DroneEntry, LivePage
 from anafi_mav.web.media_routes import MediaRoutes
 from anafi_mav.web.server import HttpServer
@@ -231,6 +232,7 @@ class Gateway:
         if self.web is not None:
             LivePage(self.web, lambda: [supervised.entry() for supervised in self._supervised])
             MediaRoutes(self.web, self._drone)
+            DefinitionRoutes(self.web, self._definition)
 
     async def __aenter__(self) -> Self:
         await self.start()
@@ -391,6 +393,12 @@ class Gateway:
     def _drone(self, sysid: int) -> Drone | None:
         """Return the drone with this system id."""
         return next((supervised.drone for supervised in self._supervised if supervised.config.sysid == sysid), None)
+
+    def _definition(self, sysid: int) -> tuple[bytes, bytes] | None:
+        """Return the camera definition of a connected drone, plain and compressed."""
+        systems = [supervised.system for supervised in self._supervised if supervised.config.sysid == sysid]
+        content = next((system.definition.content for system in systems if system.active), None)
+        return (content.plain, content.packed) if content is not None and content.plain else None
 
     def lines(self) -> list[str]:
         """One line per drone and per endpoint, one for the video and one for the web server."""

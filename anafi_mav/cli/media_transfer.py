@@ -12,7 +12,7 @@ from anafi_mav.cli.media import GATEWAY
 from anafi_mav.cli.plan_options import sysid_of
 from anafi_mav.cli.terminal import complain, progress, say, say_json, say_table
 from anafi_mav.drone.payload.media import MediaClient, MediaItem, Resource
-from anafi_mav.drone.payload.media_copy import copy
+from anafi_mav.drone.payload.media_copy import copy, iso_time
 from anafi_mav.drone.payload.media_index import by_day
 from anafi_mav.drone.rest import Rest
 from anafi_mav.errors import AnafiMavError, CommandRejected, ConfigError, LinkLost, RemoteProtocolError
@@ -27,7 +27,10 @@ async def list_media(arguments: argparse.Namespace) -> int:
     if arguments.json:
         say_json([_facts(file) for file in files])
         return 0
-    rows = [(file.date, file.resource_id, f"{file.size / 1e6:.1f}", file.datetime, _place(file)) for file in files]
+    rows = [
+        (file.date, file.resource_id, f"{file.size / 1e6:.1f}", iso_time(file.datetime) or "", _place(file))
+        for file in files
+    ]
     say_table(("day", "file", "MB", "time", "place"), rows, right={2})
     say(f"{len(files)} files, {sum(file.size for file in files) / 1e6:.1f} MB")
     return 0
@@ -106,7 +109,7 @@ def _facts(file: Resource) -> dict[str, Any]:
         "type": file.type,
         "format": file.format,
         "size": file.size,
-        "time": file.datetime,
+        "time": iso_time(file.datetime),
         "md5": file.md5,
         "storage": file.storage,
         "duration": None if file.duration is None else file.duration / 1000.0,

@@ -75,12 +75,18 @@ class Effect(enum.Enum):
     LAND = "a STOP that another client's Hold may have ended since: it is then not repeated"
     RETURN = "asks for the way home: when that is flown already, it is carried out again; never cancelled"
     LAPSING = "a mode that ends without another command: asked for after its end, it begins again, or is refused"
+    TARGET = "a target that may be set twice: carried out each time it arrives, and never cancelled"
     IRREVOCABLE = "cannot be cancelled: the drone does it whatever is sent then, so CANCELLED would be a lie"
 
     @property
     def stops(self) -> bool:
         """Ends something and begins nothing. It may be carried out twice."""
         return self in (Effect.STOP, Effect.HOLD, Effect.LAND)
+
+    @property
+    def is_repeatable(self) -> bool:
+        """It is carried out again each time it arrives."""
+        return self.stops or self is Effect.TARGET
 
     @property
     def is_revocable(self) -> bool:
@@ -312,7 +318,7 @@ class CommandHistory:
             return newest.result
         effect = command.effect
         landing_ended = effect is Effect.LAND and newest.superseded and landing_ended_at >= newest.ended
-        if effect.stops and not landing_ended:
+        if effect.is_repeatable and not landing_ended:
             return None
         succeeded = newest.result in (dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_CANCELLED)
         if now - newest.ended >= (RESEND_WINDOW if succeeded else REFUSAL_WINDOW):

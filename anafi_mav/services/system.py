@@ -195,6 +195,8 @@ class System:
         )
         self._autopilot: Component = Component(self, AUTOPILOT, AUTOPILOT_SERVICES)
         camera = Component(self, CAMERA, CAMERA_SERVICES)
+        self.definition = camera.definition
+        """The definition of the camera."""
         self.components = (self._autopilot, camera)
         """The autopilot is the first: the others' services build on what its services make of an event."""
         self.services: list[Service] = [service for component in self.components for service in component.services]

@@ -104,6 +104,12 @@ ITEMS: dict[int, Item] = {
     82: Item("DO_CHANGE_SPEED: types, unchanged, default"),
     83: Item("DO_SET_HOME here and there; HOME_POSITION told"),
     91: Item("VIDEO_STREAM_INFORMATION of each stream and of all; each URI opens once its stream is shown"),
+    98: Item("the gimbal is device 1 of component 1: 280, 281, 283, 285"),
+    99: Item("280 to the camera and 259 to the autopilot are refused at once", NEITHER),
+    100: Item("1001: control is taken, stolen and released; the mission's"),
+    101: Item("1000 as LONG and INT moves the pitch within 2 deg, clipped", PX4),
+    102: Item("282 without a quaternion is a rate; it ends with the messages", PX4),
+    103: Item("285: one frame of yaw, consistent with the heading", PX4),
     104: Item("MANUAL_CONTROL: signs, neutral after 0.5 s of silence"),
     105: Item("Offboard refused without setpoints, Hold within 1 s of their end"),
     106: Item("position targets in every frame and mask; terrain refused"),
@@ -147,5 +153,5 @@ ITEMS: dict[int, Item] = {
     155: Item("LINK_NODE_STATUS, ONBOARD_COMPUTER_STATUS on request", NEITHER),
     156: Item("the standard flavour connects and takes off", NEITHER),
 }
-"""In scope so far, by number. Missing: 3, 4, 84-90, 92-103, 128, 136, 138, 139, 154 (camera, gimbal),
+"""In scope so far, by number. Missing: 3, 4, 84-90, 92-97, 128, 136, 138, 139, 154 (camera, gimbal),
 123, 124, 144, 145, 151, 152 (fleet)."""

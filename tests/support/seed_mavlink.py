@@ -19,6 +19,7 @@ class Reach(NamedTuple):
 
 
 _FLIGHT = "conformance/test_conf_flight.py::"
+_GIMBAL = "conformance/test_conf_gimbal.py::"
 _GUIDED = "conformance/test_conf_guided.py::"
 _TELEMETRY = "conformance/test_conf_telemetry.py::"
 _ANAFI = "conformance/test_anafi_messages.py::"
@@ -26,6 +27,7 @@ _MAINTENANCE = "conformance/test_conf_maintenance.py::"
 _TWIN = "conformance/test_conf_params.py::test_alias_and_native_parameter_are_one_value"
 _PARAMETER = "conformance/test_conf_params.py::test_native_settings_reach_the_drone"
 _MISSIONS = "conformance/test_conf_missions.py::"
+_CAMERA = "conformance/test_conf_camera_settings.py::"
 _SAFETY = "conformance/test_safety.py::"
 
 REACHED: dict[str, Reach] = {
@@ -36,7 +38,10 @@ REACHED: dict[str, Reach] = {
         _GUIDED + "test_conf_143_condition_yaw",
     ),
     "drone/moveto": Reach("`MAV_CMD_DO_REPOSITION`", _FLIGHT + "test_conf_029_goto"),
-    "gimbal/command": Reach("", waits=PAYLOAD),
+    "gimbal/command": Reach(
+        "`MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW`, `GIMBAL_MANAGER_SET_ATTITUDE`",
+        _GIMBAL + "test_conf_098_gimbal_is_device_1_of_the_autopilot",
+    ),
     "battery/health": Reach("`BATTERY_INFO`.state_of_health", _TELEMETRY + "test_conf_037_the_cells_of_an_ai"),
     "battery/percentage": Reach("`BATTERY_STATUS`.battery_remaining", _TELEMETRY + "test_conf_037_battery"),
     "battery/voltage": Reach("`BATTERY_STATUS`.voltages", _TELEMETRY + "test_conf_037_battery"),
@@ -71,7 +76,9 @@ REACHED: dict[str, Reach] = {
     "drone/rpy": Reach("`ATTITUDE`", _TELEMETRY + "test_conf_040_attitude_signs"),
     "drone/speed": Reach("`LOCAL_POSITION_NED`, `GLOBAL_POSITION_INT`", _TELEMETRY + "test_conf_041_velocity_signs"),
     "drone/state": Reach("`EXTENDED_SYS_STATE`, `HEARTBEAT`, `ANAFI_FLIGHT_STATUS`", _ANAFI + "test_flight_status"),
-    "gimbal/attitude/absolute": Reach("", waits=PAYLOAD),
+    "gimbal/attitude/absolute": Reach(
+        "`GIMBAL_DEVICE_ATTITUDE_STATUS`", _GIMBAL + "test_conf_103_yaw_has_one_frame_and_agrees_with_the_heading"
+    ),
     "home/location": Reach("`HOME_POSITION`, `ANAFI_HOME`", _TELEMETRY + "test_conf_034_home"),
     "link/quality": Reach("`RC_CHANNELS`.rssi, `ANAFI_LINK`.quality", _TELEMETRY + "test_conf_134_rssi"),
     "skycontroller/attitude": Reach("`ANAFI_CONTROLLER_ATTITUDE`", _ANAFI + "test_where_the_skycontroller_points"),
@@ -115,24 +122,40 @@ REACHED: dict[str, Reach] = {
         "`MAV_CMD_PREFLIGHT_CALIBRATION`, `MAV_CMD_GIMBAL_REQUEST_AXIS_CALIBRATION`",
         _MAINTENANCE + "test_conf_130_the_gimbal",
     ),
-    "gimbal/reset": Reach("", waits=PAYLOAD),
+    "gimbal/reset": Reach(
+        "`MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW` with `GIMBAL_MANAGER_FLAGS_NEUTRAL`",
+        _GIMBAL + "test_conf_101_command_as_long_and_int_moves_the_pitch",
+    ),
     "home/navigate": Reach("`MAV_CMD_NAV_RETURN_TO_LAUNCH`, mode Hold", _FLIGHT + "test_conf_025_return"),
     "home/set": Reach("`MAV_CMD_DO_SET_HOME`", _GUIDED + "test_conf_083_set_home"),
     "skycontroller/offboard": Reach(
         "`ANAFI_CONTROLLER_INPUT`.source; the gateway takes it when it is told to move",
         _SAFETY + "test_a_pilots_stick_ends_offboard_for_good",
     ),
-    "storage/download": Reach("", waits=PAYLOAD),
+    "storage/download": Reach(
+        "MAVLink FTP of component 100, `/media`; `anafi-mav media download`",
+        "conformance/test_conf_media.py::test_conf_113_media_is_listed_read_and_removed",
+    ),
     "storage/format": Reach("", waits=PAYLOAD),
-    "camera/autorecord": Reach("", waits=PAYLOAD),
-    "camera/ev_compensation": Reach("", waits=PAYLOAD),
-    "camera/hdr": Reach("", waits=PAYLOAD),
-    "camera/max_zoom_speed": Reach("", waits=PAYLOAD),
-    "camera/mode": Reach("", waits=PAYLOAD),
+    "camera/autorecord": Reach(
+        "extended parameter `CAM_AUTOREC`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"
+    ),
+    "camera/ev_compensation": Reach(
+        "extended parameter `CAM_EV`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"
+    ),
+    "camera/hdr": Reach("extended parameter `CAM_HDR`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"),
+    "camera/max_zoom_speed": Reach(
+        "extended parameter `CAM_ZOOMSPEED`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"
+    ),
+    "camera/mode": Reach("extended parameter `CAM_MODE`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"),
     "camera/relative": Reach("", waits=PAYLOAD),
-    "camera/rendering": Reach("", waits=PAYLOAD),
-    "camera/streaming": Reach("", waits=PAYLOAD),
-    "camera/style": Reach("", waits=PAYLOAD),
+    "camera/rendering": Reach(
+        "extended parameter `CAM_THM_RENDER`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"
+    ),
+    "camera/streaming": Reach(
+        "extended parameter `CAM_STREAMING`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"
+    ),
+    "camera/style": Reach("extended parameter `CAM_STYLE`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"),
     "drone/banked_turn": Reach("`ANF_BANKED_TURN`", _PARAMETER),
     "drone/max_altitude": Reach("`ANF_MAX_ALT`", _TWIN),
     "drone/max_distance": Reach("`ANF_MAX_DIST`, `ANF_GEOFENCE`", _TWIN),
@@ -153,5 +176,8 @@ REACHED: dict[str, Reach] = {
     "home/min_altitude": Reach("`ANF_RTH_ALT`", _TWIN),
     "home/precise": Reach("`ANF_RTH_PRECISE`", _PARAMETER),
     "home/type": Reach("`ANF_HOME_TYPE`", _PARAMETER),
-    "storage/download_folder": Reach("", waits="nothing: a setting of the computer, not of the drone"),
+    "storage/download_folder": Reach(
+        "waits for nothing: the configuration key `media: {download_folder}` of the gateway",
+        "conformance/test_media_download.py::test_photo_of_a_flight_is_copied_after_landing",
+    ),
 }

@@ -163,7 +163,7 @@ def sidecar(name: str, resource: Resource, md5: str, xmp: dict[str, str]) -> dic
         "format": resource.format or None,
         "size": resource.size,
         "md5": md5,
-        "time": _iso(resource.datetime),
+        "time": iso_time(resource.datetime),
         "place": None
         if place is None
         else {
@@ -214,7 +214,7 @@ def _number(text: str | None) -> float | None:
     return float(text) if text is not None and re.fullmatch(r"-?[0-9]{1,12}(\.[0-9]{1,9})?", text) else None
 
 
-def _iso(text: str) -> str | None:
+def iso_time(text: str) -> str | None:
     """Return a time of the drone as ISO 8601 extended."""
     try:
         return datetime.strptime(text, "%Y%m%dT%H%M%S%z").isoformat()

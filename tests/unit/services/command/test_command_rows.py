@@ -34,10 +34,10 @@ ROWS: dict[str, tuple[bool, Altitude, object, ProgressPolicy]] = {
     "DO_CANCEL_MAG_CAL": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
     "DO_CHANGE_ALTITUDE": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
     "DO_CHANGE_SPEED": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
-    "DO_GIMBAL_MANAGER_CONFIGURE": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
-    "DO_GIMBAL_MANAGER_PITCHYAW": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
-    "DO_MOUNT_CONFIGURE": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
-    "DO_MOUNT_CONTROL": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "DO_GIMBAL_MANAGER_CONFIGURE": (False, Altitude.UNUSED, Effect.TARGET, ProgressPolicy.PROMPT),
+    "DO_GIMBAL_MANAGER_PITCHYAW": (False, Altitude.UNUSED, Effect.TARGET, ProgressPolicy.PROMPT),
+    "DO_MOUNT_CONFIGURE": (False, Altitude.UNUSED, Effect.TARGET, ProgressPolicy.PROMPT),
+    "DO_MOUNT_CONTROL": (False, Altitude.UNUSED, Effect.TARGET, ProgressPolicy.PROMPT),
     "DO_FENCE_ENABLE": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
     "DO_FLIGHTTERMINATION": (False, Altitude.UNUSED, Effect.STOP, ProgressPolicy.PROMPT),
     "DO_ORBIT": (True, Altitude.AMSL, Effect.CHANGE, ProgressPolicy.PROMPT),
@@ -137,6 +137,7 @@ def test_every_mode_has_an_effect() -> None:
         (Effect.RETURN, False, False),
         (Effect.LAPSING, False, True),
         (Effect.IRREVOCABLE, False, False),
+        (Effect.TARGET, False, False),
     ],
 )
 def test_effect_decides_repetition_and_cancellation(effect: Effect, stops: bool, revocable: bool) -> None:
