@@ -567,6 +567,8 @@ MEDIA_NOT_INDEXED = OperatorText("Media unavailable: drone indexes its storage")
 MEDIA_UNAVAILABLE = Template("Media unavailable: {error}", error=BELOW)
 FILE_TOO_LARGE = OperatorText("File too large for FTP: use media download")
 FILE_DAMAGED = OperatorText("File damaged: MD5 is not the drone's")
+MEDIA_COPIED = Template("Media copied: {count} file(s)", count=99999)
+MEDIA_NOT_COPIED = Template("Media not copied: {error}", error=BELOW)
 DELETE = Subject("Delete")
 CAMERA_SAVING = Reason("camera is saving photos")
 
