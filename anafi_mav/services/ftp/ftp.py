@@ -59,6 +59,12 @@ MAX_REPETITIONS = 16
 """Sequence numbers under which one waiting request is answered: QGroundControl repeats it three times, each time with
 another number."""
 
+RESTARTED = 1 << 15
+"""Distance of a sequence number from the last kept one, modulo 2**16, from which it is an older number.
+
+A client that restarts counts from the beginning, and its TerminateSession may equal one of before.
+"""
+
 _HEADER = struct.Struct("<HBBBBBBI")
 
 
@@ -295,8 +301,11 @@ class FtpServer:
         client.seen = now
         if len(self._clients) > MAX_CLIENTS:
             self._drop(next(iter(self._clients)))
-        if client.kept is not None and client.kept[0] == request:
-            return client.kept[1]
+        if client.kept is not None:
+            if client.kept[0] == request:
+                return client.kept[1]
+            if request.seq - client.kept[0].seq & 0xFFFF >= RESTARTED:
+                client.kept = None
         if self._waits(client, request) or (len(client.waits) >= MAX_WAITS and request.opcode not in _SHORT):
             return None
         try:
