@@ -223,10 +223,7 @@ class _Client:
     """Those that are open."""
     waits: list[Wait] = field(default_factory=list)
     kept: tuple[FtpRequest, bytes] | None = None
-    """The last request of `_KEPT` and its answer, which a repetition gets again.
-
-    Opening a file drops it: a client may number its requests from 0 again for each file.
-    """
+    """The last request of `_KEPT` and its answer, which a repetition gets again."""
     seen: float = 0.0
 
 
@@ -483,7 +480,7 @@ class FtpServer:
         session = self._session_for(client, request, now)
         if isinstance(session, FileError):
             return session
-        client.sessions[request.session], client.kept = session, None
+        client.sessions[request.session] = session
         if session.state is not State.WRITING or session.created != request.seq:
             self._abandon(client, request.session)
             session.step(Event.CREATE)
@@ -514,7 +511,7 @@ class FtpServer:
         if isinstance(session, FileError):
             return session
         opening = files.open(request.path)
-        client.sessions[request.session], client.kept = session, None
+        client.sessions[request.session] = session
         self._abandon(client, request.session)
         session.step(Event.OPEN)
         session.path, session.source, session.used = request.path, None, now
