@@ -183,7 +183,7 @@ JUST_TAKEN_OFF = Reason("took off, drone is landing")
 # == Reasons: bounds ==
 
 NOT_A_NUMBER = Reason("not a number")
-TOO_LOW = ReasonTemplate("{height:.1f} m < {lowest:.1f} m", height=-99999.9, lowest=-999.9)
+TOO_LOW = ReasonTemplate("relative {height:.1f} m < {lowest:.1f} m", height=-99999.9, lowest=-999.9)
 ABOVE_CEILING = ReasonTemplate("{height:.1f} m > ceiling {ceiling:g} m", height=99999.9, ceiling=4000.5)
 NEAR_ESTIMATE = ReasonTemplate("estimated AMSL: {height:.0f} m < {lowest:g} m", height=-99, lowest=15)
 NOT_ON_EARTH = Reason("not a place on earth")
