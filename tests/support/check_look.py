@@ -18,6 +18,9 @@ SIZES = {
     "Disparity map": [176, 90],
 }
 
+SHADES = {"ParrotThermalVideo": [48, 168], "ParrotThermalBlendedVideo": [168, 168]}
+"""Luma of sky and ground where it is not that of a visible picture."""
+
 PRODUCTS = {"4k": "0914", "thermal": "0919", "usa": "091e", "ai": "091a"}
 
 
@@ -39,5 +42,5 @@ def check_look(report: dict[str, Any], model: str, log: list[dict[str, Any]]) ->
 
 def check_pictures(stream: dict[str, Any], name: str) -> None:
     """Sky above ground, of the right size, and what they say can be read."""
-    assert (stream["size"], stream["shades"]) == (SIZES[name], [168, 88])
+    assert (stream["size"], stream["shades"]) == (SIZES[name], SHADES.get(name, [168, 88]))
     assert stream["kinds"] == ["PROTO"], "Olympe turns version 3 into the protocol buffer"

@@ -1,20 +1,54 @@
-"""Simulated camera picture, sky above ground, as an H.264 stream of a few kB a second.
+"""H.264 encoder for pictures of coloured cells, in pure Python.
 
-Constrained baseline (ITU-T H.264), one slice a picture, CAVLC. A key picture is predicted from its first macroblock
-and from the one at the left end of the horizon, the only two with a residual; every other macroblock takes 7 or 8
-bits. The pictures between repeat the one before: a slice that skips all macroblocks, some ten bytes.
+Constrained baseline (ITU-T H.264), one slice a picture, CAVLC, no deblocking. A cell has 4 x 4 pixels of one colour of
+`PALETTE`, so that a macroblock is 16 numbers: their differences to its neighbour are the Intra16x16 DC coefficients,
+the only ones that are coded. The colours are chosen so that these are whole numbers and a decoder shows the palette
+exactly: nothing is rounded, and no error adds up.
+
+A key picture codes every macroblock. A picture between codes those that have changed and skips the others (P_Skip).
 """
 
 from __future__ import annotations
 
+import re
 from functools import cached_property, lru_cache
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
 
 from anafi_mav.errors import LocalProtocolError
+from anafi_mav.sim.video.cavlc import chroma_dc, luma_dc, se, ue
 
 KEY_INTERVAL = 30
 """Pictures from one key picture to the next: a second."""
 FRAME_RATE = 30
 """Pictures a second, as the stream says of itself."""
+CELL = 4
+"""Pixels of a cell's side."""
+
+Cells = npt.NDArray[np.uint8]
+"""A picture as rows of cells: numbers of colours."""
+Blocks = npt.NDArray[np.uint8]
+"""A picture as macroblocks of 16 cells, row by row; shape (macroblocks, 16)."""
+
+
+class CellColour(NamedTuple):
+    """A colour, in whole steps of the quantiser from the middle, 128: 40 of luma, 16 of chroma."""
+
+    luma: int
+    blue: int
+    red: int
+
+
+SKY, GROUND, DARK, LIGHT, HORIZON, COLD, WARM = range(7)
+"""Numbers of colours: sky, ground, text's background, text, the line between sky and ground, and sky and ground of a
+thermal picture."""
+
+PALETTE = (
+    *(CellColour(1, 2, -1), CellColour(-1, -1, 0), CellColour(-2, 0, 0), CellColour(2, 0, 0), CellColour(3, 0, 0)),
+    *(CellColour(-2, 2, 1), CellColour(1, -3, 2)),
+)
 
 _LEVELS = ((99, 10), (396, 11), (1620, 30), (3600, 31), (8192, 40), (36864, 51))
 """Largest picture in macroblocks -> level_idc that has it 30 times a second (H.264 table A-1)."""
@@ -23,65 +57,36 @@ _FRAME_NUM_BITS = 4
 _KEY, _BETWEEN, _SPS, _PPS = 5, 1, 7, 8
 """Types of NAL units."""
 _QP_DELTA = 10
-"""Quantiser 36: one step of a DC coefficient is 2.5 steps of brightness."""
-_SKY, _GROUND = 16, -32
-"""Residuals in those steps: 128 + 40 for the sky, 80 less for the ground."""
+"""Quantiser 36: one step of a luma DC coefficient is 2.5 steps of brightness, of chroma (34) 4 (8.5.10, 8.5.11)."""
+_INTRA_IN_P = 5
+"""mb_type of the first intra macroblock of a P slice (table 7-13)."""
+
+_VERTICAL, _HORIZONTAL, _DC = 0, 1, 2
+"""Intra16x16PredMode (table 8-4)."""
+_CHROMA_MODE = {_VERTICAL: 2, _HORIZONTAL: 1, _DC: 0}
+"""intra_chroma_pred_mode (table 8-5)."""
+_ZIGZAG = (0, 1, 4, 8, 5, 2, 3, 6, 9, 12, 13, 10, 7, 11, 14, 15)
+_HADAMARD = np.array([[1, 1, 1, 1], [1, 1, -1, -1], [1, -1, -1, 1], [1, -1, 1, -1]], dtype=np.int32)
+_HADAMARD_2 = np.array([[1, 1], [1, -1]], dtype=np.int32)
+_STEPS = np.array(PALETTE, dtype=np.int32)
+
+MAX_KNOWN = 1 << 14
+"""Macroblocks whose code is kept, with the neighbour that they are predicted from: 3 MB. A flight in every attitude
+has some thousand."""
+
+_START_CODE = re.compile(rb"\0\0(?=[\0-\3])")
 
 
-class _Bits:
-    """A row of bits, first the highest."""
-
-    def __init__(self) -> None:
-        self._text: list[str] = []
-
-    def u(self, bits: int, value: int) -> None:
-        self._text.append(f"{value:0{bits}b}")
-
-    def ue(self, value: int) -> None:
-        """Exp-Golomb."""
-        code = f"{value + 1:b}"
-        self._text.append("0" * (len(code) - 1) + code)
-
-    def se(self, value: int) -> None:
-        """Signed Exp-Golomb."""
-        self.ue(2 * value - 1 if value > 0 else -2 * value)
-
-    def raw(self, text: str) -> None:
-        self._text.append(text)
-
-    def unit(self, importance: int, kind: int) -> bytes:
-        """A NAL unit: the stop bit, and a 3 where two zeros would be taken for a start code."""
-        text = "".join(self._text) + "1"
-        text += "0" * (-len(text) % 8)
-        payload = int(text, 2).to_bytes(len(text) // 8, "big")
-        escaped = bytearray((importance << 5 | kind,))
-        zeros = 0
-        for byte in payload:
-            if zeros == 2 and byte <= 3:
-                escaped.append(3)
-                zeros = 0
-            escaped.append(byte)
-            zeros = zeros + 1 if byte == 0 else 0
-        return bytes(escaped)
+def _unit(importance: int, kind: int, text: str) -> bytes:
+    """Return a NAL unit: the stop bit, and a 3 where two zeros would be taken for a start code."""
+    text += "1"
+    text += "0" * (-len(text) % 8)
+    payload = int(text, 2).to_bytes(len(text) // 8, "big")
+    return bytes((importance << 5 | kind,)) + _START_CODE.sub(b"\0\0\3", payload)
 
 
-def _residual(level: int) -> str:
-    """Intra16x16DCLevel with `level` as its only coefficient, the first (H.264 9.2)."""
-    if level == 0:
-        return "1"  # coeff_token: none
-    # coeff_token: one coefficient, no trailing ones, no coefficients around; total_zeros: none.
-    token, zeros = "000101", "1"
-    # The first level without trailing ones counts from 2 on (9.2.2.1).
-    code = (2 * level - 2 if level > 0 else -2 * level - 1) - 2
-    if code < 14:
-        return token + "0" * code + "1" + zeros
-    if code < 30:
-        return token + "0" * 14 + "1" + f"{code - 14:04b}" + zeros
-    return token + "0" * 15 + "1" + f"{code - 30:012b}" + zeros
-
-
-class Pictures:
-    """The pictures of one size."""
+class PictureEncoder:
+    """Encodes pictures of one size."""
 
     def __init__(self, width: int, height: int) -> None:
         """Pixels, even. Raises `LocalProtocolError` for a size that no level has."""
@@ -92,116 +97,140 @@ class Pictures:
         if level is None or blocks == 0 or width % 2 or height % 2:
             raise LocalProtocolError(f"no picture has {width} x {height} pixels")
         self._level = level
+        self.cells = (self._rows * 4, self._columns * 4)
+        """Rows and columns of cells; those at the lower and right edge may be cropped."""
 
     @cached_property
     def sps(self) -> bytes:
         """The sequence parameter set."""
-        bits = _Bits()
-        bits.u(8, 66)  # baseline
-        bits.u(8, 0b11000000)  # constrained
-        bits.u(8, self._level)
-        bits.ue(0)
-        bits.ue(_FRAME_NUM_BITS - 4)
-        bits.ue(2)  # pictures are shown in the order they are sent
-        bits.ue(1)  # one reference picture
-        bits.u(1, 0)
-        bits.ue(self._columns - 1)
-        bits.ue(self._rows - 1)
-        bits.u(1, 1)  # frames, no fields
-        bits.u(1, 1)
         right, below = self._columns * 16 - self.width, self._rows * 16 - self.height
-        bits.u(1, int(bool(right or below)))
-        if right or below:
-            for crop in (0, right // 2, 0, below // 2):
-                bits.ue(crop)
-        bits.u(1, 1)  # video usability information
-        bits.u(4, 0)  # no aspect ratio, overscan, signal type or chroma place
-        bits.u(1, 1)  # timing: two ticks a picture, at a fixed rate
-        bits.u(32, 1)
-        bits.u(32, 2 * FRAME_RATE)
-        bits.u(1, 1)
-        bits.u(3, 0)  # no buffering parameters, no picture structure
-        bits.u(1, 1)  # bitstream restriction: nothing is reordered, one picture is kept
-        bits.u(1, 1)
-        for value in (0, 0, 16, 16, 0, 1):
-            bits.ue(value)
-        return bits.unit(3, _SPS)
+        crop = "1" + "".join(map(ue, (0, right // 2, 0, below // 2))) if right or below else "0"
+        return _unit(
+            3,
+            _SPS,
+            f"{66:08b}11000000{self._level:08b}"  # baseline, constrained
+            + ue(0)
+            + ue(_FRAME_NUM_BITS - 4)
+            + ue(2)  # pictures are shown in the order they are sent
+            + ue(1)  # one reference picture
+            + "0"
+            + ue(self._columns - 1)
+            + ue(self._rows - 1)
+            + "11"  # frames, no fields
+            + crop
+            + "10000"  # video usability information; no aspect ratio, overscan, signal type or chroma place
+            + f"1{1:032b}{2 * FRAME_RATE:032b}1"  # timing: two ticks a picture, at a fixed rate
+            + "000"  # no buffering parameters, no picture structure
+            + "11"  # bitstream restriction: nothing is reordered, one picture is kept
+            + "".join(map(ue, (0, 0, 16, 16, 0, 1))),
+        )
 
     @cached_property
     def pps(self) -> bytes:
         """The picture parameter set."""
-        bits = _Bits()
-        bits.ue(0)
-        bits.ue(0)
-        bits.u(2, 0)  # CAVLC
-        bits.ue(0)
-        bits.ue(0)
-        bits.ue(0)
-        bits.u(3, 0)
-        bits.se(0)
-        bits.se(0)
-        bits.se(0)
-        bits.u(1, 1)  # each slice says whether it is deblocked
-        bits.u(2, 0)
-        return bits.unit(3, _PPS)
+        return _unit(
+            3,
+            _PPS,
+            ue(0)
+            + ue(0)
+            + "00"  # CAVLC
+            + ue(0)
+            + ue(0)
+            + ue(0)
+            + "000"
+            + se(0)
+            + se(0)
+            + se(0)
+            + "100",  # each slice says whether it is deblocked
+        )
 
-    def units(self, number: int) -> list[bytes]:
-        """The NAL units of picture `number` of a stream, which begins with a key picture."""
-        gop, place = divmod(number, KEY_INTERVAL)
-        if place == 0:
-            return [self.sps, self.pps, self._key(gop % 2)]
-        return [self._between(place % (1 << _FRAME_NUM_BITS))]
+    def blocks(self, cells: Cells) -> Blocks:
+        """Return a picture as the macroblocks that `key` and `between` take."""
+        rows, columns = self._rows, self._columns
+        fours = np.ascontiguousarray(cells).view(np.uint32).reshape(rows, 4, columns)
+        return fours.transpose(0, 2, 1).copy().view(np.uint8).reshape(rows * columns, 16)
 
-    @lru_cache(maxsize=2)  # noqa: B019 # sizes are few and live as long as the process
-    def _key(self, id: int) -> bytes:
-        bits = _Bits()
-        self._slice(bits, 7, 0)
-        bits.ue(id)
-        bits.u(2, 0)
-        self._quality(bits)
-        horizon = self._rows // 2
-        starts = {horizon: _macroblock(2, _GROUND)} | {0: _macroblock(2, _SKY)}
-        for row in range(self._rows):
-            # Below the first, rows are like the one above, the ground's first like its own left end.
-            pattern = _macroblock(1 if row in (0, horizon) else 0, 0)
-            left = starts.get(row, pattern)
-            bits.raw(left + pattern * (self._columns - 1))
-        return bits.unit(3, _KEY)
+    def key(self, blocks: Blocks, id: int) -> bytes:
+        """Return a key picture; `id` differs from that of the key picture before it."""
+        head = ue(0) + ue(7) + ue(0) + "0" * _FRAME_NUM_BITS + ue(id) + "00" + _quality()
+        coded = self._coded(blocks, range(len(blocks)))
+        return _unit(3, _KEY, head + "".join([intra for intra, _ in coded]))
 
-    @lru_cache(maxsize=1 << _FRAME_NUM_BITS)  # noqa: B019
-    def _between(self, frame_num: int) -> bytes:
-        bits = _Bits()
-        self._slice(bits, 5, frame_num)
-        bits.u(3, 0)  # the parameter set's number of references, their order, no marking
-        self._quality(bits)
-        bits.ue(self._columns * self._rows)  # as many macroblocks are skipped
-        return bits.unit(2, _BETWEEN)
+    def between(self, blocks: Blocks, before: Blocks, frame_num: int) -> bytes:
+        """Return a picture that changes `before` into `blocks`.
 
-    def _slice(self, bits: _Bits, kind: int, frame_num: int) -> None:
-        bits.ue(0)
-        bits.ue(kind)
-        bits.ue(0)
-        bits.u(_FRAME_NUM_BITS, frame_num)
+        `frame_num` counts from the key picture.
+        """
+        head = ue(0) + ue(5) + ue(0) + f"{frame_num % (1 << _FRAME_NUM_BITS):0{_FRAME_NUM_BITS}b}000" + _quality()
+        changed = np.flatnonzero((blocks.view(np.uint64) != before.view(np.uint64)).any(axis=1)).tolist()
+        text, next_block = [head], 0
+        for block, (_, inter) in zip(changed, self._coded(blocks, changed), strict=True):
+            text += ue(block - next_block), inter
+            next_block = block + 1
+        if next_block < len(blocks):
+            text.append(ue(len(blocks) - next_block))
+        return _unit(2, _BETWEEN, "".join(text))
 
-    def _quality(self, bits: _Bits) -> None:
-        bits.se(_QP_DELTA)
-        bits.ue(1)  # no deblocking
+    def _coded(self, blocks: Blocks, numbers: range | list[int]) -> list[tuple[str, str]]:
+        """Return the codes of macroblocks, for key pictures and for those between."""
+        data, columns = blocks.tobytes(), self._columns
+        coded = []
+        for number in numbers:
+            at = 16 * number
+            own = data[at : at + 16]
+            if number % columns:
+                coded.append(_macroblock(_HORIZONTAL, data[at - 16 : at], own))
+            elif number:
+                above = at - 16 * columns
+                coded.append(_macroblock(_VERTICAL, data[above : above + 16], own))
+            else:
+                coded.append(_macroblock(_DC, b"", own))
+        return coded
 
 
-def _macroblock(prediction: int, level: int) -> str:
-    """Encode an intra 16x16 macroblock with one DC coefficient.
+def _quality() -> str:
+    """Return the end of a slice header: quantiser, no deblocking."""
+    return se(_QP_DELTA) + ue(1)
 
-    Prediction is from above (0), from the left (1) or from both (2).
+
+@lru_cache(maxsize=MAX_KNOWN)
+def _macroblock(prediction: int, neighbour: bytes, own: bytes) -> tuple[str, str]:
+    """Encode an intra 16x16 macroblock of 16 cells, predicted from its neighbour.
+
+    The first one of a picture has no neighbour: it is predicted as grey.
     """
-    bits = _Bits()
-    bits.ue(1 + prediction)
-    bits.ue(0 if prediction == 2 else 2 - prediction)  # chroma likewise: 2 is from above, 1 from the left
-    bits.se(0)
-    bits.raw(_residual(level))
-    return "".join(bits._text)
+    cells = _steps(own)
+    difference = cells.copy()
+    if prediction == _HORIZONTAL:
+        difference -= _steps(neighbour)[:, 3:, :]
+        beside = _steps(neighbour)[::2, 2:3, 1:]
+    elif prediction == _VERTICAL:
+        difference -= _steps(neighbour)[3:, :, :]
+        beside = _steps(neighbour)[2:3, ::2, 1:]
+    else:
+        beside = np.zeros((1, 1, 2), dtype=np.int32)
+    # A cell is 16 steps of the coefficients times its difference, and the transform's gain is 16.
+    luma = (_HADAMARD @ difference[:, :, 0] @ _HADAMARD).ravel().tolist()
+    # Chroma has half as many cells in each direction: the upper left one of four counts. Its gain is 4, as is its step.
+    chroma = [
+        (_HADAMARD_2 @ plane @ _HADAMARD_2).ravel().tolist()
+        for plane in np.moveaxis(cells[::2, ::2, 1:] - beside, 2, 0)
+    ]
+    coloured = any(map(any, chroma))
+    kind = 1 + prediction + (4 if coloured else 0)
+    rest = ue(_CHROMA_MODE[prediction]) + se(0) + luma_dc([luma[place] for place in _ZIGZAG])
+    if coloured:
+        rest += "".join(map(chroma_dc, chroma))
+    return ue(kind) + rest, ue(_INTRA_IN_P + kind) + rest
+
+
+def _steps(cells: bytes) -> npt.NDArray[np.int32]:
+    """Return the colours of 16 cells in steps; shape (4, 4, 3)."""
+    steps: npt.NDArray[np.int32] = _STEPS[np.frombuffer(cells, np.uint8)].reshape(4, 4, 3)
+    return steps
 
 
 @lru_cache(maxsize=16)
-def pictures(width: int, height: int) -> Pictures:
-    """The pictures of a size, made once."""
-    return Pictures(width, height)
+def encoder(width: int, height: int) -> PictureEncoder:
+    """Return the encoder of a size, made once."""
+    return PictureEncoder(width, height)

@@ -11,7 +11,8 @@ from anafi_mav.arsdk.video import rtcp
 from anafi_mav.arsdk.video.rtcp import ReceiverReport, SenderReport
 from anafi_mav.arsdk.video.rtp_h264 import CLOCK_RATE, PictureSender
 from anafi_mav.arsdk.video.video_metadata import FrameMetadata
-from anafi_mav.sim.video.h264 import pictures
+from anafi_mav.sim.video.camera_picture import CameraPicture
+from anafi_mav.sim.video.h264 import KEY_INTERVAL, Blocks, encoder
 from anafi_mav.sim.video.video import CameraStream
 
 REPORT_PERIOD = 1.0
@@ -60,7 +61,12 @@ class Track:
         """`on_report` hears that the client reports, and so lives."""
         self.stream = stream
         self._sender = PictureSender(chance.getrandbits(32), chance.getrandbits(16))
-        self._pictures = pictures(stream.width, stream.height)
+        self.camera = CameraPicture(stream.width, stream.height, stream.spectrum)
+        self._encoder = encoder(stream.width, stream.height)
+        self._before: Blocks | None = None
+        """The picture that was sent last."""
+        self._keys = 0
+        """Key pictures sent."""
         self._profile = profile
         self._name = name
         self._air = send
@@ -124,11 +130,11 @@ class Track:
         """Stop playing."""
         self._number = None
 
-    def send(self, taken: float, metadata: FrameMetadata | None) -> None:
-        """The next picture, `taken` now or a little earlier."""
+    def send(self, taken: float, metadata: FrameMetadata | None, blocks: Blocks) -> None:
+        """Send the next picture, `taken` now or a little earlier."""
         if self._number is None or self._sockets is None:
             return
-        units = self._pictures.units(self._number)
+        units = self._units(self._number, blocks)
         self._number += 1
         self._sent += 1
         rtp, _ = self._sockets
@@ -142,6 +148,18 @@ class Track:
             sender, (_, reports) = self._sender, self._sockets
             report = SenderReport(sender.ssrc, int(now * 1e6), self.timestamp(now), sender.packets, sender.octets)
             self._air(rtcp.encode_sender_report(report, self._name), _Letterbox(reports, self._clients[1]))
+
+    def _units(self, number: int, blocks: Blocks) -> list[bytes]:
+        """Return the NAL units of a picture.
+
+        The first of all, and one each second, is a key picture.
+        """
+        before, self._before = self._before, blocks
+        place = number % KEY_INTERVAL
+        if place == 0 or before is None:
+            self._keys += 1
+            return [self._encoder.sps, self._encoder.pps, self._encoder.key(blocks, self._keys % 2)]
+        return [self._encoder.between(blocks, before, place)]
 
     def told(self) -> dict[str, Any]:
         """For the log: what was sent, and what the client said of it."""

@@ -30,11 +30,12 @@ from anafi_mav.arsdk.video.rtsp import (
     Status,
 )
 from anafi_mav.arsdk.video.sdp import format_description
-from anafi_mav.arsdk.video.video_metadata import FrameMetadata
+from anafi_mav.arsdk.video.video_metadata import FrameMetadata, Quaternion
 from anafi_mav.sim.autopilot.firmware import Firmware
 from anafi_mav.sim.payload.media import MediaKind
 from anafi_mav.sim.video import video
-from anafi_mav.sim.video.h264 import FRAME_RATE
+from anafi_mav.sim.video.camera_picture import CameraView
+from anafi_mav.sim.video.h264 import FRAME_RATE, Blocks
 from anafi_mav.sim.video.playback import Send, Track
 from anafi_mav.sim.video.video import CameraStream, streams_of
 
@@ -49,6 +50,8 @@ PERIOD = 1.0 / FRAME_RATE
 """s of the host's clock between two pictures."""
 
 _LIVE, _REPLAY = "live", "replay/"
+_LEVEL, _REPLAY_HFOV = Quaternion(1.0, 0.0, 0.0, 0.0), math.radians(69.0)
+"""View of a recording's pictures."""
 _PUBLIC = "OPTIONS, DESCRIBE, SETUP, PLAY, PAUSE, TEARDOWN, GET_PARAMETER"
 
 
@@ -114,6 +117,8 @@ class VideoServer:
         self._server: asyncio.AbstractServer | None = None
         self._connections: set[asyncio.Task[None]] = set()
         self._sessions: dict[str, _Session] = {}
+        self._taken = 0
+        """Pictures since the start."""
         self._due = 0.0
         """s of the host's clock until the next picture."""
         self._address = ""
@@ -379,29 +384,50 @@ class VideoServer:
         self._take(now)
 
     def _take(self, now: float) -> None:
-        said: dict[str, FrameMetadata] = {}
+        self._taken += 1
+        live: dict[str, tuple[FrameMetadata, Blocks]] = {}
         for session in tuple(self._sessions.values()):
             if not session.playing:
                 continue
+            recorded = session.resource.seconds is not None
             for track, _ in session.tracks.values():
-                stream = track.stream
-                # Of what a recording shows nothing but the place is kept: its pictures say nothing.
-                if session.resource.seconds is None and stream.title not in said:
-                    said[stream.title] = video.metadata(self._firmware, stream)
                 track.report(now)
-                self._send_picture(track, now, said.get(stream.title) if session.resource.seconds is None else None)
-            if session.resource.seconds is not None:
+                title = track.stream.title
+                if recorded:
+                    # A recording keeps nothing but its place: its pictures have no metadata and look north.
+                    self._send_picture(track, now, None, track.camera.draw(self._replayed(session)))
+                    continue
+                if title not in live:
+                    said = video.metadata(self._firmware, track.stream)
+                    live[title] = said, track.camera.draw(self._seen(track.stream, said))
+                self._send_picture(track, now, *live[title])
+            if recorded:
                 session.position += PERIOD
                 if session.position >= session.until - 0.5 / FRAME_RATE:
                     session.position = session.until
                     self._stop(session, "finished")
 
-    def _send_picture(self, track: Track, taken: float, metadata: FrameMetadata | None) -> None:
+    def _seen(self, stream: CameraStream, said: FrameMetadata) -> CameraView:
+        """Return the moment that a live picture shows: that of its metadata."""
+        assert said.timestamp is not None
+        assert said.quat is not None
+        assert said.hfov is not None
+        name = self._firmware.identity.name
+        if stream.spectrum != "visible":
+            name = f"{name} {stream.spectrum}"
+        return CameraView(name, self._taken, said.timestamp // 1000, said.quat, said.hfov)
+
+    def _replayed(self, session: _Session) -> CameraView:
+        """Return the moment that a picture of a recording shows."""
+        number, time = round(session.position * FRAME_RATE), round(session.position * 1000.0)
+        return CameraView(self._firmware.identity.name, number, time, _LEVEL, _REPLAY_HFOV)
+
+    def _send_picture(self, track: Track, taken: float, metadata: FrameMetadata | None, blocks: Blocks) -> None:
         """Send a picture once it is encoded."""
         if self._latency > 0.0:
-            asyncio.get_running_loop().call_later(self._latency, track.send, taken, metadata)
+            asyncio.get_running_loop().call_later(self._latency, track.send, taken, metadata, blocks)
         else:
-            track.send(taken, metadata)
+            track.send(taken, metadata, blocks)
 
 
 _HANDLERS: dict[str, Callable[[VideoServer, RtspRequest, str], Awaitable[tuple[list[tuple[str, str]], bytes]]]] = {

@@ -7,9 +7,11 @@ import itertools
 import random
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
+from support.pictures import decode, strip
 from support.rtsp_client import LIMIT, Viewer, viewer
 from support.sim_bench import Bench
 
@@ -142,6 +144,20 @@ async def test_the_live_stream_plays() -> None:
         # (The time is told in whole microseconds, which may end the 90 kHz tick before the one of the time itself.)
         assert (report.timestamp - int(report.time * 0.09)) % (1 << 32) in (0, 1)
         assert said.timestamp == max(1, round(held.bench.firmware.time * 1e6))
+
+
+async def test_pictures_show_the_moment_of_their_metadata(tmp_path: Path) -> None:
+    async with watching() as (held, client):
+        eye = await client.setup("live/video")
+        await client.play()
+        held.bench.take_off()
+        held.bench.climb(8.0)
+        pictures = await eye.first(KEY_INTERVAL + 5)
+        images = decode(tmp_path / "stream.264", [list(picture.units) for picture in pictures])
+        read = [strip(image) for image in images]
+        times = [picture.metadata.timestamp for picture in pictures if picture.metadata is not None]
+        assert [time for _, time in read] == [time // 1000 for time in times if time is not None]
+        assert [number for number, _ in read] == [*range(read[0][0], read[0][0] + len(pictures))]
 
 
 async def test_each_picture_has_its_capture_time() -> None:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
-import cv2
 import pytest
 from support.sim_bench import HOME, Bench
 
@@ -32,58 +30,15 @@ from anafi_mav.arsdk.video.video_metadata import (
     decode_v3,
     encode_v3,
 )
-from anafi_mav.errors import LocalProtocolError
 from anafi_mav.sim.payload import optics
 from anafi_mav.sim.video import video
-from anafi_mav.sim.video.h264 import KEY_INTERVAL, Pictures, pictures
+from anafi_mav.sim.video.h264 import encoder
 from anafi_mav.sim.video.video import streams_of
 from anafi_mav.sim.world.model import MODELS
 
 
 def say(bench: Bench, stream: int = 0) -> FrameMetadata:
     return video.metadata(bench.firmware, streams_of(bench.firmware.model)[stream])
-
-
-# -- the picture
-
-
-@pytest.mark.parametrize(("width", "height"), [(1280, 720), (1920, 1080), (960, 720), (176, 90), (16, 16), (34, 18)])
-def test_a_decoder_shows_sky_above_ground(width: int, height: int, tmp_path: Path) -> None:
-    shown = Pictures(width, height)
-    stream = tmp_path / "stream.264"
-    units = [unit for number in range(KEY_INTERVAL + 20) for unit in shown.units(number)]
-    stream.write_bytes(b"".join(b"\0\0\0\1" + unit for unit in units))
-    capture, count = cv2.VideoCapture(str(stream)), 0
-    while True:
-        ok, image = capture.read()
-        if not ok:
-            break
-        count += 1
-        assert image.shape == (height, width, 3)
-        rows = -(-height // 16)
-        horizon = 16 * (rows // 2)
-        # 128 + 16 * 2.5 of luma, and 32 * 2.5 less; the decoder stretches 16..235 to 0..255.
-        sky, ground = round((168 - 16) * 255 / 219), round((88 - 16) * 255 / 219)
-        if horizon == 0:
-            ground = sky
-        else:
-            assert abs(int(image[:horizon].min()) - sky) <= 1
-            assert abs(int(image[:horizon].max()) - sky) <= 1
-        assert abs(int(image[horizon:].min()) - ground) <= 1
-        assert abs(int(image[horizon:].max()) - ground) <= 1
-    assert count == KEY_INTERVAL + 20
-
-
-def test_video_of_one_second_is_small() -> None:
-    second = [len(unit) for number in range(KEY_INTERVAL) for unit in pictures(1280, 720).units(number)]
-    assert sum(second) < 5000
-    assert max(second[3:]) < 12  # a picture that repeats the one before
-
-
-@pytest.mark.parametrize("size", [(0, 16), (1281, 720), (16, 15), (16000, 16000)])
-def test_sizes_that_are_none(size: tuple[int, int]) -> None:
-    with pytest.raises(LocalProtocolError):
-        Pictures(*size)
 
 
 # -- the metadata
@@ -298,4 +253,4 @@ def test_streams_have_the_names_that_olympe_asks_for(model: str) -> None:
     assert described.info == bench.firmware.identity.name
     assert [video.profile(MODELS[model])] == [PROTO_PROFILE if model == "ai" else V3_PROFILE]
     for media, stream in zip(described.media, streams_of(bench.firmware.model), strict=True):
-        assert media.sps == pictures(stream.width, stream.height).sps
+        assert media.sps == encoder(stream.width, stream.height).sps
