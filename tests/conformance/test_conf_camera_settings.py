@@ -16,6 +16,8 @@ from support.ext_params import fetch, read, send_set, value_of, write
 from support.flavours import both
 from support.ftp import Ftp
 from support.mav import CAMERA, Client
+from support.missions import ACTIVE, put, said, start, state, takeoff, way
+from support.plans import Item
 from support.sim_settings import sim_value
 from support.world import World, world
 
@@ -236,6 +238,39 @@ async def test_conf_095_recording_keeps_its_settings(model: str) -> None:
         await w.client.wait("STATUSTEXT", lambda m: "camera is recording" in m.text, since=0)
         assert w.gateway.systems[0].drone.camera[0].recording_now
         assert (await write(w.client, "CAM_EV", 1.0, 9)).param_result == ACCEPTED
+
+
+async def test_conf_095_mission_keeps_the_settings_of_its_pictures() -> None:
+    photo = Item(dialect.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, p1=0.0, p2=0.0, p3=1.0, p4=1.0, frame=2)
+    async with world(web=True, speed=8.0) as w:
+        await put(w, [takeoff(5.0), way(60.0, 0.0, 5.0), photo, way(60.0, 5.0, 5.0)])
+        await start(w)
+        await state(w, ACTIVE, seq=1)
+        mark = w.client.mark()
+        ack = await write(w.client, "CAM_EV", 1.0, 9)
+        assert (ack.param_result, value_of(ack)) == (FAILED, 0.0)
+        await said(w, "mission uses camera", since=mark)
+        assert w.commands("camera.set_ev_compensation") == []
+        assert (await write(w.client, "CAM_ZOOMSPEED", 1.0, 9)).param_result == ACCEPTED
+        assert (await w.client.command(dialect.MAV_CMD_DO_PAUSE_CONTINUE, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        assert (await write(w.client, "CAM_EV", 1.0, 9)).param_result == ACCEPTED
+
+
+async def test_conf_095_writes_fail_when_the_link_is_lost() -> None:
+    async with world(speed=1.0) as w:
+        mark = w.client.mark()
+        w.drone.faults.mute = True
+        for name, value in (("CAM_EV", 1.0), ("CAM_SATURATION", 2.0)):
+            send_set(w.client, name, value, 9)
+        for name in ("CAM_EV", "CAM_SATURATION"):
+            ack = await w.client.wait(
+                "PARAM_EXT_ACK", lambda m, name=name: (m.param_id, m.param_result) == (name, FAILED), since=mark
+            )
+            assert value_of(ack) == 0.0
+        w.drone.faults.mute = False
+        await w.client.heartbeat(lambda beat: True, timeout=20.0)
+        for name in ("CAM_EV", "CAM_SATURATION"):
+            assert value_of(await read(w.client, name)) == pytest.approx(sim_value(w.drone, name), abs=1e-6)
 
 
 async def test_conf_095_two_clients_see_the_drones_last_answer() -> None:

@@ -65,7 +65,7 @@ def _content(catalogue: Catalogue, model: str, version: int) -> bytes:
 
 def _parameter(parent: ET.Element, entry: CatalogueEntry) -> ET.Element:
     setting, kind = entry.setting, entry.setting.kind
-    attributes = {"name": setting.name, "type": kind.xml, "default": kind.text(_default(entry))}
+    attributes = {"name": setting.name, "type": kind.xml, "default": kind.text(entry.default)}
     if not setting.is_listed:
         attributes["control"] = "0"
     if entry.limits is not None:
@@ -79,14 +79,6 @@ def _parameter(parent: ET.Element, entry: CatalogueEntry) -> ET.Element:
     element = ET.SubElement(parent, "parameter", attributes)
     ET.SubElement(element, "description").text = setting.title
     return element
-
-
-def _default(entry: CatalogueEntry) -> float:
-    """Return the possible value that is nearest to the default of the table."""
-    wanted = entry.setting.kind.normalise(entry.setting.default)
-    if entry.limits is not None:
-        return min(max(wanted, entry.limits.low), entry.limits.high)
-    return min((option.value for option in entry.options), key=lambda value: abs(value - wanted))
 
 
 def _option(parent: ET.Element, tag: str, option: Option, kind: ExtType) -> ET.Element:

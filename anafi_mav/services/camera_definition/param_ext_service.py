@@ -167,7 +167,10 @@ class ParamExtService(Service):
     # Values.
 
     def _value(self, entry: CatalogueEntry) -> float:
-        """Return the value of the camera at work; of another one where it has no such setting."""
+        """Return the value of the camera at work; of another one where it has no such setting.
+
+        The default stands for a setting that no camera reports now, as the interval of a series in another photo mode.
+        """
         drone = self.host.drone
         cameras, thermal = drone.camera.state, drone.thermal.state
         active = drone.camera.active_id
@@ -175,7 +178,7 @@ class ParamExtService(Service):
             value = entry.setting.value_of(View(drone.camera[id], cameras, thermal))
             if value is not None:
                 return value
-        return entry.setting.kind.normalise(entry.setting.default)
+        return entry.default
 
     def _message(self, place: int) -> dialect.MAVLink_message:
         """PARAM_EXT_VALUE of one setting."""
