@@ -193,7 +193,7 @@ class ParamExtService(Service):
         )
 
     def _report_changes(self) -> None:
-        """Send every value that differs from the last reported one to all clients, and once more later."""
+        """Send each changed value to all clients, now and once more later."""
         repeat_at = self.host.clock.monotonic() + REPEAT_AFTER
         for place, entry in enumerate(self._catalogue.entries):
             name, value = entry.setting.name, self._value(entry)
