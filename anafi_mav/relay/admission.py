@@ -1,4 +1,7 @@
-"""Admission of pictures to one viewer: from an entry on, and none while the viewer is too slow. No I/O."""
+"""Admission of pictures to one viewer. No I/O.
+
+A viewer gets pictures from an entry on, and none while it is too slow.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +35,7 @@ class PictureGate:
         self._is_slow = False
 
     def begin(self, now: float, *, has_entry: bool) -> None:
-        """Note that the viewer starts `now`, with an entry and the pictures since that one, or without."""
+        """Note that the viewer starts `now`; `has_entry`: with an entry and the pictures since."""
         self._since, self._is_slow = now, False
         self._awaits_entry = not has_entry
 
