@@ -39,6 +39,7 @@ from anafi_mav.subject import DRONE
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.flying import ON_GROUND
 from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.web.definition_routes import DefinitionRoutes
 from anafi_mav.web.live_page import DroneEntry, LivePage
 from anafi_mav.web.live_video import LiveVideo
 from anafi_mav.web.server import HttpServer
@@ -228,6 +229,7 @@ class Gateway:
             LivePage(self.web, self._entries)
             if self.relay is not None:
                 LiveVideo(self.web, self.relay.source)
+            DefinitionRoutes(self.web, self._definition)
 
     async def __aenter__(self) -> Self:
         await self.start()
@@ -386,6 +388,12 @@ class Gateway:
     def systems(self) -> tuple[System, ...]:
         """MAVLink system of each drone, listed as in the configuration; empty before `start`."""
         return tuple(supervised.system for supervised in self._supervised)
+
+    def _definition(self, sysid: int) -> tuple[bytes, bytes] | None:
+        """Return the camera definition of a connected drone, plain and compressed."""
+        systems = [supervised.system for supervised in self._supervised if supervised.config.sysid == sysid]
+        content = next((system.definition.content for system in systems if system.active), None)
+        return (content.plain, content.packed) if content is not None and content.plain else None
 
     def lines(self) -> list[str]:
         """One line per drone and per endpoint, one for the video and one for the web server."""

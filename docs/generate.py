@@ -287,8 +287,9 @@ QGroundControl and MAVSDK load by themselves over MAVLink FTP.
 | a read of a name that is not listed | PARAM_ERROR |
 | a read of an unknown value | -1; no parameter is ever NaN |
 
-The drone keeps its own settings, and the gateway keeps its settings for each drone. Four begin with their default at
-each start: `ANF_HAND_LAUNCH`, `ANF_CRUISE_SPEED`, `ANF_CLIMB_SPEED` and `ANF_FENCE_ON`.
+The drone keeps its own settings, and the gateway keeps its settings for each drone. Six begin with their default at
+each start: `ANF_HAND_LAUNCH`, `ANF_CRUISE_SPEED`, `ANF_CLIMB_SPEED`, `ANF_FENCE_ON`, `ANF_SC_WHEELS` and
+`ANF_SC_BUTTONS`.
 """
 
 PARAMETERS_NATIVE = """
@@ -344,6 +345,107 @@ def parameters() -> str:
                 where = f"`{one.source}`" if "." in one.source else one.source
                 what = f"{one.short}: {one.long.lower().rstrip('.')}" if one.long == NOT_AVAILABLE else one.short
                 parts.append(f"| `{one.name}` | {what} | {stated(one)} | {one.unit or '–'} | {where} |\n")
+    return "".join(parts)
+
+
+CAMERA_SETTINGS = """\
+# Camera settings
+
+<!-- Made by docs/generate.py from anafi_mav/services/camera_definition and the simulated models. -->
+
+For people who set up the camera from a ground station, and for programmers. After reading you know each setting, the
+models that have it, and the answers to a write.
+
+The camera is component 100. Its settings are extended parameters (PARAM_EXT). QGroundControl, MAVSDK's `camera` plugin
+and MAVProxy's `camera` module load the definition file and list the settings by themselves. The file is made from what
+the drone reports: the options of another firmware appear in it.
+
+| file | address |
+|---|---|
+| in MAVLink FTP of component 100, named by CAMERA_INFORMATION | `mftp://camera_definition.xml.xz` |
+| the same, not compressed | `mftp://camera_definition.xml` |
+| on the gateway's [web server](web.md) | `/drone/SYSID/camera_definition.xml`, and with `.xz` |
+
+The address has no `[;comp=100]`, because MAVSDK opens it as it is written. Without it the file belongs to the component
+that announces it. The version is a hash of the content. When the drone reports other capabilities, CAMERA_INFORMATION
+is sent again with another version. Options stay for the whole connection, even if the drone stops reporting them: it
+reports some for its present mode only.
+
+| write | PARAM_EXT_ACK | sent besides |
+|---|---|---|
+| the drone has confirmed the value | ACCEPTED | PARAM_EXT_VALUE to every client |
+| the drone has not answered within 0.25 s | IN_PROGRESS, later the result | – |
+| the same again before the result | IN_PROGRESS | nothing more to the drone |
+| a value that is not in the definition, or of another type | VALUE_UNSUPPORTED, value in effect | – |
+| refused by the drone, or while it records or takes photos | FAILED, value in effect | value and a text to the client |
+| while the flown mission needs the camera | FAILED, value in effect | value and a text to the client |
+| an unknown name | FAILED | – |
+
+A change by the pilot, by another client or by the drone itself is sent to every client as PARAM_EXT_VALUE. Some changes
+take others with them: a video mode selects a resolution and a frame rate that it can record. They are sent too.
+
+## Settings
+
+A column of a model has the options or the range that the simulated model reports. "All" is each value of the row, "–" a
+setting that the model does not have. "Counts while" names values of other settings: ground stations hide it otherwise.
+While the camera records, the settings marked † are refused.
+
+| name | meaning | type | values | {titles} | counts while |
+|---|---|---|---|{rules}---|
+"""
+
+SHOWN_OPTIONS = 12
+"""Longest list of options that is written out; of a longer one the ends and the number."""
+
+
+def _options(setting: Any, options: Any) -> str:
+    """Return the options of a setting; of a choice the numbers are the values, of all others the texts."""
+    is_choice = setting.kind.name == "UINT8"
+    texts = [f"`{value:g}` {text}" if is_choice else text for value, text in options]
+    return f"{texts[0]} to {texts[-1]} ({len(texts)})" if len(texts) > SHOWN_OPTIONS else "; ".join(texts)
+
+
+def _of_model(setting: Any, entry: Any, union: Any) -> str:
+    """Return the values of a setting on one model."""
+    if entry is None:
+        return "–"
+    if entry.limits is not None:
+        return f"{entry.limits.low:.4g} to {entry.limits.high:.4g}"
+    if len(entry.options) == len(union):
+        return "all"
+    if setting.kind.name == "UINT8":
+        return ", ".join(f"{option.value:g}" for option in sorted(entry.options))
+    return _options(setting, entry.options)
+
+
+def camera_settings() -> str:
+    """docs/camera-settings.md."""
+    from support.camera_states import MODEL_KEYS, catalogue
+
+    from anafi_mav import models
+    from anafi_mav.services.camera_definition.camera_setting import Guard
+    from anafi_mav.services.camera_definition.catalogue import SETTINGS
+
+    catalogues = [catalogue(key) for key in MODEL_KEYS]
+    titles = " | ".join(models.MODELS[key].title for key in MODEL_KEYS)
+    parts = [CAMERA_SETTINGS.format(titles=titles, rules="---|" * len(MODEL_KEYS))]
+    for setting in SETTINGS:
+        entries = [found[setting.name] if setting.name in found.index else None for found in catalogues]
+        union = sorted({option.value: option for entry in entries if entry for option in entry.options}.values())
+        cells = [_of_model(setting, entry, union) for entry in entries]
+        counts = []
+        for name, values in setting.only_in.items():
+            known = {option.value for found in catalogues if name in found.index for option in found[name].options}
+            counts.append(f"`{name}` is {', '.join(f'{value:g}' for value in sorted(known & values))}")
+        row = (
+            f"`{setting.name}`" + (" †" if setting.guard is Guard.CAPTURE else ""),
+            setting.title + (f", {setting.unit}" if setting.unit else ""),
+            setting.kind.name,
+            _options(setting, union) if union else "a range",
+            *cells,
+            "; ".join(counts) or "–",
+        )
+        parts.append(f"| {' | '.join(row)} |\n")
     return "".join(parts)
 
 
@@ -574,6 +676,7 @@ def operator_texts() -> str:
 
 
 PAGES: dict[str, Callable[[], str]] = {
+    "camera-settings.md": camera_settings,
     "configuration.md": configuration,
     "dialect.md": dialect,
     "parameters.md": parameters,

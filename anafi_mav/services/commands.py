@@ -36,11 +36,13 @@ There are a handful, and an address is easily made up.
 PROGRESS_AFTER, PROGRESS_EVERY = 0.3, 0.8
 """s until the first IN_PROGRESS and between them: MAVSDK resends at 0.5 s, every client gives up after 1-3 s (R9)."""
 
-MODE_PROGRESS_AFTER = 2.5
-"""s until the first IN_PROGRESS of a DO_SET_MODE. DEVIATION: R9 wants one a second of every command. MAVSDK 4.1 takes
-one for the end of start_mission, pause_mission and arm, which fail then and crash when the real end comes
-(mission_raw_impl.cpp start_mission; action_impl.cpp waits for the end, but for the mode that it sets before arming). It
-gives up 2 s after it has sent it, the others later."""
+LATE_PROGRESS_AFTER = 2.5
+"""s until the first IN_PROGRESS of a `LATE` command. DEVIATION: R9 wants one a second of every command.
+
+MAVSDK 4.1 takes one of a DO_SET_MODE for the end of start_mission, pause_mission and arm, which fail then and crash
+when the real end comes (mission_raw_impl.cpp start_mission; action_impl.cpp waits for the end, but for the mode that it
+sets before arming). It takes one of a gimbal command for its failure (gimbal_impl.cpp receive_command_result). It
+gives up 2 s after it has sent them, the others later."""
 
 _UNSET_INT = (2**31 - 1, -(2**31))
 """x and y of a COMMAND_INT that stand for "not set": the specified INT32_MAX, and what a cast NaN becomes (R8)."""
@@ -75,12 +77,18 @@ class Effect(enum.Enum):
     LAND = "a STOP that another client's Hold may have ended since: it is then not repeated"
     RETURN = "asks for the way home: when that is flown already, it is carried out again; never cancelled"
     LAPSING = "a mode that ends without another command: asked for after its end, it begins again, or is refused"
+    TARGET = "a target that may be set twice: carried out each time it arrives, and never cancelled"
     IRREVOCABLE = "cannot be cancelled: the drone does it whatever is sent then, so CANCELLED would be a lie"
 
     @property
     def stops(self) -> bool:
         """Ends something and begins nothing. It may be carried out twice."""
         return self in (Effect.STOP, Effect.HOLD, Effect.LAND)
+
+    @property
+    def is_repeatable(self) -> bool:
+        """It is carried out again each time it arrives."""
+        return self.stops or self is Effect.TARGET
 
     @property
     def is_revocable(self) -> bool:
@@ -126,7 +134,7 @@ class ProgressPolicy(enum.Enum):
 
     PROMPT = "after `PROGRESS_AFTER`"
     EARLY = "after `PROGRESS_AFTER`, and at once where the command first waits for the end of a take-off's climb"
-    LATE = "after `MODE_PROGRESS_AFTER`: clients take one for the end of it"
+    LATE = "after `LATE_PROGRESS_AFTER`: clients take one for the end of it"
     FINAL_ONLY = "as `PROMPT`, but never to clients of flavours that take `first_answer_as_final`"
 
 
@@ -312,7 +320,7 @@ class CommandHistory:
             return newest.result
         effect = command.effect
         landing_ended = effect is Effect.LAND and newest.superseded and landing_ended_at >= newest.ended
-        if effect.stops and not landing_ended:
+        if effect.is_repeatable and not landing_ended:
             return None
         succeeded = newest.result in (dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_CANCELLED)
         if now - newest.ended >= (RESEND_WINDOW if succeeded else REFUSAL_WINDOW):

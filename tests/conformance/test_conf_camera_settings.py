@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 import itertools
 import lzma
 from collections.abc import Iterable, Iterator
 
+import aiohttp
 import pytest
 from msgspec import structs
 from support.camera_states import MODEL_KEYS
 from support.definition_readers import Described, ReadDefinition, read_definition
 from support.ext_params import fetch, read, send_set, value_of, write
+from support.flavours import both
 from support.ftp import Ftp
 from support.mav import CAMERA, Client
 from support.sim_settings import sim_value
@@ -273,7 +276,39 @@ async def test_conf_096_settings_that_follow_a_change_are_sent_too() -> None:
             assert value_of(message) == pytest.approx(sim_value(w.drone, name), abs=1e-6)
 
 
-async def test_definition_grows_with_reported_shutter_times() -> None:
+@both
+async def test_conf_094_definition_is_the_same_over_http(flavour: str) -> None:
+    async with world(flavour=flavour) as w, aiohttp.ClientSession() as http:
+        plain = await Ftp(w.client, component=CAMERA).download("/camera_definition.xml")
+        assert w.gateway.web is not None
+        url = w.gateway.web.url_for("127.0.0.1", "/drone/1/camera_definition.xml")
+        assert url is not None
+        async with http.get(url) as answer:
+            assert (answer.status, answer.content_type) == (200, "application/xml")
+            assert await answer.read() == plain
+        async with http.get(f"{url}.xz") as answer:
+            assert lzma.decompress(await answer.read()) == plain
+        async with http.get(url.replace("/1/", "/8/")) as answer:
+            assert answer.status == 404
+
+
+async def test_other_capabilities_make_another_definition() -> None:
+    async with world(model="thermal") as w:
+        link = w.gateway.systems[0].definition
+        before, announced = await load(w.client), asyncio.Event()
+        link.subscribe(announced.set)
+        assert (link.uri, link.version) == ("mftp://camera_definition.xml.xz", before.version)
+        reports = w.drone.firmware.payload.cameras[0].settings_report()
+        (exposure,) = (report for report in reports if isinstance(report, ExposureSettings))
+        every = structs.replace(exposure, manual_iso_sensitivity_capabilities=0xFFFFFF)
+        w.drone.inject(every)
+        await announced.wait()
+        after = await load(w.client)
+        assert after.version == link.version != before.version
+        assert len(after.parameters["CAM_ISO"].options) > len(before.parameters["CAM_ISO"].options)
+
+
+async def test_definition_keeps_options_that_are_reported_no_longer() -> None:
     async with world(model="thermal") as w:
         before = await load(w.client)
         times = [option.value for option in before.parameters["CAM_SHUTTERSPD"].options]
@@ -282,5 +317,8 @@ async def test_definition_grows_with_reported_shutter_times() -> None:
         few = structs.replace(exposure, manual_shutter_speed_capabilities=0b11)
         w.drone.inject(few)
         await w.gateway.systems[0].drone.expect(ExposureSettings, lambda m: True, 5.0)
-        assert (await load(w.client)).version == before.version
-        assert [option.value for option in (await load(w.client)).parameters["CAM_SHUTTERSPD"].options] == times
+        for _ in range(2):  # longer than the gateway waits for further events
+            await w.client.heartbeat(lambda beat: True, since=w.client.mark())
+        after = await load(w.client)
+        assert after.version == before.version
+        assert [option.value for option in after.parameters["CAM_SHUTTERSPD"].options] == times

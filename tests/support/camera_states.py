@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from anafi_mav.arsdk.messages.proto import antiflicker
 from anafi_mav.drone.payload.camera import Camera
 from anafi_mav.drone.payload.camera_state import CamerasState
 from anafi_mav.drone.payload.thermal import Thermal, ThermalState
@@ -30,7 +31,9 @@ def states(model: str) -> tuple[CamerasState, ThermalState]:
     cameras, thermal = CamerasState(), ThermalState()
     messages = parts.states_report()
     if isinstance(parts.cameras, Camera2):
-        messages += [parts.cameras.state(default=True)]
+        assert parts.services is not None
+        mains = parts.services.handle(antiflicker.GetState(include_default_capabilities=True))
+        messages += [parts.cameras.state(default=True), *(mains or ())]
     for message in messages:
         if type(message) in Camera.REDUCERS:
             cameras = Camera.REDUCERS[type(message)](cameras, message)

@@ -19,6 +19,7 @@ class Reach(NamedTuple):
 
 
 _FLIGHT = "conformance/test_conf_flight.py::"
+_GIMBAL = "conformance/test_conf_gimbal.py::"
 _GUIDED = "conformance/test_conf_guided.py::"
 _TELEMETRY = "conformance/test_conf_telemetry.py::"
 _ANAFI = "conformance/test_anafi_messages.py::"
@@ -26,6 +27,7 @@ _MAINTENANCE = "conformance/test_conf_maintenance.py::"
 _TWIN = "conformance/test_conf_params.py::test_alias_and_native_parameter_are_one_value"
 _PARAMETER = "conformance/test_conf_params.py::test_native_settings_reach_the_drone"
 _MISSIONS = "conformance/test_conf_missions.py::"
+_CAMERA = "conformance/test_conf_camera_settings.py::"
 _SAFETY = "conformance/test_safety.py::"
 
 REACHED: dict[str, Reach] = {
@@ -35,8 +37,14 @@ REACHED: dict[str, Reach] = {
         "`MAV_CMD_CONDITION_YAW`, `MAV_CMD_DO_CHANGE_ALTITUDE`; `SET_POSITION_TARGET_LOCAL_NED`",
         _GUIDED + "test_conf_143_condition_yaw",
     ),
-    "drone/moveto": Reach("`MAV_CMD_DO_REPOSITION`", _FLIGHT + "test_conf_029_goto"),
-    "gimbal/command": Reach("", waits=PAYLOAD),
+    "drone/moveto": Reach(
+        "`MAV_CMD_DO_REPOSITION`; orientation mode: `ANF_YAW_MODE`",
+        "conformance/test_move_heading.py::test_goto_turns_as_the_parameter_demands",
+    ),
+    "gimbal/command": Reach(
+        "`MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW`, `GIMBAL_MANAGER_SET_ATTITUDE`",
+        _GIMBAL + "test_conf_098_gimbal_is_device_1_of_the_autopilot",
+    ),
     "battery/health": Reach("`BATTERY_INFO`.state_of_health", _TELEMETRY + "test_conf_037_the_cells_of_an_ai"),
     "battery/percentage": Reach("`BATTERY_STATUS`.battery_remaining", _TELEMETRY + "test_conf_037_battery"),
     "battery/voltage": Reach("`BATTERY_STATUS`.voltages", _TELEMETRY + "test_conf_037_battery"),
@@ -71,12 +79,15 @@ REACHED: dict[str, Reach] = {
     "drone/rpy": Reach("`ATTITUDE`", _TELEMETRY + "test_conf_040_attitude_signs"),
     "drone/speed": Reach("`LOCAL_POSITION_NED`, `GLOBAL_POSITION_INT`", _TELEMETRY + "test_conf_041_velocity_signs"),
     "drone/state": Reach("`EXTENDED_SYS_STATE`, `HEARTBEAT`, `ANAFI_FLIGHT_STATUS`", _ANAFI + "test_flight_status"),
-    "gimbal/attitude/absolute": Reach("", waits=PAYLOAD),
+    "gimbal/attitude/absolute": Reach(
+        "`GIMBAL_DEVICE_ATTITUDE_STATUS`", _GIMBAL + "test_conf_103_yaw_has_one_frame_and_agrees_with_the_heading"
+    ),
     "home/location": Reach("`HOME_POSITION`, `ANAFI_HOME`", _TELEMETRY + "test_conf_034_home"),
     "link/quality": Reach("`RC_CHANNELS`.rssi, `ANAFI_LINK`.quality", _TELEMETRY + "test_conf_134_rssi"),
     "skycontroller/attitude": Reach("`ANAFI_CONTROLLER_ATTITUDE`", _ANAFI + "test_where_the_skycontroller_points"),
     "skycontroller/command": Reach(
-        "`ANAFI_CONTROLLER_INPUT`", _ANAFI + "test_skycontroller_sticks_are_reported_while_a_program_flies"
+        "`ANAFI_CONTROLLER_INPUT`, `RC_CHANNELS`; wheels and buttons with `ANF_SC_WHEELS`, `ANF_SC_BUTTONS`",
+        _ANAFI + "test_wheels_and_buttons_are_the_clients_on_request",
     ),
     "skycontroller/rpy": Reach("`ANAFI_CONTROLLER_ATTITUDE`", _ANAFI + "test_where_the_skycontroller_points"),
     "storage/available": Reach("", waits=PAYLOAD),
@@ -115,7 +126,10 @@ REACHED: dict[str, Reach] = {
         "`MAV_CMD_PREFLIGHT_CALIBRATION`, `MAV_CMD_GIMBAL_REQUEST_AXIS_CALIBRATION`",
         _MAINTENANCE + "test_conf_130_the_gimbal",
     ),
-    "gimbal/reset": Reach("", waits=PAYLOAD),
+    "gimbal/reset": Reach(
+        "`MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW` with `GIMBAL_MANAGER_FLAGS_NEUTRAL`",
+        _GIMBAL + "test_conf_101_command_as_long_and_int_moves_the_pitch",
+    ),
     "home/navigate": Reach("`MAV_CMD_NAV_RETURN_TO_LAUNCH`, mode Hold", _FLIGHT + "test_conf_025_return"),
     "home/set": Reach("`MAV_CMD_DO_SET_HOME`", _GUIDED + "test_conf_083_set_home"),
     "skycontroller/offboard": Reach(
@@ -124,15 +138,25 @@ REACHED: dict[str, Reach] = {
     ),
     "storage/download": Reach("", waits=PAYLOAD),
     "storage/format": Reach("", waits=PAYLOAD),
-    "camera/autorecord": Reach("", waits=PAYLOAD),
-    "camera/ev_compensation": Reach("", waits=PAYLOAD),
-    "camera/hdr": Reach("", waits=PAYLOAD),
-    "camera/max_zoom_speed": Reach("", waits=PAYLOAD),
-    "camera/mode": Reach("", waits=PAYLOAD),
-    "camera/relative": Reach("", waits=PAYLOAD),
-    "camera/rendering": Reach("", waits=PAYLOAD),
-    "camera/streaming": Reach("", waits=PAYLOAD),
-    "camera/style": Reach("", waits=PAYLOAD),
+    "camera/autorecord": Reach(
+        "extended parameter `CAM_AUTOREC`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"
+    ),
+    "camera/ev_compensation": Reach(
+        "extended parameter `CAM_EV`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"
+    ),
+    "camera/hdr": Reach("extended parameter `CAM_HDR`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"),
+    "camera/max_zoom_speed": Reach(
+        "extended parameter `CAM_ZOOMSPEED`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"
+    ),
+    "camera/mode": Reach("extended parameter `CAM_MODE`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"),
+    "camera/relative": Reach("`ANF_CAM_RELATIVE`", _PARAMETER),
+    "camera/rendering": Reach(
+        "extended parameter `CAM_THM_RENDER`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"
+    ),
+    "camera/streaming": Reach(
+        "extended parameter `CAM_STREAMING`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"
+    ),
+    "camera/style": Reach("extended parameter `CAM_STYLE`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"),
     "drone/banked_turn": Reach("`ANF_BANKED_TURN`", _PARAMETER),
     "drone/max_altitude": Reach("`ANF_MAX_ALT`", _TWIN),
     "drone/max_distance": Reach("`ANF_MAX_DIST`, `ANF_GEOFENCE`", _TWIN),

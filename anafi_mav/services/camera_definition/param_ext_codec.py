@@ -11,8 +11,12 @@ from anafi_mav.mavlink import dialect
 VALUE_LENGTH = 128
 """Bytes of a param_value; a value lies at its beginning, little endian (MAVLink parameter_ext.md)."""
 
-NAME_LENGTH = 16
-"""Characters of a param_id: a name of this length fills the field, without a NUL."""
+NAME_LENGTH = 15
+"""Longest name. A param_id has 16 characters and needs no NUL, but QGroundControl writes one all the same
+(QGCCameraIO.cc _sendParameter)."""
+
+FIELD_LENGTH = 16
+"""Characters of a param_id."""
 
 DECIMALS = 6
 """Of a number in the definition file. MAVSDK prints a float with as many and looks the text up among the options: a

@@ -22,9 +22,10 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.camera_definition.camera_setting import Guard, View
 from anafi_mav.services.camera_definition.catalogue import Catalogue, CatalogueEntry
-from anafi_mav.services.camera_definition.definition_file import DefinitionFile, definition_file
-from anafi_mav.services.camera_definition.param_ext_codec import VALUE_LENGTH
+from anafi_mav.services.camera_definition.definition_file import definition_file
+from anafi_mav.services.camera_definition.param_ext_codec import FIELD_LENGTH, VALUE_LENGTH
 from anafi_mav.services.component_metadata import COMPRESSED, compress
+from anafi_mav.services.definition_link import DefinitionContent
 from anafi_mav.services.files import Query, ServedFile
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.paced_sender import PacedSender
@@ -81,8 +82,6 @@ class ParamExtService(Service):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._catalogue = Catalogue()
-        self._definition: DefinitionFile | None = None
-        self._packed = b""
         self._sender = PacedSender(host)
         self._sent: dict[str, float] = {}
         """The value of each setting that was last reported to all clients."""
@@ -103,11 +102,6 @@ class ParamExtService(Service):
 
     def files(self) -> Mapping[str, ServedFile]:
         return {PATH: ServedFile(self._plain_file), PATH + COMPRESSED: ServedFile(self._packed_file)}
-
-    @property
-    def definition(self) -> DefinitionFile | None:
-        """The camera definition in effect; None before the first connection."""
-        return self._definition
 
     def link_up(self) -> None:
         self._catalogue = Catalogue()
@@ -150,15 +144,15 @@ class ParamExtService(Service):
         if not self._catalogue.entries:
             return
         made = definition_file(self._catalogue, drone.identity.model.title)
-        if made != self._definition:
-            self._definition, self._packed = made, compress(made.content)
-        self.host.definition.update(URI, made.version)
+        if made.content != self.host.definition.content.plain:
+            content = DefinitionContent(URI, made.version, made.content, compress(made.content))
+            self.host.definition.update(content)
 
     def _plain_file(self, flavour: Flavour, query: Query) -> bytes | None:
-        return None if self._definition is None else self._definition.content
+        return self.host.definition.content.plain or None
 
     def _packed_file(self, flavour: Flavour, query: Query) -> bytes | None:
-        return self._packed or None
+        return self.host.definition.content.packed or None
 
     # Values.
 
@@ -315,7 +309,9 @@ class ParamExtService(Service):
         self._answer(write.inbound, write.name, kind.encode(self._value(entry)), kind.mav, result)
 
     def _answer(self, inbound: Inbound, name: str, value: bytes, kind: int, result: int) -> None:
-        message = dialect.MAVLink_param_ext_ack_message(name.encode(errors="replace")[:16], value, kind, result)
+        message = dialect.MAVLink_param_ext_ack_message(
+            name.encode(errors="replace")[:FIELD_LENGTH], value, kind, result
+        )
         self.host.send(message, inbound.channel)
 
 

@@ -59,6 +59,12 @@ MAX_REPETITIONS = 16
 """Sequence numbers under which one waiting request is answered: QGroundControl repeats it three times, each time with
 another number."""
 
+RESTARTED = 1 << 15
+"""Distance of a sequence number from the last kept one, modulo 2**16, from which it is an older number.
+
+A client that restarts counts from the beginning, and its TerminateSession may equal one of before.
+"""
+
 _HEADER = struct.Struct("<HBBBBBBI")
 
 
@@ -217,7 +223,10 @@ class _Client:
     """Those that are open."""
     waits: list[Wait] = field(default_factory=list)
     kept: tuple[FtpRequest, bytes] | None = None
-    """The last request of `_KEPT` and its answer, which a repetition gets again."""
+    """The last request of `_KEPT` and its answer, which a repetition gets again.
+
+    Opening a file drops it: a client may number its requests from 0 again for each file.
+    """
     seen: float = 0.0
 
 
@@ -292,8 +301,11 @@ class FtpServer:
         client.seen = now
         if len(self._clients) > MAX_CLIENTS:
             self._drop(next(iter(self._clients)))
-        if client.kept is not None and client.kept[0] == request:
-            return client.kept[1]
+        if client.kept is not None:
+            if client.kept[0] == request:
+                return client.kept[1]
+            if request.seq - client.kept[0].seq & 0xFFFF >= RESTARTED:
+                client.kept = None
         if self._waits(client, request) or (len(client.waits) >= MAX_WAITS and request.opcode not in _SHORT):
             return None
         try:
@@ -471,7 +483,7 @@ class FtpServer:
         session = self._session_for(client, request, now)
         if isinstance(session, FileError):
             return session
-        client.sessions[request.session] = session
+        client.sessions[request.session], client.kept = session, None
         if session.state is not State.WRITING or session.created != request.seq:
             self._abandon(client, request.session)
             session.step(Event.CREATE)
@@ -502,7 +514,7 @@ class FtpServer:
         if isinstance(session, FileError):
             return session
         opening = files.open(request.path)
-        client.sessions[request.session] = session
+        client.sessions[request.session], client.kept = session, None
         self._abandon(client, request.session)
         session.step(Event.OPEN)
         session.path, session.source, session.used = request.path, None, now

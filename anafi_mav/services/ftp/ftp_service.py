@@ -128,9 +128,9 @@ class FtpService(Service):
 
     def _content(self, path: str, flavour: Flavour, query: Query) -> bytes | None:
         """Return a file's content; metadata are made once."""
-        if path.endswith(COMPRESSED):
+        file = self._files.get(path)
+        if file is None:  # the compressed form of metadata
             return self._once(path, flavour, lambda: _compressed(self._content(path[: -len(COMPRESSED)], flavour, {})))
-        file = self._files[path]
         if file.metadata is None:
             return file.make(flavour, query)
         return self._once(path, flavour, lambda: file.make(flavour, {}))

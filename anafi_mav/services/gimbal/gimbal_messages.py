@@ -154,24 +154,26 @@ def manager_status(
     )
 
 
-def attitude_status(
-    vehicle: Vehicle, gimbal: GimbalState, times: Times, *, neutral: bool
-) -> dialect.MAVLink_message | None:
-    """GIMBAL_DEVICE_ATTITUDE_STATUS. ARSDK reports no rates of the gimbal: NaN."""
-    attitude = gimbal.attitude
-    if attitude is None:
+def attitude_status(gimbal: GimbalState, times: Times, *, neutral: bool) -> dialect.MAVLink_message | None:
+    """GIMBAL_DEVICE_ATTITUDE_STATUS. ARSDK reports no rates of the gimbal: NaN.
+
+    Frames and errors are the reported ones, also beside the attitude of a picture, which has neither.
+    """
+    pose = times.pose
+    flags, body = device_flags(gimbal, neutral=neutral), pose.attitude
+    earth = bool(flags & dialect.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME)
+    if pose.frame is None:
+        q = reported_rotation(gimbal, earth=earth)
+    else:
+        q = pictured_rotation(pose.frame.metadata.quat, None if body is None else body.yaw, earth=earth)
+    if q is None:
         return None
-    flags, absolute = device_flags(gimbal, neutral=neutral), attitude.absolute
-    earth = flags & dialect.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
-    yaw = absolute.yaw if earth else attitude.relative.yaw
-    angles = (angle * units.RAD_PER_DEG for angle in (absolute.roll, absolute.pitch, yaw))
-    body = vehicle.drone.piloting.state.attitude
     return dialect.MAVLink_gimbal_device_attitude_status_message(
         0,
         0,
         times.boot_ms,
         flags,
-        units.quaternion_from_euler(*angles),
+        q,
         NAN,
         NAN,
         NAN,
@@ -180,6 +182,33 @@ def attitude_status(
         NAN,
         DEVICE,
     )
+
+
+def reported_rotation(gimbal: GimbalState, *, earth: bool) -> tuple[float, ...] | None:
+    """Return the gimbal's rotation as its event reports it: from north, or from the heading."""
+    attitude = gimbal.attitude
+    if attitude is None:
+        return None
+    absolute = attitude.absolute
+    angles = (absolute.roll, absolute.pitch, absolute.yaw if earth else attitude.relative.yaw)
+    return units.quaternion_from_euler(*(angle * units.RAD_PER_DEG for angle in angles))
+
+
+def pictured_rotation(
+    quaternion: tuple[float, float, float, float] | None, heading: float | None, *, earth: bool
+) -> tuple[float, ...] | None:
+    """Return a picture's rotation: from north, or from the heading (rad) of the same picture.
+
+    The metadata have it from north. It is turned back as a quaternion: straight down a heading cannot be subtracted
+    from an angle of yaw.
+    """
+    if quaternion is None or earth:
+        return quaternion
+    if heading is None:
+        return None
+    w, x, y, z = quaternion
+    cosine, sine = math.cos(heading / 2.0), math.sin(heading / 2.0)
+    return cosine * w + sine * z, cosine * x + sine * y, cosine * y - sine * x, cosine * z - sine * w
 
 
 def failure_flags(gimbal: GimbalState) -> int:

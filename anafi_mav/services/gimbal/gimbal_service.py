@@ -21,7 +21,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.stall import STALL
 from anafi_mav.services.command_targets import height, place
-from anafi_mav.services.commands import Action, Altitude, Command, Effect
+from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.gimbal import gimbal_messages, mount, targets
 from anafi_mav.services.gimbal.control import Answer, ClientId, GimbalControl, Heartbeats
@@ -99,29 +99,35 @@ class GimbalService(Service):
         return dialect.MAV_PROTOCOL_CAPABILITY_COMPONENT_IMPLEMENTS_GIMBAL_MANAGER
 
     def actions(self) -> Mapping[int, Action]:
+        # MAVSDK's gimbal plugin takes an IN_PROGRESS for a failure (gimbal_impl.cpp, receive_command_result).
+        late = ProgressPolicy.LATE
+
         def aim(handler: mount.Handler) -> Action:
-            return Action(handler, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE)
+            return Action(
+                handler,
+                location=False,
+                altitude=Altitude.UNUSED,
+                effect=Effect.TARGET,
+                progress=late,
+                group=ActionGroup.GIMBAL,
+            )
+
+        def look(
+            handler: mount.Handler, altitude: Altitude = Altitude.UNUSED, effect: Effect = Effect.CHANGE
+        ) -> Action:
+            has_location = altitude is not Altitude.UNUSED
+            return Action(handler, location=has_location, altitude=altitude, effect=effect, progress=late)
 
         return {
             dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: aim(self._pitch_yaw),
             dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE: aim(self._configure),
             dialect.MAV_CMD_DO_MOUNT_CONFIGURE: aim(self._mount_configure),
             dialect.MAV_CMD_DO_MOUNT_CONTROL: aim(self._mount_control),
-            dialect.MAV_CMD_DO_SET_ROI_LOCATION: Action(
-                self._look_at, location=True, altitude=Altitude.AMSL, effect=Effect.CHANGE
-            ),
-            dialect.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET: Action(
-                self._look_beside, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
-            ),
-            dialect.MAV_CMD_DO_SET_ROI_SYSID: Action(
-                self._look_at_system, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
-            ),
-            dialect.MAV_CMD_DO_SET_ROI_NONE: Action(
-                self._look_anywhere, location=False, altitude=Altitude.UNUSED, effect=Effect.STOP
-            ),
-            dialect.MAV_CMD_DO_SET_ROI: Action(
-                self._legacy_roi, location=True, altitude=Altitude.BY_FRAME, effect=Effect.CHANGE
-            ),
+            dialect.MAV_CMD_DO_SET_ROI_LOCATION: look(self._look_at, Altitude.AMSL),
+            dialect.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET: look(self._look_beside),
+            dialect.MAV_CMD_DO_SET_ROI_SYSID: look(self._look_at_system),
+            dialect.MAV_CMD_DO_SET_ROI_NONE: look(self._look_anywhere, effect=Effect.STOP),
+            dialect.MAV_CMD_DO_SET_ROI: look(self._legacy_roi, Altitude.BY_FRAME),
         }
 
     def messages(self) -> Mapping[int, MessageHandler]:
@@ -150,11 +156,10 @@ class GimbalService(Service):
                 lambda vehicle, times: gimbal_messages.device_information(vehicle, gimbal(vehicle), times)
             ),
             dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS: MessageStream(
-                lambda vehicle, times: gimbal_messages.attitude_status(
-                    vehicle, gimbal(vehicle), times, neutral=self._neutral
-                ),
+                lambda vehicle, times: gimbal_messages.attitude_status(gimbal(vehicle), times, neutral=self._neutral),
                 attitude,
                 every=0.1,
+                from_pictures=True,
             ),
             dialect.MAVLINK_MSG_ID_MOUNT_ORIENTATION: MessageStream(
                 lambda vehicle, times: gimbal_messages.mount_orientation(gimbal(vehicle), times), attitude, every=0.2
@@ -214,9 +219,9 @@ class GimbalService(Service):
         """Give the gimbal to the mission that is flown while it needs it."""
         if self._control.mission(needs_gimbal=self.host.vehicle.mission_needs_gimbal) and self._control.is_of_mission:
             self._roi.forget_system()
-            self._neutral, self._repeat = False, None
-            if self._rates.end_unless(()):
-                self._stop_turning()
+            turns = self._rates.end_unless(()) or self._halt is not None
+            self._begin()
+            self._neutral, self._zeros = False, STOPS if turns else 0  # soon: its first target may follow
 
     def _watch_rates(self, now: float) -> None:
         client = self._rates.client
@@ -227,6 +232,8 @@ class GimbalService(Service):
                 reason = texts.RATE_CLIENT_SILENT.fill(system=client[0])
                 self.host.text(Severity.NOTICE, texts.GIMBAL_STOPPED.fill(reason=reason))
             return
+        if self._command is not None:
+            return  # the command ends when the gimbal turns, or is at the end of its range
         gimbal = self.host.drone.gimbal.main
         at_end = [axis for axis, aim in self._rates.rates.items() if aim.value and gimbal.is_at_end(axis, aim.value)]
         if at_end and self._rates.limit(at_end):
@@ -495,16 +502,16 @@ class GimbalService(Service):
 
     async def _look(self, command: Command, where: GeoPoint, ato: float) -> None:
         self._require_control(command.client)
+        await self._rest()
         await self._roi.look_at(where, ato)
-        self._leave_to_roi()
 
-    def _leave_to_roi(self) -> None:
-        """The drone aims the gimbal from now on."""
+    async def _rest(self) -> None:
+        """End what moves the gimbal, before the drone aims it: a stop sent later could end that."""
+        turns = self._rates.end_unless(()) or self._halt is not None
+        self._begin()
         self._neutral = False
-        if self._rates.end_unless(()):
-            self._stop_turning()
-        else:
-            self._begin()
+        if turns:
+            await self.host.drone.gimbal.stop()
 
     async def _look_at_system(self, command: Command) -> None:
         """Run MAV_CMD_DO_SET_ROI_SYSID: param1 system, param2 gimbal device."""
@@ -513,8 +520,8 @@ class GimbalService(Service):
 
     async def _look_at_number(self, command: Command, system: float) -> None:
         self._require_control(command.client)
+        await self._rest()
         await self._roi.look_at_system(system)
-        self._leave_to_roi()
 
     async def _look_anywhere(self, command: Command) -> None:
         """Run MAV_CMD_DO_SET_ROI_NONE: param1 gimbal device."""
@@ -523,15 +530,20 @@ class GimbalService(Service):
         await self._roi.stop()
 
     async def _legacy_roi(self, command: Command) -> None:
-        """MAV_CMD_DO_SET_ROI: param1 MAV_ROI; none or a location. At 0/0 MAVProxy means none."""
+        """Run MAV_CMD_DO_SET_ROI: param1 MAV_ROI; none or a location.
+
+        With a place it looks there, also if param1 is 0: Mission Planner and dronekit send it so, and ArduPilot does
+        not read param1. At 0/0 MAVProxy means none.
+        """
         kind = command.params[0]
-        if kind == dialect.MAV_ROI_NONE or (command.x == 0.0 and command.y == 0.0):
+        is_none = kind == dialect.MAV_ROI_NONE or math.isnan(kind)
+        if not is_none and kind != dialect.MAV_ROI_LOCATION:
+            raise Refused(texts.ROI, texts.ROI_KINDS, lasting=True)
+        if (is_none and place(command) is None) or (command.x == 0.0 and command.y == 0.0):
             self._require_control(command.client)
             await self._roi.stop()
-        elif kind == dialect.MAV_ROI_LOCATION or math.isnan(kind):
-            await self._look_at_place(command)
         else:
-            raise Refused(texts.ROI, texts.ROI_KINDS, lasting=True)
+            await self._look_at_place(command)
 
     async def _look_beside(self, command: Command) -> None:
         """Run MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET: param5, 6, 7 deg of pitch, roll, yaw from the path.
@@ -545,9 +557,9 @@ class GimbalService(Service):
         pitch, roll, yaw = offsets
         if any(abs(value) > targets.WIDEST for value in offsets):
             raise Refused(texts.ROI, texts.GIMBAL_ANGLE, lasting=True)
-        goto, here = vehicle.guided.goto, vehicle.place
         if vehicle.mission.flying:
             raise Refused(texts.ROI, texts.GIMBAL_OF_MISSION)
+        goto, here = vehicle.guided.goto, vehicle.place
         if goto is None or here is None or piloting.altitude is None:
             raise Refused(texts.ROI, texts.ROI_NO_WAYPOINT)
         bearing, elevation = mount.direction(here, goto.place, goto.ato - piloting.altitude)
@@ -637,8 +649,8 @@ class GimbalService(Service):
         try:
             if not self._control.allows((inbound.sysid, inbound.compid)):
                 raise Refused(texts.ROI, self._holder)
+            await self._rest()
             await self._roi.look_at(where, ato)
-            self._leave_to_roi()
         except AnafiMavError as error:
             self.host.warn_throttled(error.text if isinstance(error, Refused) else texts.from_below(error))
 

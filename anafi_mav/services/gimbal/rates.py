@@ -2,7 +2,7 @@
 
 The drone turns with a rate until its next target or the end of the range. So the end has to be commanded:
 
-- a rate by message (GIMBAL_MANAGER_SET_ATTITUDE and others) ends when none has arrived for a second;
+- a rate by message (GIMBAL_MANAGER_SET_ATTITUDE and others) ends when none has arrived for a second and a bit;
 - a rate by command goes on, as MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW says, until its sender's heartbeats stop, if it sends
   any. MAVSDK's example sends one rate and waits five seconds.
 
@@ -19,8 +19,9 @@ from anafi_mav.drone import Aim
 from anafi_mav.drone.events import Axis
 from anafi_mav.services.gimbal.control import ClientId, Heartbeats
 
-MESSAGE_SILENCE = 1.0
-"""s without a rate by message."""
+MESSAGE_SILENCE = 1.2
+"""s without a rate by message. MAVProxy's gimbal module sends one a second, and each a little late: after exactly one
+second the gimbal would stop and start again with each of them."""
 
 COMMAND_SILENCE = 3.0
 """s without heartbeats of a client whose rate by command is in force."""

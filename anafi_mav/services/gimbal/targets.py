@@ -37,6 +37,10 @@ FASTEST = 1000.0
 UNIT_TOLERANCE = 0.1
 """How far a quaternion's length may be from 1: single precision and sloppy sums, not garbage."""
 
+UPRIGHT = math.cos(math.radians(0.1))
+"""Sine of a pitch that counts as straight up or down: nearer to it the single precision of a message decides how a
+rotation is divided into roll and yaw."""
+
 DEVICES = (0, 1, 154)
 """Gimbal device ids that mean the gimbal: all, its own, and the component that gimbals usually are."""
 
@@ -102,8 +106,8 @@ class Frames:
 
 
 def wrap_180(angle: float) -> float:
-    """Return the same angle (deg) in [-180, 180)."""
-    return (angle + 180.0) % 360.0 - 180.0
+    """Return the same angle (deg) in (-180, 180]."""
+    return 180.0 - (180.0 - angle) % 360.0
 
 
 def read(
@@ -143,15 +147,24 @@ def read(
 def of_quaternion(q: Sequence[float]) -> Mapping[Axis, float] | None:
     """Return the angles (deg) of a quaternion (w, x, y, z); None for no rotation.
 
-    Empty when it is not set.
+    Empty when it is not set. Of the two sets of angles that every rotation has, it is the one without a roll beyond
+    90 deg, which no gimbal has. So the Ai looks up and back with a pitch of 150 deg. Straight up and down, where roll
+    and yaw turn about one axis, roll is 0.
     """
     if all(math.isnan(value) for value in q):
         return {}
     length = math.hypot(*q)
     if not abs(length - 1.0) <= UNIT_TOLERANCE:  # also if one of them is not a number
         return None
-    roll, pitch, yaw = (angle * units.DEG_PER_RAD for angle in units.euler_from_quaternion(*q))
-    return {Axis.ROLL: roll, Axis.PITCH: pitch, Axis.YAW: yaw}
+    w, x, y, z = (value / length for value in q)
+    sine = 2.0 * (w * y - z * x)
+    if abs(sine) >= UPRIGHT:
+        yaw = math.copysign(2.0, -sine) * math.atan2(x, w) * units.DEG_PER_RAD
+        return {Axis.ROLL: 0.0, Axis.PITCH: math.copysign(90.0, sine), Axis.YAW: wrap_180(yaw)}
+    roll, pitch, yaw = (angle * units.DEG_PER_RAD for angle in units.euler_from_quaternion(w, x, y, z))
+    if abs(roll) > 90.0:
+        roll, pitch, yaw = roll + 180.0, 180.0 - pitch, yaw + 180.0
+    return {Axis.ROLL: wrap_180(roll), Axis.PITCH: wrap_180(pitch), Axis.YAW: wrap_180(yaw)}
 
 
 def from_attitude(

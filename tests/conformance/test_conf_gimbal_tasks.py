@@ -1,0 +1,313 @@
+"""The gimbal beside other tasks: regions of interest, missions, mounts, pictures; judged by the simulator."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.flavours import both
+from support.gimbal import (
+    CONFIGURE,
+    EARTH_FRAME,
+    LEVEL,
+    NAN,
+    PITCHYAW,
+    VEHICLE_FRAME,
+    YAW_LOCK,
+    beat,
+    euler,
+    looks,
+    next_truth,
+    rate,
+    request,
+    send_rates,
+    truth,
+)
+from support.missions import ACTIVE, PAUSED, put, start, state, takeoff, way
+from support.plans import Item
+from support.world import HOME, World, world
+
+from anafi_mav import geo, units
+from anafi_mav.arsdk.messages.ardrone3 import PoiMode, PoiStatus
+
+ACCEPTED, DENIED, REJECTED, UNSUPPORTED = (
+    dialect.MAV_RESULT_ACCEPTED,
+    dialect.MAV_RESULT_DENIED,
+    dialect.MAV_RESULT_TEMPORARILY_REJECTED,
+    dialect.MAV_RESULT_UNSUPPORTED,
+)
+ROI, NO_ROI, ROI_SYSTEM, ROI_BESIDE, OLD_ROI = (
+    dialect.MAV_CMD_DO_SET_ROI_LOCATION,
+    dialect.MAV_CMD_DO_SET_ROI_NONE,
+    dialect.MAV_CMD_DO_SET_ROI_SYSID,
+    dialect.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET,
+    dialect.MAV_CMD_DO_SET_ROI,
+)
+MOUNT, MOUNT_MODE = dialect.MAV_CMD_DO_MOUNT_CONTROL, dialect.MAV_CMD_DO_MOUNT_CONFIGURE
+TARGETING, GPS_POINT = dialect.MAV_MOUNT_MODE_MAVLINK_TARGETING, dialect.MAV_MOUNT_MODE_GPS_POINT
+PAUSE, INTERVAL = dialect.MAV_CMD_DO_PAUSE_CONTINUE, dialect.MAV_CMD_SET_MESSAGE_INTERVAL
+EAST = geo.destination(HOME[0], HOME[1], 0.0, 20.0)
+NORTH = geo.destination(HOME[0], HOME[1], 60.0, 0.0)
+STATUS, ATTITUDE = "GIMBAL_MANAGER_STATUS", "GIMBAL_DEVICE_ATTITUDE_STATUS"
+
+
+def pois(w: World) -> list[Any]:
+    return [entry.args for entry in w.commands("ardrone3.Piloting.StartPilotedPOIV2")]
+
+
+async def heads(w: World, degrees: float) -> None:
+    """Wait until the simulated drone's true heading is this."""
+    since = w.drone.log[-1].t
+    wanted = degrees * units.RAD_PER_DEG
+    await w.drone.wait_log(
+        lambda e: e.kind == "pose" and abs(units.wrap_pi(e.args["yaw"] - wanted)) < 0.05, 20.0, since=since
+    )
+
+
+async def region(w: World, status: PoiStatus, mode: PoiMode) -> None:
+    """Wait until the drone has reported this of its region of interest."""
+    poi = w.gateway.systems[0].drone.poi
+    await w.client.wait("HEARTBEAT", lambda beat: (poi.state.status, poi.state.mode) == (status, mode), since=0)
+
+
+async def test_region_is_locked_until_a_client_aims_the_gimbal() -> None:
+    async with world() as w:
+        await w.take_off(20.0)
+        # A rate in force ends before the drone takes the gimbal.
+        assert (await w.client.command(PITCHYAW, NAN, NAN, 3.0, NAN, x=LEVEL)).result == ACCEPTED
+        assert (await w.client.command(ROI, 154.0, x=EAST[0], y=EAST[1], z=HOME[2])).result == ACCEPTED
+        assert [poi["mode"] for poi in pois(w)] == [PoiMode.LOCKED_GIMBAL]
+        await heads(w, 90.0)
+        await looks(w, pitch_absolute=-45.0)
+        assert not [m for _, m in w.client.since(0, "STATUSTEXT") if "Gimbal" in m.text]
+        # Angles: the nose stays on the region, the gimbal is the client's.
+        assert (await w.client.command(PITCHYAW, -10.0, 0.0, x=LEVEL)).result == ACCEPTED
+        assert [poi["mode"] for poi in pois(w)] == [PoiMode.LOCKED_GIMBAL, PoiMode.FREE_GIMBAL]
+        await looks(w, pitch_absolute=-10.0)
+        assert abs(math.degrees(w.drone.pose.yaw) - 90.0) < 3.0
+        # Locked again, and freed by a message.
+        assert (await w.client.command(ROI, x=EAST[0], y=EAST[1], z=HOME[2])).result == ACCEPTED
+        await looks(w, pitch_absolute=-45.0)
+        for _ in range(6):
+            send_rates(w.client, 10.0)
+            await next_truth(w)
+        assert pois(w)[-1]["mode"] == PoiMode.FREE_GIMBAL
+        assert truth(w).pitch_absolute > -44.0
+        assert (await w.client.command(NO_ROI, 2.0)).result == DENIED
+        assert (await w.client.command(NO_ROI)).result == ACCEPTED
+        assert len(w.commands("ardrone3.Piloting.StopPilotedPOI")) == 1
+
+
+async def test_region_follows_another_system_that_reports_its_position() -> None:
+    async with world() as w:
+        await w.take_off(20.0)
+        other = await w.connect(7, 1)
+
+        def moves(to: tuple[float, float]) -> None:
+            place = (round(to[0] * 1e7), round(to[1] * 1e7), round(HOME[2] * 1e3), 0, 0, 0, 0, 0)
+            other.send(dialect.MAVLink_global_position_int_message(0, *place))
+
+        assert (await w.client.command(ROI_SYSTEM, 7.0)).result == REJECTED
+        assert (await w.client.command(ROI_SYSTEM, NAN)).result == REJECTED
+        moves(EAST)
+        assert (await w.client.command(ROI_SYSTEM, 7.0)).result == ACCEPTED
+        await heads(w, 90.0)
+        moves(NORTH)
+        await heads(w, 0.0)
+        await looks(w, pitch_absolute=-math.degrees(math.atan2(20.0, 60.0)))
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "ROI kept: no position of system 7", timeout=8.0)
+        assert (await w.client.command(NO_ROI)).result == ACCEPTED
+        count = len(pois(w))
+        moves(EAST)
+        await next_truth(w)
+        await next_truth(w)
+        assert len(pois(w)) == count
+
+
+async def test_region_beside_the_path_turns_nose_and_gimbal() -> None:
+    """40 m to the north and 40 m up: the path rises by 45 deg; 10 deg below it, and 30 deg to the right."""
+    there = geo.destination(HOME[0], HOME[1], 40.0, 0.0)
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(ROI_BESIDE, x=0.0, y=0.0, z=0.0)).result == REJECTED
+        await w.take_off(5.0)
+        frame = dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
+        goto = await w.client.command(
+            dialect.MAV_CMD_DO_REPOSITION, -1, 1, 0, NAN, frame=frame, x=there[0], y=there[1], z=45.0
+        )
+        assert goto.result == ACCEPTED
+        assert (await w.client.command(ROI_BESIDE, x=-10.0, y=0.0, z=30.0)).result == ACCEPTED
+        await heads(w, 30.0)
+        await w.client.wait(ATTITUDE, lambda m: abs(euler(m)[1] - 35.0) < 3.0)
+        assert truth(w).pitch_absolute == pytest.approx(35.0, abs=3.0)
+
+
+@both
+async def test_older_region_command_reads_the_place_first(flavour: str) -> None:
+    """Mission Planner and dronekit send param1 = 0 with a place; that is no "none"."""
+    async with world(flavour=flavour) as w:
+        await w.take_off(20.0)
+        frame = dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
+        ack = await w.client.command(OLD_ROI, 0.0, 0.0, 0.0, 0.0, frame=frame, x=EAST[0], y=EAST[1], z=0.0)
+        assert ack.result == ACCEPTED
+        await heads(w, 90.0)
+        await looks(w, pitch_absolute=-45.0)
+        assert (await w.client.command(OLD_ROI, 0.0)).result == ACCEPTED
+        assert len(w.commands("ardrone3.Piloting.StopPilotedPOI")) == 1
+
+
+def owner(status: Any) -> tuple[int, int]:
+    return status.primary_control_sysid, status.primary_control_compid
+
+
+@both
+async def test_conf_100_mission_has_the_gimbal_while_its_items_come(flavour: str) -> None:
+    aim = Item(PITCHYAW, 0.0, 0.0, z=1.0, p1=-30.0, p2=NAN, p3=NAN, p4=NAN, frame=2)
+    async with world(flavour=flavour, web=True) as w:
+        me = (255, 190)
+
+        async def belongs(to: tuple[int, int], since: int) -> None:
+            await w.client.wait(STATUS, lambda m: owner(m) == to, since=since, timeout=30.0)
+
+        await put(w, [takeoff(6.0), way(60.0, 0.0, 6.0), aim, way(75.0, 0.0, 6.0)])
+        beat(w.client)
+        assert (await w.client.command(CONFIGURE, *me, -1, -1)).result == ACCEPTED
+        assert (await w.client.command(PITCHYAW, NAN, NAN, -0.5, NAN, x=LEVEL)).result == ACCEPTED
+        mark = w.client.mark()
+        await start(w)
+        await belongs((1, 1), mark)
+        assert (await w.client.command(CONFIGURE, *me, -1, -1)).result == REJECTED
+        assert (await w.client.command(PITCHYAW, 20.0, x=LEVEL)).result == REJECTED
+        assert (await w.client.command(NO_ROI)).result == REJECTED
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Gimbal refused: mission has control", since=mark)
+        last = w.commands("gimbal.set_target")[-1].args
+        assert (last["control_mode"], last["pitch"]) == (1, 0.0)  # the client's rate was stopped
+
+        await state(w, ACTIVE, seq=1, since=mark)
+        mark = w.client.mark()
+        assert (await w.client.command(PAUSE, 0.0)).result == ACCEPTED
+        await state(w, PAUSED, since=mark)
+        await belongs((0, 0), mark)
+        beat(w.client)
+        assert (await w.client.command(CONFIGURE, *me, -1, -1)).result == ACCEPTED
+        assert (await w.client.command(PITCHYAW, 20.0, x=LEVEL)).result == ACCEPTED
+        await looks(w, pitch_absolute=20.0)
+        mark = w.client.mark()
+        assert (await w.client.command(PAUSE, 1.0)).result == ACCEPTED
+        await belongs((1, 1), mark)
+        await looks(w, pitch_absolute=-30.0)  # the mission's own item
+        await belongs((0, 0), mark)
+        assert (await w.client.command(PITCHYAW, 5.0, x=LEVEL)).result == ACCEPTED
+
+
+async def test_mount_commands_and_messages_have_the_same_signs() -> None:
+    async with world(flavour="ardupilot") as w:
+        assert (await w.client.command(MOUNT, -30.0, 5.0, 10.0, 0.0, x=0.0, y=0.0, z=TARGETING)).result == ACCEPTED
+        await looks(w, pitch_absolute=-30.0, roll_absolute=5.0)
+        shown = await w.client.wait("MOUNT_ORIENTATION", lambda m: abs(m.pitch + 30.0) < 0.5)
+        assert (shown.roll, shown.yaw) == pytest.approx((5.0, 0.0), abs=0.5)
+        status = await request(w.client, dialect.MAVLINK_MSG_ID_MOUNT_STATUS, "MOUNT_STATUS")
+        assert (status.pointing_a, status.pointing_b) == pytest.approx((-3000, 500), abs=50)
+        # dronekit: MOUNT_CONFIGURE, then MOUNT_CONTROL in hundredths of a degree.
+        w.client.send(dialect.MAVLink_mount_configure_message(1, 1, TARGETING, 1, 1, 1))
+        w.client.send(dialect.MAVLink_mount_control_message(1, 1, 1500, -500, 0, 0))
+        await looks(w, pitch_absolute=15.0, roll_absolute=-5.0)
+        assert (await w.client.command(MOUNT_MODE, dialect.MAV_MOUNT_MODE_NEUTRAL)).result == ACCEPTED
+        await looks(w, pitch_absolute=0.0)
+        for mode in (dialect.MAV_MOUNT_MODE_RETRACT, dialect.MAV_MOUNT_MODE_RC_TARGETING):
+            assert (await w.client.command(MOUNT_MODE, mode)).result == UNSUPPORTED
+            assert (await w.client.command(MOUNT, 10.0, 0.0, 0.0, 0.0, z=mode)).result == UNSUPPORTED
+        assert truth(w).pitch_absolute == 0.0
+
+        # A place: degE7 in single precision as MAVProxy sends it, and by message.
+        await w.take_off(20.0)
+        degrees = [value * 1e7 for value in EAST]
+        ack = await w.client.command(MOUNT, 0.0, 0.0, 0.0, 0.0, x=degrees[0], y=degrees[1], z=GPS_POINT)
+        assert ack.result == ACCEPTED
+        await heads(w, 90.0)
+        assert pois(w)[-1]["altitude"] == pytest.approx(0.0, abs=0.01)
+        w.client.send(dialect.MAVLink_mount_configure_message(1, 1, GPS_POINT, 1, 1, 1))
+        places = [round(value * 1e7) for value in NORTH]
+        w.client.send(dialect.MAVLink_mount_control_message(1, 1, *places, 300, 0))
+        await heads(w, 0.0)
+        assert pois(w)[-1]["altitude"] == pytest.approx(3.0, abs=0.01)
+
+
+async def test_conf_099_components_refuse_what_is_not_theirs_at_once() -> None:
+    async with world() as w:
+        for component, message in ((100, dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION), (1, 259)):
+            began = w.client.mark()
+            ack = await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, message, target=(1, component), timeout=1.0)
+            assert ack.result == UNSUPPORTED
+            assert ack.get_srcComponent() == component
+            assert len(w.client.since(began, "COMMAND_ACK")) == 1
+
+
+async def test_manager_status_leaves_five_times_a_second_on_request() -> None:
+    async with world(speed=1.0) as w:
+
+        async def per_second() -> float:
+            await w.client.wait(STATUS)  # the first one after the change may be early
+            mark = w.client.mark()
+            for _ in range(5):
+                await w.client.wait(STATUS)
+            times = [m.time_boot_ms for _, m in w.client.since(mark, STATUS)]
+            return 1000.0 * (len(times) - 1) / (times[-1] - times[0])
+
+        ack = await w.client.command(INTERVAL, dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS, 200_000)
+        assert ack.result == ACCEPTED
+        assert await per_second() == pytest.approx(5.0, rel=0.15)
+        ack = await w.client.command(INTERVAL, dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS, 0)
+        assert ack.result == ACCEPTED
+        assert await per_second() == pytest.approx(1.0, rel=0.15)
+
+
+async def test_attitude_at_30_hz_is_made_of_pictures() -> None:
+    """An Ai that turns: the yaw of each picture, to the nose and to north, belongs to one moment."""
+    async with world(model="ai", speed=1.0, video_latency=0.1) as w:
+        if w.drone.rtsp_port is None:
+            pytest.skip(w.drone.rtsp_problem)
+        await w.take_off(5.0)
+        assert (await w.client.command(PITCHYAW, -30.0, 20.0, x=LEVEL)).result == ACCEPTED
+        await looks(w, yaw_relative=20.0, pitch_absolute=-30.0)
+        for message in (dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS, dialect.MAVLINK_MSG_ID_ATTITUDE):
+            assert (await w.client.command(INTERVAL, message, 33_333)).result == ACCEPTED
+        await w.client.wait("HEARTBEAT", lambda _: w.gateway.systems[0].drone.video.state.playing, timeout=10.0)
+
+        async def measure(flags: int, yaw: float) -> list[Any]:
+            assert (await w.client.command(PITCHYAW, -30.0, yaw, x=flags)).result == ACCEPTED
+            await looks(w, pitch_absolute=-30.0)
+            turn = await w.client.command(dialect.MAV_CMD_CONDITION_YAW, 40.0, NAN, 1.0, 1.0)
+            assert turn.result == ACCEPTED
+            mark = w.client.mark()
+            for _ in range(3):
+                await w.client.wait("HEARTBEAT")
+            return [m for _, m in w.client.since(mark, ATTITUDE)]
+
+        frame = VEHICLE_FRAME | EARTH_FRAME
+        statuses = await measure(LEVEL, 20.0)
+        times = [m.time_boot_ms for m in statuses]
+        assert 1000.0 * (len(times) - 1) / (times[-1] - times[0]) == pytest.approx(30.0, rel=0.1)
+        headings = {m.time_boot_ms: m.yaw for _, m in w.client.since(0, "ATTITUDE")}
+        for status in statuses:
+            assert status.flags & frame == VEHICLE_FRAME
+            assert euler(status) == pytest.approx((0.0, -30.0, 20.0), abs=1.0)
+            assert status.delta_yaw == pytest.approx(headings.get(status.time_boot_ms, status.delta_yaw), abs=1e-4)
+        assert len({round(status.delta_yaw, 2) for status in statuses}) > 3  # it turned meanwhile
+        locked = math.degrees(w.drone.pose.yaw) + 10.0
+        for status in (await measure(LEVEL | YAW_LOCK, locked))[5:]:
+            assert status.flags & frame == EARTH_FRAME
+            assert euler(status) == pytest.approx((0.0, -30.0, locked), abs=2.0)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+async def test_pitch_up_is_positive_in_every_message(sign: float) -> None:
+    """The worst error there is: up must be up in angles, rates, manual control and reports of the whole chain."""
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(PITCHYAW, sign * 30.0, x=LEVEL)).result == ACCEPTED
+        await looks(w, pitch_absolute=sign * 30.0)
+        assert w.commands("gimbal.set_target")[-1].args["pitch"] == sign * 30.0  # gimbal.xml: + is up
+        assert euler(await w.client.wait(ATTITUDE))[1] == pytest.approx(sign * 30.0, abs=0.5)
+        send_rates(w.client, sign * 12.0)
+        assert await rate(w, "pitch_absolute", 2) == pytest.approx(sign * 12.0, rel=0.1)
