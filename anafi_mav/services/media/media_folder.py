@@ -1,4 +1,4 @@
-"""The drone's photos and videos as a folder: `<day>/<file>`, read from the drone while a client reads them.
+"""The drone's photos and videos as a folder: `<day>/<file>`, read while a client reads them.
 
 A day is "2026-11-22" by the drone's clock. Nothing is kept here but checksums: `drone.media` keeps the list and the
 pieces that were read last.
@@ -104,7 +104,7 @@ def busy(drone: Drone) -> texts.OperatorText | None:
 
 
 def when_listed(drone: Drone, then: Callable[[Listing], T]) -> T | Awaitable[T]:
-    """Apply `then` to the list of media: at once when it is kept, else when the drone has sent it."""
+    """Apply `then` to the list of media: at once when it is kept, else once the drone sent it."""
     kept = drone.media.kept_listing
     return _after_listing(drone, then) if kept is None else then(kept)
 
