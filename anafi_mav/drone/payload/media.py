@@ -29,7 +29,7 @@ from anafi_mav.drone.payload.media_index import MediaIndex
 from anafi_mav.drone.payload.media_reader import MediaReader, OpenedFile
 from anafi_mav.drone.rest import Rest
 from anafi_mav.drone.settings import Commanding
-from anafi_mav.errors import RemoteProtocolError
+from anafi_mav.errors import CommandRejected, RemoteProtocolError
 
 log = logging.getLogger("anafi_mav")
 
@@ -135,6 +135,13 @@ class MediaClient:
             raise RemoteProtocolError(f"no MD5 of {resource.resource_id}")
         return md5.lower()
 
+    async def known_md5(self, resource: Resource) -> str | None:
+        """Return the MD5 of a file; None when the drone has none."""
+        try:
+            return await self.md5(resource)
+        except (CommandRejected, RemoteProtocolError):
+            return None
+
     async def thumbnail(self, of: MediaItem | Resource) -> bytes:
         """Return a small JPEG. Raises `CommandRejected` when the drone has none."""
         if not of.thumbnail:
@@ -147,6 +154,15 @@ class MediaClient:
         Where its bytes begin (0 where the web server has no ranges), and the bytes.
         """
         return self._rest.open_file(resource.url, offset, resource.size)
+
+    async def read_from(self, resource: Resource, offset: int = 0) -> AsyncGenerator[bytes, None]:
+        """Iterate over the bytes of a file from `offset` on, for its only reader."""
+        async with self.open(resource, offset) as (start, chunks):
+            skipped = offset - start
+            async for chunk in chunks:
+                if len(chunk) > skipped:
+                    yield chunk[skipped:]
+                skipped = max(skipped - len(chunk), 0)
 
     async def delete(self, media_id: str) -> None:
         """Delete a media with all its files."""
@@ -228,6 +244,10 @@ class Media(Commanding[MediaState]):
     async def md5(self, resource: Resource) -> str:
         """Return the MD5 of a file on the drone, hexadecimal."""
         return await self._available().md5(resource)
+
+    async def known_md5(self, resource: Resource) -> str | None:
+        """Return the MD5 of a file; None when the drone has none."""
+        return await self._available().known_md5(resource)
 
     async def thumbnail(self, of: MediaItem | Resource) -> bytes:
         """Return a small JPEG. Raises `CommandRejected` when the drone has none."""

@@ -60,9 +60,9 @@ MAX_REPETITIONS = 16
 another number."""
 
 RESTARTED = 1 << 15
-"""Distance of a sequence number from the last kept one, modulo 2**16, from which it is an older number.
+"""Distance from one sequence number to another, modulo 2**16, from which the second is not newer.
 
-A client that restarts counts from the beginning, and its TerminateSession may equal one of before.
+A client that restarts counts from the beginning, and its TerminateSession may equal the one whose answer is kept.
 """
 
 _HEADER = struct.Struct("<HBBBBBBI")
@@ -301,7 +301,7 @@ class FtpServer:
         if client.kept is not None:
             if client.kept[0] == request:
                 return client.kept[1]
-            if request.seq - client.kept[0].seq & 0xFFFF >= RESTARTED:
+            if not 0 < (request.seq - client.kept[0].seq) % (2 * RESTARTED) < RESTARTED:
                 client.kept = None
         if self._waits(client, request) or (len(client.waits) >= MAX_WAITS and request.opcode not in _SHORT):
             return None
