@@ -183,7 +183,7 @@ JUST_TAKEN_OFF = Reason("took off, drone is landing")
 # == Reasons: bounds ==
 
 NOT_A_NUMBER = Reason("not a number")
-TOO_LOW = ReasonTemplate("{height:.1f} m < {lowest:.1f} m", height=-99999.9, lowest=-999.9)
+TOO_LOW = ReasonTemplate("relative {height:.1f} m < {lowest:.1f} m", height=-99999.9, lowest=-999.9)
 ABOVE_CEILING = ReasonTemplate("{height:.1f} m > ceiling {ceiling:g} m", height=99999.9, ceiling=4000.5)
 NEAR_ESTIMATE = ReasonTemplate("estimated AMSL: {height:.0f} m < {lowest:g} m", height=-99, lowest=15)
 NOT_ON_EARTH = Reason("not a place on earth")
@@ -567,6 +567,8 @@ MEDIA_NOT_INDEXED = OperatorText("Media unavailable: drone indexes its storage")
 MEDIA_UNAVAILABLE = Template("Media unavailable: {error}", error=BELOW)
 FILE_TOO_LARGE = OperatorText("File too large for FTP: use media download")
 FILE_DAMAGED = OperatorText("File damaged: MD5 is not the drone's")
+MEDIA_COPIED = Template("Media copied: {count} file(s)", count=99999)
+MEDIA_NOT_COPIED = Template("Media not copied: {error}", error=BELOW)
 DELETE = Subject("Delete")
 CAMERA_SAVING = Reason("camera is saving photos")
 
