@@ -239,6 +239,7 @@ NO_PLACE = Reason("no position given")
 ROI_KINDS = Reason("only a location or none")
 NO_SUCH_GIMBAL = ReasonTemplate("no gimbal {number:g}", number=-1.23457e-38)
 NO_GIMBAL = Reason("drone reports no gimbal")
+GIMBAL_CALIBRATES = Reason("gimbal calibration runs")
 NO_RETRACT = Reason("cannot retract")
 TWO_YAW_FRAMES = Reason("both yaw frame flags")
 GIMBAL_ANGLE = Reason("angle beyond 360 deg")
@@ -587,6 +588,7 @@ BANNER_DRONE = Template(
 )  # fmt: skip
 TUNE_REFUSED = OperatorText("Tune refused: drone is not on the ground")
 TUNE_FAILED = Template("Tune not played: {error}", error=BELOW)
+CONTROLLER_INPUTS = Template("Wheels, buttons not read: {error}", error=BELOW)
 NO_EXPOSURE = Template("Exposure unknown: no video: {error}", error=BELOW)
 NO_PICTURES = Template("Pose from events: no video: {error}", error=BELOW)
 

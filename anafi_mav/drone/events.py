@@ -39,6 +39,7 @@ from anafi_mav.arsdk.messages.ardrone3 import MoveToChanged as MoveToChanged
 from anafi_mav.arsdk.messages.ardrone3 import MoveToStatus as MoveToStatus
 from anafi_mav.arsdk.messages.ardrone3 import NoFlyOverMaxDistanceChanged as NoFlyOverMaxDistanceChanged
 from anafi_mav.arsdk.messages.ardrone3 import NumberOfSatelliteChanged as NumberOfSatelliteChanged
+from anafi_mav.arsdk.messages.ardrone3 import OrientationMode as OrientationMode
 from anafi_mav.arsdk.messages.ardrone3 import PilotedPOIV2 as PilotedPOIV2
 from anafi_mav.arsdk.messages.ardrone3 import PoiMode as PoiMode
 from anafi_mav.arsdk.messages.ardrone3 import PoiStatus as PoiStatus
@@ -81,6 +82,7 @@ from anafi_mav.arsdk.messages.mediastore import MediastoreState as MediastoreSta
 from anafi_mav.arsdk.messages.obstacle_avoidance import Mode as ObstacleAvoidanceMode
 from anafi_mav.arsdk.messages.obstacle_avoidance import Status as ObstacleAvoidanceStatus
 from anafi_mav.arsdk.messages.piloting_style import PilotingStyleStyle as PilotingStyleStyle
+from anafi_mav.arsdk.messages.piloting_style import Style as PilotingStyle
 from anafi_mav.arsdk.messages.precise_home import Mode as PreciseHomeModeChanged
 from anafi_mav.arsdk.messages.precise_home import PreciseHomeMode as PreciseHomeMode
 from anafi_mav.arsdk.messages.precise_home import PreciseHomeState as PreciseHomeState
@@ -181,10 +183,12 @@ __all__ = [
     "NumberOfSatelliteChanged",
     "ObstacleAvoidanceMode",
     "ObstacleAvoidanceStatus",
+    "OrientationMode",
     "PaletteMode",
     "PhyState",
     "PilotedPOIV2",
     "PilotingSource",
+    "PilotingStyle",
     "PilotingStyleStyle",
     "PlayError",
     "PlayMode",

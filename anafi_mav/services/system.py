@@ -44,6 +44,7 @@ from anafi_mav.services.media.media_service import MediaService
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.monitor import takeoff_point_service
 from anafi_mav.services.monitor.aborted_return_service import AbortedReturnService
+from anafi_mav.services.monitor.controller_input_service import ControllerInputService
 from anafi_mav.services.monitor.link_loss_service import LinkLossService
 from anafi_mav.services.monitor.pilot_service import PilotService
 from anafi_mav.services.monitor.roll_sign_service import RollSignService
@@ -54,6 +55,7 @@ from anafi_mav.services.plan.fence_service import FenceService
 from anafi_mav.services.plan.mission_service import MissionService
 from anafi_mav.services.plan.plan_service import PlanService
 from anafi_mav.services.plan.rally_service import RallyService
+from anafi_mav.services.pose import UNKNOWN_POSE, VehiclePose
 from anafi_mav.services.service import Service
 from anafi_mav.services.setpoint.follow_service import FollowService
 from anafi_mav.services.setpoint.manual_control_service import ManualControlService
@@ -108,6 +110,7 @@ AUTOPILOT_SERVICES: tuple[type[Service], ...] = (
     TakeoffPointService,
     VideoTelemetryService,
     PilotService,
+    ControllerInputService,
 )
 """Services of component 1, beside commands, messages and files themselves."""
 
@@ -208,6 +211,9 @@ class System:
             if isinstance(service, PlanService):
                 service.take_tables(joined(service.item_commands() for service in self._autopilot.services))
         self._ticking = [service for service in self.services if type(service).tick is not Service.tick]
+        self._on_change = [
+            service for service in self.services if type(service).state_changed is not Service.state_changed
+        ]
         self._subscribed: dict[type[Message], tuple[EventHandler, ...]] = {}
         """The handlers of each kind of event, in the order in which they are called."""
 
@@ -347,10 +353,10 @@ class System:
         task.add_done_callback(self._tasks.discard)
         return task
 
-    def times(self, at: float | None = None) -> Times:
+    def times(self, at: float | None = None, pose: VehiclePose = UNKNOWN_POSE) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
         ns = round(((self.clock.monotonic() if at is None else at) - self._started) * 1e9)
-        return Times(ns, ns // 1_000, ns // 1_000_000 & 0xFFFFFFFF)
+        return Times(ns, ns // 1_000, ns // 1_000_000 & 0xFFFFFFFF, pose=pose)
 
     # The heart.
 
@@ -434,7 +440,7 @@ class System:
             self._hold_mode(last)
             if not disarmed:
                 self.send_heartbeat()
-        for service in self.services:
+        for service in self._on_change:
             service.state_changed()
         if disarmed:
             self.send_heartbeat()

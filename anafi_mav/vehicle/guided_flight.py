@@ -16,6 +16,7 @@ from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import check_height, check_place
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.move_heading import oriented
 from anafi_mav.vehicle.base.refusal import Refused
 
 SAME_HEIGHT = 0.1
@@ -33,7 +34,7 @@ class Goto:
     ato: float
     """m above take-off."""
     yaw: float | None
-    """rad, clockwise from north; None keeps the heading."""
+    """rad, clockwise from north; None: by the vehicle's `move_heading`."""
     speed: float | None
     """m/s over ground, of this move only; None: the vehicle's cruise speed."""
     mode: FlightMode
@@ -96,8 +97,8 @@ class GuidedFlight:
     ) -> None:
         """Go to a place, height (m, above take-off) and heading (rad).
 
-        None keeps the present value; for the place also the target of a move under way (as PX4 does). Returns when
-        the drone moves; a change of height without a GPS fix returns at its end.
+        None keeps the present value; for the place also the target of a move under way (as PX4 does), for the heading
+        see `move_heading`. Returns when the drone moves; a change of height without a GPS fix returns at its end.
 
         `speed` (m/s over ground) counts for this move only. `mode` is Hold or Guided.
         """
@@ -135,14 +136,16 @@ class GuidedFlight:
             raise Refused(texts.GOTO, vehicle.activity)
         vehicle.select(goto.mode)
         before, self._goto = self._goto, goto
+        orientation, heading = oriented(vehicle.move_heading, vehicle.place, goto.place, goto.yaw)
         try:
             await vehicle.drone.piloting.move_to(
                 goto.place.latitude,
                 goto.place.longitude,
                 goto.ato,
-                heading_deg=None if goto.yaw is None else units.wrap_360(goto.yaw * units.DEG_PER_RAD),
+                heading_deg=heading,
                 horizontal_speed=vehicle.cruise_speed if goto.speed is None else goto.speed,
                 vertical_speed=vehicle.climb_speed,
+                orientation=orientation,
             )
         except BaseException:
             self._goto = before  # a refused one must not be flown by the next change of height or speed

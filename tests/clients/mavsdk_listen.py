@@ -104,6 +104,19 @@ async def first(telemetry: TelemetryAsync, name: str, accept: Callable[[Any], bo
     return None
 
 
+async def rate(telemetry: TelemetryAsync, name: str, count: int = 60) -> float:
+    """Hz of so many samples in a row, by their own times; those of events, 0.2 s apart, begin again."""
+    times: list[float] = []
+    async for value in getattr(telemetry, f"subscribe_{name}")():
+        stamp = (value.time_usec if name == "odometry" else value.timestamp_us) / 1e6
+        if times and stamp - times[-1] > 0.15:
+            times.clear()
+        times.append(stamp)
+        if len(times) == count:
+            break
+    return (len(times) - 1) / (times[-1] - times[0])
+
+
 async def main(url: str) -> None:
     async with connected(url) as drone:
         telemetry, info, action = TelemetryAsync(drone), InfoAsync(drone), ActionAsync(drone)
@@ -131,6 +144,9 @@ async def main(url: str) -> None:
         await asyncio.wait_for(first(telemetry, "position", lambda p: p.relative_altitude_m > 2.5), 20.0)
         for name in ("landed_state", "armed", "distance_sensor", "position"):
             say(f"flying {name}", await asyncio.wait_for(first(telemetry, name), 10.0))
+        for name in ("attitude_quaternion", "odometry"):
+            await getattr(telemetry, f"set_rate_{name}")(30.0)
+            say(f"hz {name}", await asyncio.wait_for(rate(telemetry, name), 30.0))
         flights = info.subscribe_flight_information()
         say("flight_information", await asyncio.wait_for(flights.__anext__(), 10.0))
         say("speed_factor", await result(info.get_speed_factor))

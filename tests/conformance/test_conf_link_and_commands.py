@@ -245,8 +245,9 @@ async def test_conf_015_capabilities(flavour: str) -> None:
         await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)
         bits = (await w.client.wait("AUTOPILOT_VERSION", since=mark)).capabilities
         # MISSION_FLOAT 1, MISSION_INT 4, COMMAND_INT 8, FTP 32, SET_ATTITUDE_TARGET 64, SET_POSITION_TARGET_LOCAL_NED
-        # 128 and _GLOBAL_INT 256, MAVLINK2 8192, FENCE 16384, RALLY 32768; PARAM_ENCODE_BYTEWISE 16 or _C_CAST 131072
-        served = 1 | 4 | 8 | 32 | 64 | 128 | 256 | 8192 | 16384 | 32768
+        # 128 and _GLOBAL_INT 256, MAVLINK2 8192, FENCE 16384, RALLY 32768, COMPONENT_IMPLEMENTS_GIMBAL_MANAGER 262144;
+        # PARAM_ENCODE_BYTEWISE 16 or _C_CAST 131072
+        served = 1 | 4 | 8 | 32 | 64 | 128 | 256 | 8192 | 16384 | 32768 | 262144
         encoding = 16 if flavour == "px4" else 131072
         assert bits == served | encoding
     async with world(flavour=flavour, allow_kill=True) as w:

@@ -238,6 +238,7 @@ async def test_alias_and_native_parameter_are_one_value(flavour: str, row: tuple
 
 NATIVE_WRITES = [
     ("ANF_BANKED_TURN", 0, INT32, "ardrone3.PilotingSettings.BankedTurn", {"value": 0}),
+    ("ANF_CAM_RELATIVE", 1, INT32, "piloting_style.set_style", {"style": 1}),
     ("ANF_RTH_DELAY", 30, INT32, "rth.set_delay", {"delay": 30}),
     ("ANF_RTH_PRECISE", 0, INT32, "precise_home.set_mode", {"mode": 0}),
     ("ANF_HOME_TYPE", 3, INT32, "rth.set_preferred_home_type", {"type": 3}),

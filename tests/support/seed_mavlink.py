@@ -37,7 +37,10 @@ REACHED: dict[str, Reach] = {
         "`MAV_CMD_CONDITION_YAW`, `MAV_CMD_DO_CHANGE_ALTITUDE`; `SET_POSITION_TARGET_LOCAL_NED`",
         _GUIDED + "test_conf_143_condition_yaw",
     ),
-    "drone/moveto": Reach("`MAV_CMD_DO_REPOSITION`", _FLIGHT + "test_conf_029_goto"),
+    "drone/moveto": Reach(
+        "`MAV_CMD_DO_REPOSITION`; orientation mode: `ANF_YAW_MODE`",
+        "conformance/test_move_heading.py::test_goto_turns_as_the_parameter_demands",
+    ),
     "gimbal/command": Reach(
         "`MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW`, `GIMBAL_MANAGER_SET_ATTITUDE`",
         _GIMBAL + "test_conf_098_gimbal_is_device_1_of_the_autopilot",
@@ -55,7 +58,10 @@ REACHED: dict[str, Reach] = {
     "camera/exposure_time": Reach(
         "`ANAFI_CAMERA_EXPOSURE`.exposure_time", _ANAFI + "test_video_runs_while_a_stream_needs_its_metadata"
     ),
-    "camera/image": Reach("", waits=PAYLOAD),
+    "camera/image": Reach(
+        "`VIDEO_STREAM_INFORMATION`.uri, [RTSP](video.md)",
+        "conformance/test_conf_video.py::test_conf_091_each_uri_opens_once_its_stream_is_shown",
+    ),
     "camera/hfov": Reach("`ANAFI_CAMERA_EXPOSURE`.hfov", _ANAFI + "test_video_runs_while_a_stream_needs_its_metadata"),
     "camera/iso_gain": Reach(
         "`ANAFI_CAMERA_EXPOSURE`.iso", _ANAFI + "test_video_runs_while_a_stream_needs_its_metadata"
@@ -83,7 +89,8 @@ REACHED: dict[str, Reach] = {
     "link/quality": Reach("`RC_CHANNELS`.rssi, `ANAFI_LINK`.quality", _TELEMETRY + "test_conf_134_rssi"),
     "skycontroller/attitude": Reach("`ANAFI_CONTROLLER_ATTITUDE`", _ANAFI + "test_where_the_skycontroller_points"),
     "skycontroller/command": Reach(
-        "`ANAFI_CONTROLLER_INPUT`", _ANAFI + "test_skycontroller_sticks_are_reported_while_a_program_flies"
+        "`ANAFI_CONTROLLER_INPUT`, `RC_CHANNELS`; wheels and buttons with `ANF_SC_WHEELS`, `ANF_SC_BUTTONS`",
+        _ANAFI + "test_wheels_and_buttons_are_the_clients_on_request",
     ),
     "skycontroller/rpy": Reach("`ANAFI_CONTROLLER_ATTITUDE`", _ANAFI + "test_where_the_skycontroller_points"),
     "storage/available": Reach("", waits=PAYLOAD),
@@ -148,7 +155,7 @@ REACHED: dict[str, Reach] = {
         "extended parameter `CAM_ZOOMSPEED`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"
     ),
     "camera/mode": Reach("extended parameter `CAM_MODE`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"),
-    "camera/relative": Reach("", waits=PAYLOAD),
+    "camera/relative": Reach("`ANF_CAM_RELATIVE`", _PARAMETER),
     "camera/rendering": Reach(
         "extended parameter `CAM_THM_RENDER`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"
     ),

@@ -6,18 +6,23 @@ import asyncio
 import itertools
 import math
 import tempfile
-from contextlib import AsyncExitStack
+from collections.abc import Callable, Iterator
+from contextlib import AsyncExitStack, ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.config import Config, DroneConfig
+from anafi_mav.drone.video.video import VideoFrame
 from anafi_mav.gateway import Gateway
+from anafi_mav.services.system import System
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 from anafi_mav.sim.world.model import MODELS
 from anafi_mav.sim.world.wind import WindSpec
+from anafi_mav.vehicle.base.velocity_loop import MotionEstimate
 from support.mav import Client
 from support.roll_records import remember_roll
 from support.world import HOLD, HOME, TAKE_OFF_SPEED, TAKEOFF, loopback
@@ -64,13 +69,23 @@ async def velocity_step(
     yaw: float = 0.0,
     tilt: float = 35.0,
     rate: float = 5.0,
+    pictures: float | None = None,
 ) -> list[Figures]:
     """Every model steps from a hover to `speed` m/s towards `course` (rad) with its nose to `yaw` (rad).
 
-    `rate` is how often the drones tell how they move, Hz: five times on the aircraft.
+    `rate` is how often the drones tell how they move, Hz: five times on the aircraft. With `pictures` the loop knows
+    attitude and speed from the live video instead, whose pictures are this old (s) when they arrive.
     """
     specs = [
-        DroneSpec(model=model, address=loopback(), home=HOME, http_port=None, telemetry_rate=rate) for model in MODELS
+        DroneSpec(
+            model=model,
+            address=loopback(),
+            home=HOME,
+            http_port=None,
+            telemetry_rate=rate,
+            video_latency=pictures or 0.0,
+        )
+        for model in MODELS
     ]
     address = loopback()
     folder = tempfile.TemporaryDirectory()
@@ -96,6 +111,11 @@ async def velocity_step(
             simulator.speed = TAKE_OFF_SPEED
             await asyncio.gather(*(_take_off(client, number + 1) for number in range(len(specs))))
             simulator.speed = 1.0
+            if pictures is not None:
+                stack.enter_context(motion_by_pictures(gateway))
+                for sysid in range(1, len(specs) + 1):
+                    asked = dialect.MAV_CMD_SET_MESSAGE_INTERVAL, dialect.MAVLINK_MSG_ID_ATTITUDE, 1e6 / 30
+                    assert (await client.command(*asked, target=(sysid, 1))).result == dialect.MAV_RESULT_ACCEPTED
             wanted = [0.0, 0.0]
             stream = asyncio.ensure_future(_stream(client, len(specs), wanted, yaw))
             try:
@@ -113,6 +133,29 @@ async def velocity_step(
         finally:
             await client.close()
             await simulator.close()
+
+
+@contextmanager
+def motion_by_pictures(gateway: Gateway) -> Iterator[None]:
+    """Give every velocity loop attitude and speed of the pictures, with their own times, and not those of events."""
+    on_attitude, on_velocity = MotionEstimate.on_attitude, MotionEstimate.on_velocity
+
+    def follow(system: System) -> Callable[[], None]:
+        def show(frame: VideoFrame) -> None:
+            motion, attitude, speed = system.vehicle.offboard.motion, frame.attitude, frame.metadata.speed
+            assert attitude is not None
+            assert speed is not None
+            on_attitude(motion, attitude.roll, attitude.pitch, attitude.yaw, frame.shot)
+            on_velocity(motion, speed.north, speed.east, speed.down, frame.shot)
+
+        return system.drone.video.subscribe(show)
+
+    with ExitStack() as stack, pytest.MonkeyPatch.context() as patch:
+        for system in gateway.systems:
+            stack.callback(follow(system))
+        patch.setattr(MotionEstimate, "on_attitude", lambda *_: None)
+        patch.setattr(MotionEstimate, "on_velocity", lambda *_: None)
+        yield
 
 
 async def _take_off(client: Client, sysid: int) -> None:

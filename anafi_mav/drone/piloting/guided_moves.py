@@ -32,6 +32,8 @@ FASTEST = 16.0
 """m/s over ground, the Ai's top speed (anafi_ros paper, table I): stands for "no limit" where Parrot has no word for it
 and another limit is given."""
 
+_WITH_HEADING = (OrientationMode.HEADING_START, OrientationMode.HEADING_DURING)
+
 
 class GuidedMoves:
     """The moves that are verbs. `Piloting` says what its verbs of the same names promise."""
@@ -98,14 +100,19 @@ class GuidedMoves:
         horizontal_speed: float | None,
         vertical_speed: float | None,
         timeout: float,
+        orientation: OrientationMode | None,
     ) -> Move:
         if not math.isfinite(
             latitude + longitude + altitude + (heading_deg or 0.0) + (horizontal_speed or 0.0) + (vertical_speed or 0.0)
         ):
             raise LocalProtocolError("a target is not a number")
+        if orientation is None:
+            orientation = OrientationMode.NONE if heading_deg is None else OrientationMode.HEADING_DURING
+        if (heading_deg is not None) != (orientation in _WITH_HEADING):
+            raise LocalProtocolError(f"a moveTo with orientation {orientation.name} and heading {heading_deg}")
         self.require_free()
         target = self._moves.distinct(Position(latitude, longitude, altitude))
-        command = self._move_to_command(target, heading_deg, horizontal_speed, vertical_speed)
+        command = self._move_to_command(target, orientation, heading_deg, horizontal_speed, vertical_speed)
         move = Move(self._commander.expect((), _decided_elsewhere), target)
         self._sticks.let_go()
         self._commander.abort_pending("a move was asked for")
@@ -127,11 +134,11 @@ class GuidedMoves:
     def _move_to_command(
         self,
         to: Position,
+        mode: OrientationMode,
         heading_deg: float | None,
         horizontal_speed: float | None,
         vertical_speed: float | None,
     ) -> Message:
-        mode = OrientationMode.NONE if heading_deg is None else OrientationMode.HEADING_DURING
         heading = 0.0 if heading_deg is None else wrap_360(heading_deg)
         if horizontal_speed is None and vertical_speed is None:
             return ardrone3.MoveTo(to.latitude, to.longitude, to.altitude, mode, heading)

@@ -20,7 +20,7 @@ from typing import Any, ClassVar
 
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import animation, ardrone3, common, follow_me, rth
-from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveToStatus, PoiStatus
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveToStatus, OrientationMode, PoiStatus
 from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.drone.element import Reducer
@@ -247,15 +247,18 @@ class Piloting(PilotingSettings):
         horizontal_speed: float | None = None,
         vertical_speed: float | None = None,
         timeout: float = ANSWER_TIMEOUT,
+        orientation: OrientationMode | None = None,
     ) -> Move:
         """Fly to a place (deg, deg, m above take-off); returns when the drone is on its way.
 
-        `heading_deg` (clockwise from north) is turned to on the way; None keeps the heading. `horizontal_speed`
-        and `vertical_speed` (m/s) limit the speed; None leaves it to the drone. `Move.result` waits for the
-        end. A newer moveTo replaces an older one.
+        `heading_deg` (clockwise from north) is turned to on the way; None keeps the heading. `orientation` is another
+        way to turn: TO_TARGET turns to the place before the drone moves, HEADING_START to `heading_deg`.
+        `horizontal_speed` and `vertical_speed` (m/s) limit the speed; None leaves it to the drone. `Move.result` waits
+        for the end. A newer moveTo replaces an older one.
+        Raises `LocalProtocolError` for a heading that the orientation does not use, or lacks.
         """
         return await self._guided.move_to(
-            latitude, longitude, altitude, heading_deg, horizontal_speed, vertical_speed, timeout
+            latitude, longitude, altitude, heading_deg, horizontal_speed, vertical_speed, timeout, orientation
         )
 
     # -- home

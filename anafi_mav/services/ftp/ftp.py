@@ -59,6 +59,12 @@ MAX_REPETITIONS = 16
 """Sequence numbers under which one waiting request is answered: QGroundControl repeats it three times, each time with
 another number."""
 
+RESTARTED = 1 << 15
+"""Distance from one sequence number to another, modulo 2**16, from which the second is not newer.
+
+A client that restarts counts from the beginning, and its TerminateSession may equal the one whose answer is kept.
+"""
+
 _HEADER = struct.Struct("<HBBBBBBI")
 
 
@@ -217,7 +223,10 @@ class _Client:
     """Those that are open."""
     waits: list[Wait] = field(default_factory=list)
     kept: tuple[FtpRequest, bytes] | None = None
-    """The last request of `_KEPT` and its answer, which a repetition gets again."""
+    """The last request of `_KEPT` and its answer, which a repetition gets again.
+
+    Opening a file drops it: a client may number its requests from 0 again for each file.
+    """
     seen: float = 0.0
 
 
@@ -292,8 +301,11 @@ class FtpServer:
         client.seen = now
         if len(self._clients) > MAX_CLIENTS:
             self._drop(next(iter(self._clients)))
-        if client.kept is not None and client.kept[0] == request:
-            return client.kept[1]
+        if client.kept is not None:
+            if client.kept[0] == request:
+                return client.kept[1]
+            if not 0 < (request.seq - client.kept[0].seq) % (2 * RESTARTED) < RESTARTED:
+                client.kept = None
         if self._waits(client, request) or (len(client.waits) >= MAX_WAITS and request.opcode not in _SHORT):
             return None
         try:

@@ -12,13 +12,14 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from anafi_mav.drone import MODELS, Drone, Range, events
-from anafi_mav.drone.events import Axis, PreciseHomeMode, RthEndingBehavior, RthHomeType
+from anafi_mav.drone.events import Axis, PilotingStyleStyle, PreciseHomeMode, RthEndingBehavior, RthHomeType
 from anafi_mav.drone.events import ObstacleAvoidanceMode as AvoidanceMode
 from anafi_mav.services.parameter.parameter import Limits, Parameter, bounds, current, number, own
 from anafi_mav.services.parameter.parameter_codec import ParamType
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.base.bounds import LOWEST
 from anafi_mav.vehicle.base.link_loss import LossAction
+from anafi_mav.vehicle.base.move_heading import MoveHeading
 from anafi_mav.vehicle.joystick_override import Override
 from anafi_mav.vehicle.offboard.stream import GUIDED_TIMEOUT, LONGEST_TIMEOUT, SHORTEST_TIMEOUT
 from anafi_mav.vehicle.return_end import LONGEST_WAIT, SHORTEST_WAIT, EndOfReturn
@@ -88,7 +89,8 @@ def _switch(
     )
 
 
-FLIGHT, HOME, GIMBAL, GATEWAY = "ANAFI flight", "ANAFI home", "ANAFI gimbal", "Gateway"
+FLIGHT, HOME, GIMBAL, CONTROLLER = "ANAFI flight", "ANAFI home", "ANAFI gimbal", "Skycontroller"
+GATEWAY = "Gateway"
 
 MAX_TILT = _range(
     "ANF_MAX_TILT",
@@ -175,6 +177,20 @@ GEOFENCE = _switch(
     lambda drone: drone.piloting.set_geofence,
     events.NoFlyOverMaxDistanceChanged,
     group=FLIGHT,
+)
+CAMERA_RELATIVE = Parameter(
+    "ANF_CAM_RELATIVE",
+    ParamType.INT32,
+    "Stick input is relative to the direction of the camera",
+    read=lambda host: number(host.drone.piloting.state.style),
+    write=lambda host, value: host.drone.piloting.set_style(PilotingStyleStyle(int(value))),
+    values=OFF_ON,
+    updates=(events.PilotingStyle,),
+    present=lambda drone: drone.piloting.state.style is not None,
+    group=FLIGHT,
+    long="Also of a Skycontroller. On: velocity setpoints, follow and orbit are refused, since their loops need the "
+    "drone's own axes.",
+    source=events.PilotingStyle.NAME,
 )
 BANKED_TURN = _switch(
     "ANF_BANKED_TURN",
@@ -329,6 +345,36 @@ GIMBAL_SPEED = _range(
     step=1.0,
     group=GIMBAL,
 )
+CONTROLLER_WHEELS = Parameter(
+    "ANF_SC_WHEELS",
+    ParamType.INT32,
+    "Clients read the Skycontroller's two wheels",
+    read=lambda host: number(host.vehicle.controller_inputs.wheels),
+    write=lambda host, value: host.vehicle.controller_inputs.request_wheels(value == 1),
+    values=OFF_ON,
+    updates=(events.GrabState,),
+    present=lambda drone: drone.controller.present,
+    group=CONTROLLER,
+    long="On: RC_CHANNELS 5 (tilt) and 6 (zoom) and ANAFI_CONTROLLER_INPUT report them. They do not move camera and "
+    "zoom.",
+    source=events.GrabState.NAME,
+    models="behind a Skycontroller",
+)
+CONTROLLER_BUTTONS = Parameter(
+    "ANF_SC_BUTTONS",
+    ParamType.INT32,
+    "Clients read the two buttons at the Skycontroller's back",
+    read=lambda host: number(host.vehicle.controller_inputs.buttons),
+    write=lambda host, value: host.vehicle.controller_inputs.request_buttons(value == 1),
+    values=OFF_ON,
+    updates=(events.GrabState,),
+    present=lambda drone: drone.controller.present,
+    group=CONTROLLER,
+    long="On: RC_CHANNELS 7 (left) and 8 (right) and ANAFI_CONTROLLER_INPUT report them. They do not reset camera "
+    "and zoom. Return home and take-off/land are always the pilot's.",
+    source=events.GrabState.NAME,
+    models="behind a Skycontroller",
+)
 MODEL = Parameter(
     "ANF_MODEL",
     ParamType.INT32,
@@ -445,6 +491,31 @@ CLIMB_SPEED = Parameter(
     long="0: the drone's default. MAV_CMD_DO_CHANGE_SPEED sets the same value.",
     default=0.0,
     source="gateway; up to the maximum of ANF_VERT_SPEED",
+)
+
+
+def _put_yaw_mode(host: Host, value: float) -> None:
+    host.vehicle.move_heading = MoveHeading(int(value))
+
+
+YAW_MODE = Parameter(
+    "ANF_YAW_MODE",
+    ParamType.INT32,
+    "Heading of a move to a place whose command names none",
+    read=lambda host: float(host.vehicle.move_heading),
+    write=own(_put_yaw_mode),
+    put=_put_yaw_mode,
+    values={
+        int(MoveHeading.KEEP): "Keep the heading",
+        int(MoveHeading.TO_TARGET): "Turn to the target on the way",
+        int(MoveHeading.TO_TARGET_FIRST): "Turn to the target, then move",
+    },
+    polled=True,
+    group=GATEWAY,
+    long="From the next move on. With 2, a heading that a command names is also turned to before the drone moves. "
+    "Not for PX4's Offboard, which keeps the heading, nor for missions, whose way points look to the next one.",
+    default=float(MoveHeading.KEEP),
+    source="gateway",
 )
 
 
@@ -607,6 +678,7 @@ NATIVE: tuple[Parameter, ...] = (
     MAX_DISTANCE,
     GEOFENCE,
     BANKED_TURN,
+    CAMERA_RELATIVE,
     AVOIDANCE,
     RETURN_ALTITUDE,
     RETURN_END_ALTITUDE,
@@ -617,11 +689,14 @@ NATIVE: tuple[Parameter, ...] = (
     PRECISE_HOME,
     HOME_TYPE,
     GIMBAL_SPEED,
+    CONTROLLER_WHEELS,
+    CONTROLLER_BUTTONS,
     MODEL,
     TAKEOFF_HEIGHT,
     HAND_LAUNCH,
     CRUISE_SPEED,
     CLIMB_SPEED,
+    YAW_MODE,
     GCS_LOSS,
     GCS_LOSS_TIME,
     RETURN_LANDING,

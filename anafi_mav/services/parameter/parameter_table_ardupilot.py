@@ -29,6 +29,7 @@ from anafi_mav.services.parameter.parameter_table import (
     RETURN_WAIT,
     TILT_RATE,
     VERTICAL_SPEED,
+    YAW_MODE,
     YAW_RATE,
     put_end_of_return,
 )
@@ -36,6 +37,7 @@ from anafi_mav.services.parameter.parameter_table_fence import FENCE_ARDUPILOT
 from anafi_mav.services.parameter.parameter_table_setup import SETUP_ARDUPILOT
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.base.link_loss import LossAction
+from anafi_mav.vehicle.base.move_heading import MoveHeading
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.return_end import EndOfReturn
 from anafi_mav.vehicle.takeoff import AUTO_DISARM
@@ -102,6 +104,13 @@ ALIASES: tuple[Parameter, ...] = (
     alias(CRUISE_SPEED, "WPNAV_SPEED", scale=CM, unit="cm/s", decimals=0),
     alias(CLIMB_SPEED, "WPNAV_SPEED_UP", scale=CM, unit="cm/s", decimals=0),
     alias(CLIMB_SPEED, "WPNAV_SPEED_DN", scale=CM, unit="cm/s", decimals=0),
+    mapped(
+        YAW_MODE,
+        "WP_YAW_BEHAVIOR",
+        ParamType.INT8,
+        {0: "Never change the heading", 2: "Face the target, except in a return"},
+        {0: MoveHeading.KEEP, 2: MoveHeading.TO_TARGET},
+    ),
     alias(MAX_ALTITUDE, "FENCE_ALT_MAX"),
     alias(MAX_DISTANCE, "FENCE_RADIUS"),
     alias(RETURN_ALTITUDE, "RTL_ALT", ParamType.INT32, scale=CM, unit="cm", decimals=0),

@@ -34,6 +34,7 @@ from anafi_mav.services.parameter.parameter_table import (
     TAKEOFF_HEIGHT,
     TILT_RATE,
     VERTICAL_SPEED,
+    YAW_MODE,
     YAW_RATE,
     put_end_of_return,
     put_return_wait,
@@ -42,6 +43,7 @@ from anafi_mav.services.parameter.parameter_table_fence import FENCE_PX4
 from anafi_mav.services.parameter.parameter_table_follow import FOLLOW_PX4
 from anafi_mav.services.parameter.parameter_table_setup import SETUP_PX4
 from anafi_mav.services.service import Host
+from anafi_mav.vehicle.base.move_heading import MoveHeading
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.silence import SILENCE
 from anafi_mav.vehicle.return_end import LONGEST_WAIT, EndOfReturn
@@ -168,6 +170,13 @@ ALIASES: tuple[Parameter, ...] = (
     alias(CRUISE_SPEED, "MPC_XY_CRUISE"),
     alias(CLIMB_SPEED, "MPC_Z_V_AUTO_UP"),
     alias(CLIMB_SPEED, "MPC_Z_V_AUTO_DN"),
+    mapped(
+        YAW_MODE,
+        "MPC_YAW_MODE",
+        ParamType.INT32,
+        {0: "Towards the target", 4: "Towards the target, heading first", 5: "Fixed"},
+        {0: MoveHeading.TO_TARGET, 4: MoveHeading.TO_TARGET_FIRST, 5: MoveHeading.KEEP},
+    ),
     alias(MAX_ALTITUDE, "GF_MAX_VER_DIST"),
     FENCE_RADIUS,
     mapped(

@@ -23,6 +23,7 @@ from anafi_mav.vehicle.base.geo_point import GeoPoint, point_of
 from anafi_mav.vehicle.base.height import HeightReference
 from anafi_mav.vehicle.base.helm import Helm
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.move_heading import MoveHeading
 from anafi_mav.vehicle.base.right import Right
 from anafi_mav.vehicle.base.roll_sign import RollCheck
 from anafi_mav.vehicle.base.severity import Severity
@@ -73,6 +74,8 @@ class Aircraft(ABC):
         """m/s over ground that moves keep to; None: the drone's own (MAV_CMD_DO_CHANGE_SPEED)."""
         self.climb_speed: float | None = None
         """m/s up and down that moves keep to; None: the drone's own."""
+        self.move_heading = MoveHeading.KEEP
+        """Heading of moves whose command names none."""
         self.origin: GeoPoint | None = None
         """Origin of the local frame: where the drone last took off, or first stood with a fix."""
         self.fence = FenceWatch()

@@ -17,6 +17,8 @@ from anafi_mav.drone import MoveEnd
 from anafi_mav.errors import AnafiMavError, LinkLost
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.move_heading import MoveHeading, oriented
 from anafi_mav.vehicle.base.refusal import Rejected, reason_of
 from anafi_mav.vehicle.offboard.goals import Goal
 
@@ -114,15 +116,29 @@ class OffboardMoves:
         height = present if goal.height is None else goal.height
         if height is None:
             raise Rejected(texts.HEIGHT_UNKNOWN)
+        orientation, heading = oriented(self._move_heading, vehicle.place, goal.place, yaw)
         move = await piloting.move_to(
             goal.place.latitude,
             goal.place.longitude,
             height,
-            heading_deg=None if yaw is None else units.wrap_360(yaw * units.DEG_PER_RAD),
+            heading_deg=heading,
             horizontal_speed=vehicle.cruise_speed,
             vertical_speed=vehicle.climb_speed,
+            orientation=orientation,
         )
         move.ended.add_done_callback(lambda ended: self._ended(wanted, ended.result()))
+
+    @property
+    def _move_heading(self) -> MoveHeading:
+        """Return the rule for a place without a heading.
+
+        PX4's Offboard keeps the heading, ArduPilot's Guided follows WP_YAW_BEHAVIOR. A stream of places never turns
+        first: the drone would stop at each of them.
+        """
+        rule = self._vehicle.move_heading
+        if self._vehicle.selected is not FlightMode.GUIDED or rule is MoveHeading.KEEP:
+            return MoveHeading.KEEP
+        return MoveHeading.TO_TARGET
 
     def _by(self, wanted: _Wanted, front: float, right: float, down: float, yaw: float | None) -> None:
         piloting = self._vehicle.drone.piloting
