@@ -41,6 +41,7 @@ from anafi_mav.vehicle.base.flying import ON_GROUND
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.web.definition_routes import DefinitionRoutes
 from anafi_mav.web.live_page import DroneEntry, LivePage
+from anafi_mav.web.live_video import LiveVideo
 from anafi_mav.web.media_routes import MediaRoutes
 from anafi_mav.web.server import HttpServer
 
@@ -174,7 +175,7 @@ class _Supervised:
         serial = self.drone.identity.serial if self.system.active else ""
         return HeldDrone(self.config.name, self.config.address, self.config.interface, serial)
 
-    def entry(self) -> DroneEntry:
+    def entry(self, *, has_video: bool) -> DroneEntry:
         """Return the drone as the page for browsers lists it."""
         connected = self.system.active
         return DroneEntry(
@@ -183,6 +184,7 @@ class _Supervised:
             model=self.drone.identity.model.title if connected else "",
             connected=connected,
             problem="" if connected else self.problem or "no answer yet",
+            stream=self.drone.streams.shown.kind.value if connected and has_video else "",
         )
 
     def line(self) -> str:
@@ -230,7 +232,9 @@ class Gateway:
         self.web = None if http is None else HttpServer(http.host, http.port)
         """The web server; None when it is configured off. Routes are added before `open`."""
         if self.web is not None:
-            LivePage(self.web, lambda: [supervised.entry() for supervised in self._supervised])
+            LivePage(self.web, self._entries)
+            if self.relay is not None:
+                LiveVideo(self.web, self.relay.source)
             MediaRoutes(self.web, self._drone)
             DefinitionRoutes(self.web, self._definition)
 
@@ -344,6 +348,9 @@ class Gateway:
             return GatewayUris()
         hint = texts.VIDEO_NEEDS_PUBLIC_HOST if self.relay.is_open_to_network else texts.VIDEO_NEEDS_HOST
         return GatewayUris(rtsp=self.relay.url_for, rtsp_hint=hint)
+
+    def _entries(self) -> list[DroneEntry]:
+        return [supervised.entry(has_video=self.relay is not None) for supervised in self._supervised]
 
     async def ready(self, timeout: float) -> bool:
         """Wait until each drone is connected or one attempt has failed.

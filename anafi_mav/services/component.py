@@ -126,8 +126,10 @@ class Component:
         self.services: list[Service] = [self.commands, self.messages, self._ftp]
         self.services += [kind(self) for kind in services]
         self.capabilities: int = 0
+        self.camera_flags: int = 0
         for service in self.services:
             self.capabilities |= service.capabilities()
+            self.camera_flags |= service.camera_flags()
         self.telemetry: frozenset[int] = frozenset()
         """Messages that the next one of their kind replaces: a full channel drops them rather than answers."""
         self._handlers: dict[int, MessageHandler] = {}

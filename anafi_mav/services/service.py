@@ -59,6 +59,8 @@ class Host(Protocol):
     """True when the configuration allows pose from the live video."""
     definition: DefinitionLink
     """Camera definition of the component."""
+    camera_flags: int
+    """CAMERA_CAP_FLAGS of all services of the component that do not depend on the drone."""
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -160,6 +162,10 @@ class Service:
 
     def capabilities(self) -> int:
         """MAV_PROTOCOL_CAPABILITY bits that this service is the reason for."""
+        return 0
+
+    def camera_flags(self) -> int:
+        """CAMERA_CAP_FLAGS bits that this service is the reason for."""
         return 0
 
     def messages(self) -> Mapping[int, MessageHandler]:

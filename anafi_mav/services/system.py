@@ -20,6 +20,9 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.mavlink.router import EVERY_COMPONENT
+from anafi_mav.services.camera.camera_service import CameraService
+from anafi_mav.services.camera.capture_service import CaptureService
+from anafi_mav.services.camera.storage_service import StorageService
 from anafi_mav.services.camera_definition.param_ext_service import ParamExtService
 from anafi_mav.services.command.calibration_service import CalibrationService
 from anafi_mav.services.command.command_service import SETTLE
@@ -114,7 +117,15 @@ AUTOPILOT_SERVICES: tuple[type[Service], ...] = (
 )
 """Services of component 1, beside commands, messages and files themselves."""
 
-CAMERA_SERVICES: tuple[type[Service], ...] = (ParamExtService, MediaService, VideoStreamService, DownloadService)
+CAMERA_SERVICES: tuple[type[Service], ...] = (
+    CameraService,
+    CaptureService,
+    StorageService,
+    VideoStreamService,
+    ParamExtService,
+    MediaService,
+    DownloadService,
+)
 """Services of component 100."""
 
 AUTOPILOT = dialect.MAV_COMP_ID_AUTOPILOT1

@@ -89,10 +89,10 @@ class Notification(msgspec.Struct, frozen=True):
         return _item(self.data.get("media"))
 
 
-def _item(told: Any) -> MediaItem | None:
+def _item(received: Any) -> MediaItem | None:
     """Return a media of the drone; None when the data is not readable as one."""
     try:
-        return msgspec.convert(told, MediaItem, strict=False)
+        return msgspec.convert(received, MediaItem, strict=False)
     except (msgspec.ValidationError, RecursionError):
         return None
 
@@ -110,10 +110,10 @@ class MediaClient:
     async def list(self, *, newest_first: bool = True) -> tuple[MediaItem, ...]:
         """Return all media."""
         query = {"sort_order": "newest" if newest_first else "oldest"}
-        told = await self._rest.json("GET", f"{API}/medias", query=query)
-        if not isinstance(told, list):
-            raise RemoteProtocolError("the drone's list of media is none")
-        items = [_item(one) for one in told]
+        answer = await self._rest.json("GET", f"{API}/medias", query=query)
+        if not isinstance(answer, list):
+            raise RemoteProtocolError("the drone's list of media is not readable")
+        items = [_item(one) for one in answer]
         if None in items:
             log.warning("%d media of the drone are not readable", items.count(None))
         return tuple(item for item in items if item is not None)
@@ -127,13 +127,13 @@ class MediaClient:
 
     async def md5(self, resource: Resource) -> str:
         """Return the MD5 of a file on the drone, hexadecimal."""
-        told = resource.md5
-        if told is None:
+        md5 = resource.md5
+        if md5 is None:
             answer = await self._rest.json("GET", f"{API}/md5/{file_name(resource.resource_id)}")
-            told = answer.get("md5") if isinstance(answer, dict) else None
-        if not isinstance(told, str) or not told:
+            md5 = answer.get("md5") if isinstance(answer, dict) else None
+        if not isinstance(md5, str) or not md5:
             raise RemoteProtocolError(f"no MD5 of {resource.resource_id}")
-        return told.lower()
+        return md5.lower()
 
     async def known_md5(self, resource: Resource) -> str | None:
         """Return the MD5 of a file; None when the drone has none."""
@@ -145,7 +145,7 @@ class MediaClient:
     async def thumbnail(self, of: MediaItem | Resource) -> bytes:
         """Return a small JPEG. Raises `CommandRejected` when the drone has none."""
         if not of.thumbnail:
-            raise RemoteProtocolError("no thumbnail was told")
+            raise RemoteProtocolError("the drone has no thumbnail of it")
         return await self._rest.read("GET", of.thumbnail, limit=THUMBNAIL_LIMIT)
 
     def open(self, resource: Resource, offset: int = 0) -> OpenedFile:

@@ -223,10 +223,7 @@ class _Client:
     """Those that are open."""
     waits: list[Wait] = field(default_factory=list)
     kept: tuple[FtpRequest, bytes] | None = None
-    """The last request of `_KEPT` and its answer, which a repetition gets again.
-
-    Opening a file drops it: a client may number its requests from 0 again for each file.
-    """
+    """The last request of `_KEPT` and its answer, which a repetition gets again."""
     seen: float = 0.0
 
 

@@ -44,7 +44,8 @@ def test_handlers_of_several_tables_keep_table_order() -> None:
         ),
         (
             events.SpeedChanged,
-            "MessageService OrbitService FenceService RollSignService OffboardFlight FollowFlight HighLatencyService",
+            "MessageService OrbitService FenceService RollSignService OffboardFlight FollowFlight HighLatencyService "
+            "PhotoReporter",
         ),
         (events.MavlinkFilePlayingStateChanged, "MessageService MissionFlight System"),
         (events.MissionItemExecuted, "MissionFlight"),
