@@ -72,7 +72,9 @@ def times(client: Client, name: str, since: int) -> list[int]:
     return [m.time_boot_ms for _, m in client.since(since, name)]
 
 
-@pytest.mark.parametrize(("model", "quirk"), [("4k", None), ("4k", Quirk.ROLL_INVERTED), ("usa", None), ("ai", None)])
+@pytest.mark.parametrize(
+    ("model", "quirk"), [("4k", None), ("4k", Quirk.ROLL_INVERTED), ("thermal", None), ("usa", None), ("ai", None)]
+)
 async def test_pose_at_30_hz_is_the_truth_of_its_time(model: str, quirk: Quirk | None) -> None:
     async with world(model=model, speed=1.0, video_latency=LATENCY) as w:
         video = require_video(w)
