@@ -26,11 +26,9 @@ class Clock(Protocol):
 class SystemClock:
     """The machine's clocks."""
 
-    def monotonic(self) -> float:
-        return time.monotonic()
-
-    def time(self) -> float:
-        return time.time()
+    def __init__(self) -> None:
+        self.monotonic = time.monotonic
+        self.time = time.time
 
 
 class Alarm:

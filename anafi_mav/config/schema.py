@@ -316,7 +316,7 @@ class VideoConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         Annotated[str, Meta(min_length=1, max_length=64)] | None,
         Meta(
             description="The host in the URIs that stations receive, where it is not the address that their link "
-            "shows: behind NAT, in a container, or for stations on serial lines.",
+            "shows: behind a MAVLink router, NAT or a container, or for stations on serial lines.",
             extra=expected("an IPv4 address or a host name, like 10.0.0.7"),
         ),
     ] = None

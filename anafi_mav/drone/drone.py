@@ -752,7 +752,8 @@ class Drone:
         reaction = self._reactions.get(kind)
         if reaction is not None:
             reaction(message, now)
-        self._commander.offer(message)
+        for expectation in tuple(self._commander.waiting.get(kind, ())):
+            expectation.offer(message)
         for callback in self._subscribers:
             try:
                 callback(message, now)

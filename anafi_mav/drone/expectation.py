@@ -155,7 +155,8 @@ class Commander:
         self.gate: Callable[[Message], bool] | None = None
         """Asked before each command; False: it is not sent, as if it were lost on the way. May raise."""
         self._open: set[Expectation[Any]] = set()
-        self._waiting: dict[type[Message], list[Expectation[Any]]] = {}
+        self.waiting: dict[type[Message], list[Expectation[Any]]] = {}
+        """Expectations by the kinds of events that they wait for."""
         self._deliveries: dict[int, asyncio.Future[None]] = {}
         self.pending_stops: set[asyncio.Future[None]] = set()
         """Stop commands from any task that the drone may not have received yet."""
@@ -315,25 +316,18 @@ class Commander:
         expectation = Expectation(self, answers, judge)
         self._open.add(expectation)
         for answer in answers:
-            self._waiting.setdefault(answer, []).append(expectation)
+            self.waiting.setdefault(answer, []).append(expectation)
         return expectation
 
     def forget(self, expectation: Expectation[Any]) -> None:
         """Stop showing events to this one."""
         self._open.discard(expectation)
         for answer in expectation.answers:
-            listening = self._waiting.get(answer, [])
+            listening = self.waiting.get(answer, [])
             if expectation in listening:
                 listening.remove(expectation)
             if not listening:
-                self._waiting.pop(answer, None)
-
-    def offer(self, message: Message) -> None:
-        """Pass an event to the expectations that wait for its kind."""
-        waiting = self._waiting.get(type(message))
-        if waiting is not None:
-            for expectation in tuple(waiting):
-                expectation.offer(message)
+                self.waiting.pop(answer, None)
 
     async def confirm(
         self,

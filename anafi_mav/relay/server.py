@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import asyncio
 import errno
-import ipaddress
 import logging
 import secrets
+import socket
 from contextlib import suppress
 
 from anafi_mav import __version__
@@ -35,6 +35,7 @@ from anafi_mav.relay.dialogue import (
 from anafi_mav.relay.feed import Feed, FeedReader, PackedPicture
 from anafi_mav.relay.outlet import Outlet, TcpOutlet, UdpOutlet
 from anafi_mav.relay.source import DroneSource, NotShown
+from anafi_mav.relay.uri_host import is_loopback, uri_host
 
 log = logging.getLogger(__name__)
 
@@ -61,9 +62,6 @@ NAME = "anafi-mav"
 
 CLOSE_WAIT = 1.0
 """s that closing waits for connections to end."""
-
-
-_EVERY_ADDRESS = ("0.0.0.0", "::")
 
 
 class RelayServer:
@@ -95,12 +93,12 @@ class RelayServer:
     async def start(self) -> None:
         """Open the port.
 
-        Raises `ConfigError` at `video.listen` or `video.rtsp_port`; nothing is then left open.
+        Raises `ConfigError` at `video.host` or `video.rtsp_port`; nothing is then left open.
         """
         try:
             self._server = await self._listen()
         except OSError as error:
-            key = "video.rtsp_port" if error.errno in (errno.EADDRINUSE, errno.EACCES) else "video.listen"
+            key = "video.rtsp_port" if error.errno in (errno.EADDRINUSE, errno.EACCES) else "video.host"
             port = DEFAULT_PORT if self._wanted_port is None else self._wanted_port
             problem = f"cannot open {self.host}:{port} for video: {error.strerror or error}"
             raise ConfigError(key, problem) from error
@@ -108,14 +106,13 @@ class RelayServer:
         self._ticker = asyncio.create_task(self._tick(), name="relay")
 
     async def _listen(self) -> asyncio.Server:
-        if self._wanted_port is not None:
-            return await asyncio.start_server(self._serve, self.host, self._wanted_port)
+        port = DEFAULT_PORT if self._wanted_port is None else self._wanted_port
         try:
-            return await asyncio.start_server(self._serve, self.host, DEFAULT_PORT)
+            return await asyncio.start_server(self._serve, self.host, port, family=socket.AF_INET)
         except OSError as error:
-            if error.errno != errno.EADDRINUSE:
+            if self._wanted_port is not None or error.errno != errno.EADDRINUSE:
                 raise
-            return await asyncio.start_server(self._serve, self.host, 0)
+        return await asyncio.start_server(self._serve, self.host, 0, family=socket.AF_INET)
 
     async def close(self) -> None:
         """Say goodbye to the viewers, end the drones' sessions and close every socket."""
@@ -148,7 +145,7 @@ class RelayServer:
     @property
     def is_open_to_network(self) -> bool:
         """True when other computers can connect."""
-        return not _is_loopback(self.host)
+        return not is_loopback(self.host)
 
     def url_for(self, local_host: str | None, path: str) -> str | None:
         """Return the URL of a path for a client that sees this computer as `local_host`.
@@ -156,25 +153,13 @@ class RelayServer:
         None when such a client cannot reach it: the server is closed, open to this computer only, or its address
         towards the client is not known (`local_host` None).
         """
-        if not self.port:
-            return None
-        host: str | None = self.host
-        if local_host is None or not _is_loopback(local_host):
-            if not self.is_open_to_network:
-                return None
-            if self._public_host is not None:
-                host = self._public_host
-            elif self.host in _EVERY_ADDRESS:
-                host = local_host
-        elif self.host in _EVERY_ADDRESS:
-            host = local_host
-        return None if host is None else f"rtsp://{f'[{host}]' if ':' in host else host}:{self.port}{path}"
+        host = uri_host(self.host, local_host, self._public_host)
+        return f"rtsp://{host}:{self.port}{path}" if self.port and host is not None else None
 
     def describe(self) -> str:
         """Return one line for people."""
         count = self.viewers
-        host = f"[{self.host}]" if ":" in self.host else self.host
-        return f"rtsp://{host}:{self.port}/SYSTEM/STREAM: {count} viewer{'' if count == 1 else 's'}"
+        return f"rtsp://{self.host}:{self.port}/SYSTEM/STREAM: {count} viewer{'' if count == 1 else 's'}"
 
     def find(self, path: tuple[str, ...]) -> tuple[DroneSource, StreamKind] | None:
         """Return the source and stream of a path; None when there is no such stream."""
@@ -206,16 +191,6 @@ class RelayServer:
             now = self.clock.monotonic()
             for connection in tuple(self._connections.values()):
                 connection.tick(now)
-
-
-def _is_loopback(host: str) -> bool:
-    """Return True for an address, or the name, that never leaves this computer."""
-    if host.lower() == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
 
 
 class _Connection:

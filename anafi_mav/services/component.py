@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Coroutine, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
 from anafi_mav.clock import Clock
@@ -20,13 +20,13 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.router import EVERY_COMPONENT
 from anafi_mav.services.command.command_service import CommandService
-from anafi_mav.services.commands import Action, ActionGroup
+from anafi_mav.services.commands import Action
 from anafi_mav.services.definition_link import DefinitionLink
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.ftp.ftp_service import FtpService
 from anafi_mav.services.gateway_uris import GatewayUris
 from anafi_mav.services.memory import Memory
-from anafi_mav.services.pose import VehiclePose
+from anafi_mav.services.pose import UNKNOWN_POSE, VehiclePose
 from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.stream import Times
 from anafi_mav.services.telemetry.message_service import MessageService
@@ -85,7 +85,7 @@ class ComponentSystem(Protocol):
     def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """Run in the background; cancelled when the drone's link goes down."""
 
-    def times(self, at: float | None = None) -> Times:
+    def times(self, at: float | None = None, pose: VehiclePose = UNKNOWN_POSE) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
 
     def set_muted(self, channel: Channel, *, muted: bool) -> None:
@@ -106,8 +106,19 @@ class Component:
         self.has_picture_pose = system.has_picture_pose
         self.definition = DefinitionLink()
         self._system = system
+        # The system's part of `Host`, without a method here for each.
+        self.text = system.text
+        self.warn_throttled = system.warn_throttled
+        self.send_heartbeat = system.send_heartbeat
+        self.spawn = system.spawn
+        self.times = system.times
+        self.set_muted = system.set_muted
         self.commands = CommandService(self)
+        self.run_action = self.commands.run
+        self.end_others = self.commands.end_others
         self.messages = MessageService(self)
+        self.show_picture = self.messages.show_picture
+        self.mark_updated = self.messages.mark_updated
         self._ftp = FtpService(self)
         self.services: list[Service] = [self.commands, self.messages, self._ftp]
         self.services += [kind(self) for kind in services]
@@ -176,45 +187,10 @@ class Component:
             if message is not None:
                 self.send(message, channels)
 
-    def send_heartbeat(self) -> None:
-        """Send one more HEARTBEAT of the autopilot to all."""
-        self._system.send_heartbeat()
-
-    def text(self, severity: Severity, text: OperatorText, to: Channel | None = None) -> None:
-        """Send a STATUSTEXT of the autopilot to all, or to one channel alone."""
-        self._system.text(severity, text, to)
-
-    def warn_throttled(self, text: OperatorText) -> None:
-        """Send a warning on a frequent event, at most once per five seconds."""
-        self._system.warn_throttled(text)
-
-    def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
-        """Run in the background; cancelled when the drone's link goes down."""
-        return self._system.spawn(work)
-
-    def run_action(
-        self,
-        client: Hashable,
-        work: Coroutine[Any, Any, None],
-        *,
-        is_order: bool = True,
-        group: ActionGroup = ActionGroup.FLIGHT,
-    ) -> asyncio.Task[None]:
-        """Run an action that a message without COMMAND_ACK requests."""
-        return self.commands.run(client, work, is_order=is_order, group=group)
-
-    def end_others(self, group: ActionGroup) -> list[asyncio.Task[None]]:
-        """Cancel the older running actions of a group, and return them."""
-        return self.commands.end_others(group)
-
     @property
     def replaced_by_order(self) -> bool:
         """True in an action that a newer order of a client has ended."""
         return self.commands.replaced_by_order
-
-    def times(self, at: float | None = None) -> Times:
-        """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
-        return self._system.times(at)
 
     @property
     def needs_pictures(self) -> bool:
@@ -225,21 +201,6 @@ class Component:
     def needs_video(self) -> bool:
         """True while a client has a stream whose fields are in the live video only."""
         return self.messages.needs_video
-
-    def show_picture(self, pose: VehiclePose, shot: float, now: float) -> None:
-        """Send the pose that a picture reports; `shot`: when it was taken (s, monotonic)."""
-        self.messages.show_picture(pose, shot, now)
-
-    def mark_updated(self, id: int, at: float) -> None:
-        """Send a streamed message for a value that no event reports.
-
-        `at`: when it was true (s, monotonic).
-        """
-        self.messages.mark_updated(id, at)
-
-    def set_muted(self, channel: Channel, *, muted: bool) -> None:
-        """Send only answers on this channel; with False everything again."""
-        self._system.set_muted(channel, muted=muted)
 
     # What clients send.
 

@@ -42,6 +42,9 @@ class VehiclePose(msgspec.Struct, frozen=True):
         return self.gps_altitude if height is None else height
 
 
+UNKNOWN_POSE = VehiclePose(None, None, None, None, None, None)
+
+
 def reported_pose(vehicle: Vehicle) -> VehiclePose:
     """Return the motion as the newest events report it."""
     state, location = vehicle.drone.piloting.state, vehicle.drone.gps.state.location

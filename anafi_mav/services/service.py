@@ -21,7 +21,7 @@ from anafi_mav.services.files import Folder, ServedFile
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.gateway_uris import GatewayUris
 from anafi_mav.services.memory import Memory
-from anafi_mav.services.pose import VehiclePose
+from anafi_mav.services.pose import UNKNOWN_POSE, VehiclePose
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
@@ -117,7 +117,7 @@ class Host(Protocol):
     def replaced_by_order(self) -> bool:
         """True in an action that a newer order of a client has ended."""
 
-    def times(self, at: float | None = None) -> Times:
+    def times(self, at: float | None = None, pose: VehiclePose = UNKNOWN_POSE) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
 
     @property

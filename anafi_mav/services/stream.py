@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import PX4, Flavour
-from anafi_mav.services.pose import VehiclePose, reported_pose
+from anafi_mav.services.pose import UNKNOWN_POSE, VehiclePose
 from anafi_mav.vehicle.vehicle import Vehicle
 
 FASTEST = 1.0 / 30.0
@@ -25,7 +25,7 @@ INPUT_FASTEST = 0.01
 
 
 class Times(msgspec.Struct, frozen=True):
-    """Time at which the newest field of a message was true, its flavour, and its pose.
+    """Time at which the newest field of a message was true, with the pose then; and its flavour.
 
     The time counts from the start of the gateway.
     """
@@ -35,20 +35,12 @@ class Times(msgspec.Struct, frozen=True):
     boot_ms: int
     """An uint32 that wraps after 49.7 days, as on every autopilot."""
     flavour: Flavour = PX4
-    moment: VehiclePose | None = None
-    """The pose at that time, as a picture or the events report it; None: as the events report it now."""
+    pose: VehiclePose = UNKNOWN_POSE
+    """Motion at that time, for a message with `from_pictures`; unknown for others."""
 
     def for_flavour(self, flavour: Flavour) -> Times:
         """Return the same moment for clients of another flavour."""
         return replace(self, flavour=flavour)
-
-    def at(self, moment: VehiclePose) -> Times:
-        """Return the same time for messages that are made of this pose."""
-        return replace(self, moment=moment)
-
-    def pose(self, vehicle: Vehicle) -> VehiclePose:
-        """Return the motion that the message is about."""
-        return reported_pose(vehicle) if self.moment is None else self.moment
 
 
 Builder = Callable[[Vehicle, Times], "dialect.MAVLink_message | None"]

@@ -54,6 +54,7 @@ from anafi_mav.services.plan.fence_service import FenceService
 from anafi_mav.services.plan.mission_service import MissionService
 from anafi_mav.services.plan.plan_service import PlanService
 from anafi_mav.services.plan.rally_service import RallyService
+from anafi_mav.services.pose import UNKNOWN_POSE, VehiclePose
 from anafi_mav.services.service import Service
 from anafi_mav.services.setpoint.follow_service import FollowService
 from anafi_mav.services.setpoint.manual_control_service import ManualControlService
@@ -203,6 +204,9 @@ class System:
             if isinstance(service, PlanService):
                 service.take_tables(joined(service.item_commands() for service in self._autopilot.services))
         self._ticking = [service for service in self.services if type(service).tick is not Service.tick]
+        self._on_change = [
+            service for service in self.services if type(service).state_changed is not Service.state_changed
+        ]
         self._subscribed: dict[type[Message], tuple[EventHandler, ...]] = {}
         """The handlers of each kind of event, in the order in which they are called."""
 
@@ -342,10 +346,10 @@ class System:
         task.add_done_callback(self._tasks.discard)
         return task
 
-    def times(self, at: float | None = None) -> Times:
+    def times(self, at: float | None = None, pose: VehiclePose = UNKNOWN_POSE) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
         ns = round(((self.clock.monotonic() if at is None else at) - self._started) * 1e9)
-        return Times(ns, ns // 1_000, ns // 1_000_000 & 0xFFFFFFFF)
+        return Times(ns, ns // 1_000, ns // 1_000_000 & 0xFFFFFFFF, pose=pose)
 
     # The heart.
 
@@ -429,7 +433,7 @@ class System:
             self._hold_mode(last)
             if not disarmed:
                 self.send_heartbeat()
-        for service in self.services:
+        for service in self._on_change:
             service.state_changed()
         if disarmed:
             self.send_heartbeat()

@@ -9,6 +9,8 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as stock
 from support import flavours
 from support.mav import CAMERA, NAN, Client
+from support.missions import ACTIVE, put, said, start, state, takeoff, way
+from support.plans import Item
 from support.rtsp_client import viewer
 from support.world import world
 
@@ -171,6 +173,19 @@ async def test_conf_137_stream_stays_while_a_camera_records() -> None:
         assert await show(w.client, 2) == ACCEPTED
 
 
+async def test_conf_137_stream_stays_while_a_mission_needs_the_camera() -> None:
+    photo = Item(stock.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, p1=0.0, p2=0.0, p3=1.0, p4=1.0, frame=2)
+    async with world(model="thermal", web=True, speed=8.0) as w:
+        await put(w, [takeoff(5.0), way(60.0, 0.0, 5.0), photo, way(60.0, 5.0, 5.0)])
+        await start(w)
+        await state(w, ACTIVE, seq=1)
+        mark = w.client.mark()
+        assert await show(w.client, 2) == stock.MAV_RESULT_TEMPORARILY_REJECTED
+        await said(w, "Video stream refused: mission uses camera", since=mark)
+        assert (await w.client.command(stock.MAV_CMD_DO_PAUSE_CONTINUE, 0)).result == ACCEPTED
+        assert await show(w.client, 3) == ACCEPTED
+
+
 async def test_conf_091_stop_of_one_client_ends_no_view_of_another() -> None:
     async with world(clients=2, speed=1.0) as w:
         (stream,) = await informed(w.client)
@@ -205,14 +220,23 @@ async def test_conf_091_viewer_stays_while_the_link_fades() -> None:
     [
         (VideoConfig(), "127.0.0.1"),
         (VideoConfig(host="0.0.0.0"), None),
-        (VideoConfig(host="0.0.0.0", public_host="gateway.example"), None),
+        (VideoConfig(host="0.0.0.0", public_host="gateway.example"), "gateway.example"),
     ],
 )
 async def test_conf_091_uri_has_the_host_of_the_clients_link(video: VideoConfig, host: str | None) -> None:
     async with world(video=video) as w:
         (stream,) = await informed(w.client)
-        url = split_url(stream.uri)
+        assert w.gateway.relay is not None
         # The clients of these tests are on this computer, at an address of their own.
-        assert url == (host or w.address, w.gateway.relay.port, "1/visible")
-        async with opened(stream.uri.replace(w.address, "127.0.0.1")) as (_, eye):
-            await eye.first(1)
+        assert split_url(stream.uri) == (host or w.address, w.gateway.relay.port, "1/visible")
+
+
+async def test_conf_091_client_without_a_usable_uri_gets_one_text() -> None:
+    async with world() as w:
+        (channel,) = w.gateway.systems[0].channels
+        channel.local_host = "192.0.2.7"  # as the link of a client on another computer
+        mark = w.client.mark()
+        for _ in range(2):
+            assert [stream.uri for stream in await informed(w.client)] == [""]
+        text = "Video open to this computer only: set video.host"
+        assert [m.text for _, m in w.client.since(mark, "STATUSTEXT")] == [text]

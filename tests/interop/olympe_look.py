@@ -38,9 +38,9 @@ class Watch:
             if self.size is None:
                 self.size = (frame.width, frame.height)
                 picture = frame.as_ndarray()
-                # Luma in the sky and on the ground, away from all text.
+                # Luma in the sky and on the ground at the right edge, away from all text.
                 sky, ground = int(0.35 * frame.height), int(0.7 * frame.height)
-                self.shades = (int(picture[sky, 16]), int(picture[ground, 16]))
+                self.shades = (int(picture[sky, frame.width - 4]), int(picture[ground, frame.width - 4]))
             with self._more:
                 self.kinds.add(kind.name)
                 self.said.append(said)

@@ -88,7 +88,7 @@ class ScriptedDevice:
         await asyncio.sleep(0)
         commander = drone._commander
         assert not commander._open, "somebody still waits for an answer"
-        assert not commander._waiting
+        assert not commander.waiting
         assert not commander.pending_stops
         assert not commander.begins
 

@@ -24,9 +24,6 @@ log = logging.getLogger("anafi_mav.arsdk")
 CONTROLLER_NAME = "anafi-mav"
 CONTROLLER_TYPE = "computer"
 
-STALL_PAUSE = 0.01
-"""s between two looks whether the watchdog's process has done its work after a stall."""
-
 ParsedT = TypeVar("ParsedT")
 
 
@@ -86,6 +83,7 @@ class ControllerSession(Session):
         """Start the process that sends the standby frames when the event loop stalls (POSIX only)."""
         if self._watchdog is None and watchdog.LIMIT is not None and os.name == "posix" and not self.lost.done():
             self._watchdog = Watchdog(self._stalled, watchdog.LIMIT)
+            self._guard = self
             self._starting = asyncio.create_task(self._start_watchdog(self._watchdog))
 
     def stand_by(self, messages: Sequence[Message]) -> None:
@@ -114,16 +112,15 @@ class ControllerSession(Session):
             self._standby_seq = self._transport.next_seq
             self._watchdog.stand_by([(seq, self._wrapped(frame)) for seq, frame in frames])
 
-    def _flush(self) -> None:
-        guard = self._watchdog
-        if guard is None or not guard.standing_by or self.lost.done():
-            super()._flush()
-        elif guard.secure():
-            super()._flush()
-            if self._transport.next_seq != self._standby_seq:
-                self._renew()
-        else:
-            self._flush_later(STALL_PAUSE)
+    def may_send(self) -> bool:
+        """False after a stall, until the watchdog's process has done its work."""
+        return self._watchdog is None or not self._watchdog.standing_by or self._watchdog.secure()
+
+    def sent(self) -> None:
+        """Renew the standby frames: their sequence numbers follow those of the sent datagrams."""
+        standing_by = self._watchdog is not None and self._watchdog.standing_by
+        if standing_by and self._transport.next_seq != self._standby_seq:
+            self._renew()
 
     def _stalled(self) -> None:
         """The watchdog has sent what stood by: of our own, nothing of before is sent any more."""

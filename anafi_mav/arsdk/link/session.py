@@ -13,7 +13,7 @@ import os
 import socket
 from collections import Counter
 from collections.abc import Callable
-from typing import TypeAlias, cast
+from typing import Protocol, TypeAlias, cast
 
 from typing_extensions import assert_never
 
@@ -39,6 +39,9 @@ OnMessage: TypeAlias = Callable[[Message | UnknownMessage, float], None]
 Air: TypeAlias = Callable[[bytes, bool, Callable[[bytes], None]], None]
 """Called with each datagram, whether it came in, and what hands it on, which may be called later, twice or never."""
 
+STALL_PAUSE = 0.01
+"""s between two questions to a guard that does not let datagrams leave."""
+
 SOCKET_BUFFER = 1 << 18
 """Bytes the kernel may hold for us while the loop is busy: some seconds of a drone's telemetry."""
 
@@ -46,6 +49,16 @@ SOCKET_BUFFER = 1 << 18
 def reason_of(error: OSError) -> str:
     """The system's own words for an error; asyncio hides them behind "Connect call failed"."""
     return os.strerror(error.errno) if error.errno is not None and error.errno > 0 else error.strerror or str(error)
+
+
+class SendGuard(Protocol):
+    """Interface of what may delay the datagrams of a session."""
+
+    def may_send(self) -> bool:
+        """Return False while no datagram may leave."""
+
+    def sent(self) -> None:
+        """Note that datagrams have left."""
 
 
 class Session(asyncio.DatagramProtocol):
@@ -82,6 +95,7 @@ class Session(asyncio.DatagramProtocol):
         self._timer_at = float("inf")
         self._flush_due = False
         self._congested = False
+        self._guard: SendGuard | None = None
 
     async def open(self, sock: socket.socket) -> None:
         """Begin on this bound socket, which belongs to the session from now on."""
@@ -229,10 +243,6 @@ class Session(asyncio.DatagramProtocol):
                 case _:
                     assert_never(event)
 
-    def _flush_later(self, delay: float) -> None:
-        self._flush_due = True
-        self._loop.call_later(delay, self._flush)
-
     def _flush_soon(self) -> None:
         if not self._flush_due:
             self._flush_due = True
@@ -242,6 +252,11 @@ class Session(asyncio.DatagramProtocol):
         self._flush_due = False
         endpoint = self._endpoint
         if endpoint is None or self.lost.done():
+            return
+        guard = self._guard
+        if guard is not None and not guard.may_send():
+            self._flush_due = True
+            self._loop.call_later(STALL_PAUSE, self._flush)
             return
         for datagram in self._transport.outgoing(self._loop.time()):
             if self._congested:
@@ -256,6 +271,8 @@ class Session(asyncio.DatagramProtocol):
                 self._timer.cancel()
             self._timer_at = deadline
             self._timer = self._loop.call_at(deadline, self._expire)
+        if guard is not None:
+            guard.sent()
 
     def _give(self, datagram: bytes) -> None:
         if not self.mute and self._endpoint is not None and not self.lost.done():

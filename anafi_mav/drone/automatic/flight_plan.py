@@ -153,9 +153,9 @@ class FlightPlan(Commanding[FlightPlanState]):
 
         The model decides. Of a model that is not known, the events that the Ai alone is known to send.
         """
-        known = self.model().plan_version
-        if known is not None:
-            return known
+        figures = self.model().plan_figures
+        if figures is not None:
+            return figures.version
         return 1 if self.state.missing is None and self.state.capabilities is None else 2
 
     @property

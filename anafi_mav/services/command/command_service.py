@@ -13,12 +13,13 @@ from collections.abc import Callable, Coroutine, Hashable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from anafi_mav.clock import Alarm
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.command_targets import UnsupportedFrame
 from anafi_mav.services.commands import (
-    MODE_PROGRESS_AFTER,
+    LATE_PROGRESS_AFTER,
     PROGRESS_AFTER,
     PROGRESS_EVERY,
     QUERY,
@@ -207,9 +208,17 @@ class CommandService(Service):
 
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:
         command = execution.command
-        if command.progress is ProgressPolicy.EARLY and self.host.vehicle.takeoff.rises:
+        policy = command.progress
+        if policy is ProgressPolicy.EARLY and self.host.vehicle.takeoff.rises:
             self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)  # it waits for the climb's end
-        progress = self.host.spawn(self._report_progress(inbound, command))
+
+        def report() -> None:
+            self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)
+            progress.set_in(PROGRESS_EVERY)
+
+        progress = Alarm(report)
+        if policy is not None:
+            progress.set_in(LATE_PROGRESS_AFTER if policy is ProgressPolicy.LATE else PROGRESS_AFTER)
         result = dialect.MAV_RESULT_FAILED
         try:
             await self._actions[command.id].handler(command)
@@ -275,14 +284,6 @@ class CommandService(Service):
             self._explain(error)
         finally:
             work.close()  # cancelled before it began, it would complain that nobody awaited it
-
-    async def _report_progress(self, inbound: Inbound, command: Command) -> None:
-        if command.progress is None:
-            return
-        await asyncio.sleep(MODE_PROGRESS_AFTER if command.progress is ProgressPolicy.LATE else PROGRESS_AFTER)
-        while True:
-            self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)
-            await asyncio.sleep(PROGRESS_EVERY)
 
     def _acknowledge(self, inbound: Inbound, command: int, result: int) -> None:
         self.host.send(

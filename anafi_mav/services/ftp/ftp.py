@@ -223,7 +223,10 @@ class _Client:
     """Those that are open."""
     waits: list[Wait] = field(default_factory=list)
     kept: tuple[FtpRequest, bytes] | None = None
-    """The last request of `_KEPT` and its answer, which a repetition gets again."""
+    """The last request of `_KEPT` and its answer, which a repetition gets again.
+
+    Opening a file drops it: a client may number its requests from 0 again for each file.
+    """
     seen: float = 0.0
 
 
@@ -480,7 +483,7 @@ class FtpServer:
         session = self._session_for(client, request, now)
         if isinstance(session, FileError):
             return session
-        client.sessions[request.session] = session
+        client.sessions[request.session], client.kept = session, None
         if session.state is not State.WRITING or session.created != request.seq:
             self._abandon(client, request.session)
             session.step(Event.CREATE)
@@ -511,7 +514,7 @@ class FtpServer:
         if isinstance(session, FileError):
             return session
         opening = files.open(request.path)
-        client.sessions[request.session] = session
+        client.sessions[request.session], client.kept = session, None
         self._abandon(client, request.session)
         session.step(Event.OPEN)
         session.path, session.source, session.used = request.path, None, now

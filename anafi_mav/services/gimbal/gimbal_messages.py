@@ -154,14 +154,12 @@ def manager_status(
     )
 
 
-def attitude_status(
-    vehicle: Vehicle, gimbal: GimbalState, times: Times, *, neutral: bool
-) -> dialect.MAVLink_message | None:
+def attitude_status(gimbal: GimbalState, times: Times, *, neutral: bool) -> dialect.MAVLink_message | None:
     """GIMBAL_DEVICE_ATTITUDE_STATUS. ARSDK reports no rates of the gimbal: NaN.
 
     Frames and errors are the reported ones, also beside the attitude of a picture, which has neither.
     """
-    pose = times.pose(vehicle)
+    pose = times.pose
     flags, body = device_flags(gimbal, neutral=neutral), pose.attitude
     earth = bool(flags & dialect.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME)
     if pose.frame is None:

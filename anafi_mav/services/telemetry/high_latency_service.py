@@ -17,6 +17,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import Flavour
+from anafi_mav.services.pose import reported_pose
 from anafi_mav.services.service import Host, Query, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.services.telemetry.telemetry_flight import target
@@ -72,7 +73,7 @@ def high_latency(vehicle: Vehicle, times: Times, climb: float) -> dialect.MAVLin
     `climb` is the fastest climb or descent since the last message (m/s). Without a target the drone's own position is
     sent as the target. Throttle, airspeed and wind are not reported and have no "unknown": 0.
     """
-    pose = times.pose(vehicle)
+    pose = reported_pose(vehicle)
     place, height = pose.place, pose.amsl(vehicle)
     if place is None or height is None or pose.attitude is None or pose.velocity is None:
         return None

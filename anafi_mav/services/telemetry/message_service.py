@@ -19,7 +19,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.streams import Streams
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import flavour_of
-from anafi_mav.services.pose import VehiclePose, reported_pose
+from anafi_mav.services.pose import UNKNOWN_POSE, VehiclePose, reported_pose
 from anafi_mav.services.service import Answer, Host, MessageHandler, Query, Request, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.services.telemetry import data_streams
@@ -185,7 +185,7 @@ class MessageService(Service):
         newest_event = max((self._stamped.get(id, -math.inf) for id in self._poses), default=-math.inf)
         channels = self._sources.on_pictures(self.host.channels, shot, newest_event, now)
         if channels:
-            times = self.host.times(shot).at(pose)
+            times = self.host.times(shot, pose)
             for id, due in self._intervals.due_on(channels, self._poses, shot):
                 self._show(id, due, times, shot)
 
@@ -216,29 +216,29 @@ class MessageService(Service):
     def _send_updated(self) -> None:
         ids, at = self._tracker.take()
         everyone = self.host.channels
-        channels = self._sources.on_events(everyone, at)
-        if channels is everyone:
+        if not self._sources.requests:
             due = self._intervals.due_on(everyone, ids, at)
         else:
+            channels = self._sources.on_events(everyone, at)
             others = tuple(id for id in ids if not self._is_pictured(id))
             poses = tuple(id for id in ids if self._is_pictured(id))
             due = [*self._intervals.due_on(everyone, others, at), *self._intervals.due_on(channels, poses, at)]
-        moment: VehiclePose | None = None
+        pose: VehiclePose | None = None
         for id, to in due:
-            times = self._stamp(id, at)
             if self._table[id].from_pictures:  # one moment for all of them
-                moment = moment or reported_pose(self.host.vehicle)
-                times = times.at(moment)
-            self._leave(id, to, times)
+                pose = pose or reported_pose(self.host.vehicle)
+                self._leave(id, to, self._stamp(id, at, pose))
+            else:
+                self._leave(id, to, self._stamp(id, at))
 
     def _times(self, id: int) -> Times:
         """When the newest of the fields of a message was true.
 
         A state that has not changed is true now.
         """
-        if self._table[id].is_repeated:
-            return self._stamp(id, self.host.clock.monotonic())
-        return self._stamp(id, self._tracker.at(id) or self._linked_at)
+        stream = self._table[id]
+        at = self.host.clock.monotonic() if stream.is_repeated else self._tracker.at(id) or self._linked_at
+        return self._stamp(id, at, reported_pose(self.host.vehicle) if stream.from_pictures else UNKNOWN_POSE)
 
     def _times_for(self, channel: Channel, id: int) -> Times:
         """As `_times`, for an answer on one channel: of the picture where pictures are the source."""
@@ -247,19 +247,19 @@ class MessageService(Service):
         now, newest = self.host.clock.monotonic(), self._sources.newest(channel)
         has_pictures = self._sources.has_pictures(channel, self.host.channels, now)
         if has_pictures and self._picture is not None and newest == self._stamped_pictures:
-            return self.host.times(newest).at(self._picture)
+            return self.host.times(newest, self._picture)
         at = max(self._tracker.at(id) or self._linked_at, newest)
         self._sources.on_answer(channel, at)
-        return self._stamp(id, at)
+        return self._stamp(id, at, reported_pose(self.host.vehicle))
 
     def _is_pictured(self, id: int) -> bool:
         """Return True when this message is made of pictures where a channel has them."""
         return self._table[id].from_pictures and id not in self._without
 
-    def _stamp(self, id: int, at: float) -> Times:
+    def _stamp(self, id: int, at: float, pose: VehiclePose = UNKNOWN_POSE) -> Times:
         """The time for a message of this kind; an event that was handled late does not put it back."""
         at = self._stamped[id] = max(at, self._stamped.get(id, at))
-        return self.host.times(at)
+        return self.host.times(at, pose)
 
     def _leave(self, id: int, to: Sequence[Channel], times: Times) -> bool:
         """Send a message; return False when a value that it needs is unknown."""

@@ -22,8 +22,8 @@ class PoseSources(Generic[ChannelT]):
     """The source of the pose messages of every channel. A closed channel is removed by itself."""
 
     def __init__(self) -> None:
-        self._requests: WeakKeyDictionary[ChannelT, set[int]] = WeakKeyDictionary()
-        """The messages for which a channel wants pictures."""
+        self.requests: WeakKeyDictionary[ChannelT, set[int]] = WeakKeyDictionary()
+        """The messages for which a channel wants pictures; while it is empty, events are the only source."""
         self._floors: WeakKeyDictionary[ChannelT, float] = WeakKeyDictionary()
         """Of each channel with pictures: the time (s) after which a picture is newer than its last event."""
         self._shots: WeakKeyDictionary[ChannelT, float] = WeakKeyDictionary()
@@ -34,23 +34,23 @@ class PoseSources(Generic[ChannelT]):
 
     def is_wanted(self, channels: Sequence[ChannelT]) -> bool:
         """Return True when one of these channels wants pictures."""
-        return bool(self._requests) and any(channel in self._requests for channel in channels)
+        return bool(self.requests) and any(channel in self.requests for channel in channels)
 
     def request(self, channel: ChannelT, id: int, *, wanted: bool) -> None:
         """Note that a channel wants a message from pictures, or does not any longer."""
-        ids = self._requests.get(channel, set())
+        ids = self.requests.get(channel, set())
         if (id in ids) == wanted:
             return
         ids = ids | {id} if wanted else ids - {id}
         if ids:
-            self._requests[channel] = ids
+            self.requests[channel] = ids
         else:
-            del self._requests[channel]
+            del self.requests[channel]
         self._split = None
 
     def close(self, channel: ChannelT) -> None:
         """The channel is closed."""
-        self._requests.pop(channel, None)
+        self.requests.pop(channel, None)
         self._split = None
 
     def link_down(self) -> None:
@@ -89,13 +89,11 @@ class PoseSources(Generic[ChannelT]):
 
     def on_events(self, channels: Sequence[ChannelT], now: float) -> Sequence[ChannelT]:
         """Return the channels whose pose is made of events."""
-        if not self._requests:
-            return channels
-        return self._divide(channels, now)[1]
+        return self._divide(channels, now)[1] if self.requests else channels
 
     def has_pictures(self, channel: ChannelT, channels: Sequence[ChannelT], now: float) -> bool:
         """Return True when the channel's pose is made of pictures."""
-        return bool(self._requests) and channel in self._divide(channels, now)[2]
+        return bool(self.requests) and channel in self._divide(channels, now)[2]
 
     def _runs(self, now: float) -> bool:
         return now - self._arrived <= SILENCE
@@ -106,7 +104,7 @@ class PoseSources(Generic[ChannelT]):
         runs = self._runs(now)
         split = self._split
         if split is None or split[0] is not channels or (split[2] and not runs):
-            pictured = [channel for channel in channels if channel in self._requests] if runs else []
+            pictured = [channel for channel in channels if channel in self.requests] if runs else []
             split = channels, [channel for channel in channels if channel not in pictured], pictured
             for channel in tuple(self._floors):
                 if channel not in pictured:

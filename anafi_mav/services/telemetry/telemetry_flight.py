@@ -31,7 +31,7 @@ MOVING = 0.5
 
 def attitude(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """ATTITUDE. ARSDK reports no body rates: NaN."""
-    state = times.pose(vehicle).attitude
+    state = times.pose.attitude
     if state is None:
         return None
     return dialect.MAVLink_attitude_message(
@@ -41,7 +41,7 @@ def attitude(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
 
 def attitude_quaternion(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """ATTITUDE_QUATERNION, (w, x, y, z)."""
-    state = times.pose(vehicle).attitude
+    state = times.pose.attitude
     if state is None:
         return None
     w, x, y, z = units.quaternion_from_euler(state.roll, state.pitch, state.yaw)
@@ -55,7 +55,7 @@ def global_position_int(vehicle: Vehicle, times: Times) -> dialect.MAVLink_messa
 
     0/0 is no substitute for an unknown position: it is a place.
     """
-    pose = times.pose(vehicle)
+    pose = times.pose
     place, height = pose.place, pose.amsl(vehicle)
     if place is None or height is None or pose.altitude is None or pose.velocity is None:
         return None
@@ -74,7 +74,7 @@ def global_position_int(vehicle: Vehicle, times: Times) -> dialect.MAVLink_messa
 
 def local_position_ned(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """LOCAL_POSITION_NED: metres north, east and down of where the drone last took off."""
-    pose, origin = times.pose(vehicle), vehicle.origin
+    pose, origin = times.pose, vehicle.origin
     place, velocity = pose.place, pose.velocity
     if place is None or origin is None or pose.altitude is None or velocity is None:
         return None
@@ -101,7 +101,7 @@ def odometry(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
 
     The velocity is along the drone's axes. Rates and covariances are not reported: NaN.
     """
-    pose, origin = times.pose(vehicle), vehicle.origin
+    pose, origin = times.pose, vehicle.origin
     place, leaning = pose.place, pose.attitude
     if place is None or origin is None:
         return None
@@ -127,7 +127,7 @@ def odometry(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
 
 def altitude(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """ALTITUDE: all relative heights are above the take-off point."""
-    pose = times.pose(vehicle)
+    pose = times.pose
     ato, ground = pose.altitude, pose.height
     if ato is None:
         return None
@@ -142,7 +142,7 @@ def vfr_hud(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
 
     No airspeed is measured: NaN. Nor does an ANAFI report its throttle, but that field knows only 0.
     """
-    pose = times.pose(vehicle)
+    pose = times.pose
     height = pose.amsl(vehicle)
     if pose.velocity is None or pose.attitude is None:
         return None

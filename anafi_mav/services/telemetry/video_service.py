@@ -106,7 +106,7 @@ def _quaternion(quat: Sequence[float] | None) -> list[float]:
 
 def picture(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """Return ANAFI_PICTURE of a picture; None without one."""
-    frame = None if times.moment is None else times.moment.frame
+    frame = times.pose.frame
     if frame is None:
         return None
     said = frame.metadata

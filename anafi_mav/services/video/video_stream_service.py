@@ -90,6 +90,8 @@ class VideoStreamService(Service):
             return
         if streams.is_recording:
             raise Refused(texts.VIDEO_STREAM, texts.CAMERA_RECORDS)
+        if self.host.vehicle.mission_needs_camera:
+            raise Refused(texts.VIDEO_STREAM, texts.MISSION_USES_CAMERA)
         self.host.end_others(ActionGroup.STREAM)
         await streams.show(stream.kind)
 

@@ -95,6 +95,26 @@ async def test_drone_has_one_session_for_all_viewers(monkeypatch: pytest.MonkeyP
         assert held.server.methods().count("PLAY") == 2
 
 
+async def test_two_drones_with_one_address_are_told_apart() -> None:
+    async with studio() as held, AsyncExitStack() as stack:
+        server = await stack.enter_async_context(VideoServer())
+        device = await stack.enter_async_context(ScriptedDevice())
+        drone = device.drone(rtsp_port=server.port)
+        await drone.connect()
+        stack.push_async_callback(drone.close)
+        assert drone.address == held.drone.address
+        held.relay.add(DroneSource(2, "bravo", drone))
+        for path, one, other in (("2/visible", server, held.server), ("1/visible", held.server, server)):
+            client = await stack.enter_async_context(viewer(held.relay.port))
+            played = other.methods().count("PLAY")
+            assert (await client.describe(path)).name == ("bravo" if one is server else "alpha")
+            eye = await client.setup(f"{path}/video")
+            await client.play(path)
+            await eye.first(3)
+            assert one.methods().count("PLAY") == 1
+            assert other.methods().count("PLAY") == played
+
+
 async def test_new_viewer_gets_pictures_since_the_last_key_at_once() -> None:
     async with studio() as held, viewer(held.relay.port) as first, viewer(held.relay.port) as second:
         await first.describe(LIVE)
@@ -198,7 +218,7 @@ async def test_port_in_use_is_named() -> None:
         assert str(held.relay.port) in caught.value.problem
         with pytest.raises(ConfigError) as caught:
             await RelayServer("192.0.2.1", 0, SystemClock()).start()
-        assert caught.value.key_path == "video.listen"
+        assert caught.value.key_path == "video.host"
 
 
 async def test_garbage_of_a_viewer_ends_its_connection_only() -> None:

@@ -31,7 +31,7 @@ OTHERS = {
 
 PRODUCT = {
     "support/scripted_device.py": dict.fromkeys(
-        ("_commander", "_open", "_waiting"), "at the end of a test nothing may wait for an answer of the drone"
+        ("_commander", "_open"), "at the end of a test nothing may wait for an answer of the drone"
     ),
     "conformance/test_extending.py": {"_CODECS": "an invented message is removed, so that no other test finds it"},
     "conformance/test_params_kept.py": {"_WRITER": "a slow memory card: the thread that writes files is kept busy"},

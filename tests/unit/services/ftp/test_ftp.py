@@ -278,6 +278,15 @@ def test_a_lost_answer_comes_again() -> None:
     assert b.ask(request(Opcode.TERMINATE_SESSION, seq=16)).error == Error.INVALID_SESSION
 
 
+def test_terminate_with_same_number_closes_the_next_file() -> None:
+    """A client that numbers its requests from 0 for each file sends the same TerminateSession for each."""
+    b = Bench()
+    for path in (b"/data.bin", b"/deep/other.txt", b"/data.bin"):
+        assert b.ask(request(Opcode.OPEN_FILE_RO, path, seq=0)).opcode == ACK
+        assert b.ask(request(Opcode.TERMINATE_SESSION, seq=2)).opcode == ACK
+        assert b.server.sessions == 0
+
+
 def test_clients_do_not_share_sessions() -> None:
     b = Bench()
     assert b.ask(request(Opcode.OPEN_FILE_RO, b"/data.bin"), "a").session == 0
