@@ -585,6 +585,7 @@ BANNER_DRONE = Template(
 )  # fmt: skip
 TUNE_REFUSED = OperatorText("Tune refused: drone is not on the ground")
 TUNE_FAILED = Template("Tune not played: {error}", error=BELOW)
+CONTROLLER_INPUTS = Template("Wheels, buttons not read: {error}", error=BELOW)
 NO_EXPOSURE = Template("Exposure unknown: no video: {error}", error=BELOW)
 NO_PICTURES = Template("Pose from events: no video: {error}", error=BELOW)
 

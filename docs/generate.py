@@ -287,8 +287,9 @@ QGroundControl and MAVSDK load by themselves over MAVLink FTP.
 | a read of a name that is not listed | PARAM_ERROR |
 | a read of an unknown value | -1; no parameter is ever NaN |
 
-The drone keeps its own settings, and the gateway keeps its settings for each drone. Four begin with their default at
-each start: `ANF_HAND_LAUNCH`, `ANF_CRUISE_SPEED`, `ANF_CLIMB_SPEED` and `ANF_FENCE_ON`.
+The drone keeps its own settings, and the gateway keeps its settings for each drone. Six begin with their default at
+each start: `ANF_HAND_LAUNCH`, `ANF_CRUISE_SPEED`, `ANF_CLIMB_SPEED`, `ANF_FENCE_ON`, `ANF_SC_WHEELS` and
+`ANF_SC_BUTTONS`.
 """
 
 PARAMETERS_NATIVE = """

@@ -36,11 +36,13 @@ There are a handful, and an address is easily made up.
 PROGRESS_AFTER, PROGRESS_EVERY = 0.3, 0.8
 """s until the first IN_PROGRESS and between them: MAVSDK resends at 0.5 s, every client gives up after 1-3 s (R9)."""
 
-MODE_PROGRESS_AFTER = 2.5
-"""s until the first IN_PROGRESS of a DO_SET_MODE. DEVIATION: R9 wants one a second of every command. MAVSDK 4.1 takes
-one for the end of start_mission, pause_mission and arm, which fail then and crash when the real end comes
-(mission_raw_impl.cpp start_mission; action_impl.cpp waits for the end, but for the mode that it sets before arming). It
-gives up 2 s after it has sent it, the others later."""
+LATE_PROGRESS_AFTER = 2.5
+"""s until the first IN_PROGRESS of a `LATE` command. DEVIATION: R9 wants one a second of every command.
+
+MAVSDK 4.1 takes one of a DO_SET_MODE for the end of start_mission, pause_mission and arm, which fail then and crash
+when the real end comes (mission_raw_impl.cpp start_mission; action_impl.cpp waits for the end, but for the mode that it
+sets before arming). It takes one of a gimbal command for its failure (gimbal_impl.cpp receive_command_result). It
+gives up 2 s after it has sent them, the others later."""
 
 _UNSET_INT = (2**31 - 1, -(2**31))
 """x and y of a COMMAND_INT that stand for "not set": the specified INT32_MAX, and what a cast NaN becomes (R8)."""
@@ -132,7 +134,7 @@ class ProgressPolicy(enum.Enum):
 
     PROMPT = "after `PROGRESS_AFTER`"
     EARLY = "after `PROGRESS_AFTER`, and at once where the command first waits for the end of a take-off's climb"
-    LATE = "after `MODE_PROGRESS_AFTER`: clients take one for the end of it"
+    LATE = "after `LATE_PROGRESS_AFTER`: clients take one for the end of it"
     FINAL_ONLY = "as `PROMPT`, but never to clients of flavours that take `first_answer_as_final`"
 
 

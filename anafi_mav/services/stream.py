@@ -20,6 +20,9 @@ from anafi_mav.vehicle.vehicle import Vehicle
 FASTEST = 1.0 / 30.0
 """s. A message that is also repeated leaves no more often, whatever updates it; a picture comes as often."""
 
+INPUT_FASTEST = 0.01
+"""s between two messages of the Skycontroller's inputs: anafi_ros publishes its sticks a hundred times a second."""
+
 
 class Times(msgspec.Struct, frozen=True):
     """Time at which the newest field of a message was true, with the pose then; and its flavour.

@@ -43,6 +43,7 @@ from anafi_mav.services.media.media_service import MediaService
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.monitor import takeoff_point_service
 from anafi_mav.services.monitor.aborted_return_service import AbortedReturnService
+from anafi_mav.services.monitor.controller_input_service import ControllerInputService
 from anafi_mav.services.monitor.link_loss_service import LinkLossService
 from anafi_mav.services.monitor.pilot_service import PilotService
 from anafi_mav.services.monitor.roll_sign_service import RollSignService
@@ -108,6 +109,7 @@ AUTOPILOT_SERVICES: tuple[type[Service], ...] = (
     TakeoffPointService,
     VideoTelemetryService,
     PilotService,
+    ControllerInputService,
 )
 """Services of component 1, beside commands, messages and files themselves."""
 

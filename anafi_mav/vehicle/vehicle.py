@@ -53,6 +53,7 @@ from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.controller_inputs import ControllerInputs
 from anafi_mav.vehicle.fence.rally import RallyPoints
 from anafi_mav.vehicle.follow_flight import FollowFlight
 from anafi_mav.vehicle.guided_flight import GuidedFlight
@@ -157,6 +158,7 @@ class Vehicle(Aircraft):
         self.offboard = OffboardFlight(self, clock, self.takeoff)
         self.takeoff.ended = self.offboard.after_takeoff
         self.manual = ManualFlight(self, clock, lambda: self.overridable)
+        self.controller_inputs = ControllerInputs(drone.controller)
         self.follow = FollowFlight(self, lambda: self.offboard.motion, clock)
         self.plan_ids: dict[int, int] = {}
         """Opaque ids of the plans that are in force, by MAV_MISSION_TYPE."""

@@ -7,14 +7,26 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as stock
+from support.flavours import both
 from support.mav import Client
+from support.params import value_of, write
 from support.setpoints import attitude, engage, streaming
 from support.world import World, world
 
 from anafi_mav.arsdk.messages import alarms, ardrone3, camera, common, rth, wifi
 from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.mavlink import dialect
-from anafi_mav.sim.skycontroller import PITCH, ROLL, THROTTLE, YAW, Skycontroller
+from anafi_mav.sim.skycontroller import (
+    PITCH,
+    RESET_ZOOM,
+    ROLL,
+    TAKEOFF_LAND,
+    THROTTLE,
+    TILT,
+    YAW,
+    ZOOM,
+    Skycontroller,
+)
 
 ACCEPTED, REJECTED = stock.MAV_RESULT_ACCEPTED, stock.MAV_RESULT_TEMPORARILY_REJECTED
 FIRST, LAST = 1 << ListFlags.FIRST, 1 << ListFlags.LAST
@@ -226,6 +238,10 @@ async def test_skycontroller_sticks_are_reported_while_a_program_flies() -> None
                     "ANAFI_CONTROLLER_INPUT", lambda m, p=percent, a=axis: m.axes[places[a]] == p
                 )
             assert inputs.axes == [4, -7, -5, 10, -128, -128]  # the wheels are the pilot's
+            channels = await ask(w.client, dialect.MAVLINK_MSG_ID_RC_CHANNELS)
+            # Roll, pitch, throttle, yaw: 5 us a percent, forward below the middle.
+            assert [getattr(channels, f"chan{n}_raw") for n in range(1, 9)] == [1475, 1450, 1465, 1520, *[65535] * 4]
+            assert channels.chancount == 8
             axes = dialect.ANAFI_AXIS_YAW | dialect.ANAFI_AXIS_THROTTLE | dialect.ANAFI_AXIS_ROLL
             assert inputs.grabbed_axes == axes | dialect.ANAFI_AXIS_PITCH
             assert inputs.source == dialect.ANAFI_PILOTING_SOURCE_GATEWAY
@@ -235,6 +251,50 @@ async def test_skycontroller_sticks_are_reported_while_a_program_flies() -> None
         inputs = await w.client.wait("ANAFI_CONTROLLER_INPUT", lambda m: m.grabbed_axes == 0)
         assert inputs.axes == [-128] * 6
         assert inputs.source == dialect.ANAFI_PILOTING_SOURCE_SKYCONTROLLER
+
+
+@both
+async def test_wheels_and_buttons_are_the_clients_on_request(flavour: str) -> None:
+    async with world(skycontroller=3, speed=1.0, flavour=flavour) as w:
+        pilot = at_hand(w)
+
+        async def grabbed(buttons: int, axes: int, since: float) -> None:
+            masks = {"buttons": buttons, "axes": axes}
+            await w.drone.wait_log(lambda e: e.name == "grab" and e.args == masks, since=since)
+
+        assert (await ask(w.client, dialect.MAVLINK_MSG_ID_RC_CHANNELS)).chancount == 0
+        for name in ("ANF_SC_WHEELS", "ANF_SC_BUTTONS"):
+            assert value_of(await write(w.client, name, 1, stock.MAV_PARAM_TYPE_INT32, flavour), flavour) == 1
+        await grabbed(0b1100, 0b110000, 0.0)
+        for id in (dialect.MAVLINK_MSG_ID_RC_CHANNELS, dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_INPUT):
+            await stream(w.client, id, 0.01)
+        began = w.drone.log[-1].t
+        pilot.stick(TILT, -40)
+        pilot.stick(ZOOM, 100)
+        pilot.press(RESET_ZOOM)
+        channels = await w.client.wait("RC_CHANNELS", lambda m: m.chan8_raw == 2000)
+        read = [getattr(channels, f"chan{n}_raw") for n in range(1, 10)]
+        assert read == [*[65535] * 4, 1300, 2000, 1000, 2000, 65535]
+        inputs = await w.client.wait("ANAFI_CONTROLLER_INPUT", lambda m: m.buttons)
+        assert (inputs.axes, inputs.buttons) == ([-128] * 4 + [-40, 100], 0b1000)
+        pilot.release(RESET_ZOOM)
+        await w.client.wait("RC_CHANNELS", lambda m: m.chan8_raw == 1000)
+        pilot.press(TAKEOFF_LAND)  # the pilot's, always
+        await w.drone.wait_log(lambda e: e.name.endswith("TakeOff"), since=began)
+        acted = [e.name for e in w.drone.log if e.t > began and e.name.startswith(("gimbal.", "camera."))]
+        assert acted == []
+        # A Skycontroller releases everything when a connection ends.
+        began = w.drone.log[-1].t
+        assert w.drone.session is not None
+        await w.drone.session.close()
+        await grabbed(0, 0, began)
+        await grabbed(0b1100, 0b110000, began)
+        mark = w.client.mark()
+        await w.client.wait("RC_CHANNELS", lambda m: m.chan5_raw == 1300, since=mark)
+        assert value_of(await write(w.client, "ANF_SC_WHEELS", 0, stock.MAV_PARAM_TYPE_INT32, flavour), flavour) == 0
+        await grabbed(0b1100, 0, began)
+        pilot.stick(TILT, 20)
+        await w.drone.wait_log(lambda e: e.name == "gimbal.set_target", since=began)
 
 
 async def test_the_dialect_works_in_pymavlink_as_the_page_says() -> None:

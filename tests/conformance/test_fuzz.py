@@ -295,9 +295,9 @@ MAY_MOVE: dict[int, Callable[[Parameters], bool]] = {
     dialect.MAV_CMD_CONDITION_YAW: lambda p: abs(p[0]) <= 360.0,
     # All default: a circle around where the drone is. Its yaw behaviour and its angle may be given.
     dialect.MAV_CMD_DO_ORBIT: lambda p: all(math.isnan(v) for v in (*p[:2], *p[4:])),
-    # Angles of the gimbal.
+    # Angles of the gimbal, or a rate of its pitch.
     dialect.MAV_CMD_DO_MOUNT_CONTROL: lambda p: any(abs(v) < 1.0 for v in p[:2]),
-    dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: lambda p: abs(p[0]) < 1.0,
+    dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: lambda p: abs(p[0]) < 1.0 or abs(p[2]) < 1.0,
 }
 """The commands that move the drone or its gimbal with parameters like these, and with which of them."""
 

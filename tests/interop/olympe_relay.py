@@ -30,7 +30,7 @@ def main() -> None:
     enough.wait(LIMIT)
     player.stop()
     player.destroy()
-    print(json.dumps({"played": played, "sizes": sizes[:PICTURES]}))
+    json.dump({"played": played, "sizes": sizes[:PICTURES]}, sys.stdout)
 
 
 if __name__ == "__main__":

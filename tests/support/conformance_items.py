@@ -30,7 +30,9 @@ ITEMS: dict[int, Item] = {
     8: Item("a command to component 0 gets one acknowledgement"),
     9: Item("an unsupported command is answered within 200 ms"),
     10: Item("NaN in every parameter of every command means the default and breaks nothing"),
-    11: Item("a long action says IN_PROGRESS at least once a second (DO_SET_MODE after 2.5 s only), then how it ended"),
+    11: Item(
+        "a long action says IN_PROGRESS at least once a second (modes and gimbal: after 2.5 s), then how it ended"
+    ),
     12: Item("a command sent four times in two seconds is executed once"),
     13: Item("commands mean the same as LONG and as INT"),
     14: Item("AUTOPILOT_VERSION on request, unset parameters tolerated"),
@@ -122,7 +124,7 @@ ITEMS: dict[int, Item] = {
     113: Item("FTP: list, open, read, burst, CRC; lost replies, traversal", NEITHER),
     114: Item("@PARAM/param.pck: a valid file or an answer at once"),
     115: Item("FTP sessions of two clients", NEITHER),
-    116: Item("MAVSDK: action, mission, telemetry, param, info, ftp", PX4, "camera, gimbal"),
+    116: Item("MAVSDK: action, mission, telemetry, param, info, ftp, gimbal", PX4, "camera"),
     117: Item("dronekit on ArduPilot's flavour", COPTER),
     118: Item("dronekit on PX4's flavour", PX4),
     119: Item("MAVProxy on ArduPilot's flavour", COPTER),

@@ -89,7 +89,8 @@ REACHED: dict[str, Reach] = {
     "link/quality": Reach("`RC_CHANNELS`.rssi, `ANAFI_LINK`.quality", _TELEMETRY + "test_conf_134_rssi"),
     "skycontroller/attitude": Reach("`ANAFI_CONTROLLER_ATTITUDE`", _ANAFI + "test_where_the_skycontroller_points"),
     "skycontroller/command": Reach(
-        "`ANAFI_CONTROLLER_INPUT`", _ANAFI + "test_skycontroller_sticks_are_reported_while_a_program_flies"
+        "`ANAFI_CONTROLLER_INPUT`, `RC_CHANNELS`; wheels and buttons with `ANF_SC_WHEELS`, `ANF_SC_BUTTONS`",
+        _ANAFI + "test_wheels_and_buttons_are_the_clients_on_request",
     ),
     "skycontroller/rpy": Reach("`ANAFI_CONTROLLER_ATTITUDE`", _ANAFI + "test_where_the_skycontroller_points"),
     "storage/available": Reach("", waits=PAYLOAD),

@@ -38,6 +38,9 @@ MAIN = 0
 """Id of the gimbal that carries the cameras; the Ai's stereo camera has one of its own."""
 
 ARRIVED_DEG = 0.5
+INVISIBLE_SHARE = 1e-4
+"""Share of an axis' highest rate that no attitude confirms: 0.02 deg/s of 180 is `STILL_DEG` in `ANSWER_TIMEOUT`."""
+
 STILL_DEG = 0.1
 """Between two attitudes of a gimbal that stands."""
 SETTLING = 3
@@ -480,7 +483,7 @@ class _Turning:
     def _turned(self, axis: Axis, aim: Aim, start: GimbalAttitude, now: GimbalAttitude) -> bool:
         before, after = start.angle(axis, aim.frame), now.angle(axis, aim.frame)
         way = aim.value if self._is_rate else _turn(after, aim.value)
-        if way == 0.0 or (not self._is_rate and abs(way) <= ARRIVED_DEG):
+        if abs(way) <= (INVISIBLE_SHARE if self._is_rate else ARRIVED_DEG):
             return True
         if replace(self._state, attitude=now).is_at_end(axis, way):
             return True

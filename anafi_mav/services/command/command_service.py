@@ -19,7 +19,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.command_targets import UnsupportedFrame
 from anafi_mav.services.commands import (
-    MODE_PROGRESS_AFTER,
+    LATE_PROGRESS_AFTER,
     PROGRESS_AFTER,
     PROGRESS_EVERY,
     QUERY,
@@ -218,7 +218,7 @@ class CommandService(Service):
 
         progress = Alarm(report)
         if policy is not None:
-            progress.set_in(MODE_PROGRESS_AFTER if policy is ProgressPolicy.LATE else PROGRESS_AFTER)
+            progress.set_in(LATE_PROGRESS_AFTER if policy is ProgressPolicy.LATE else PROGRESS_AFTER)
         result = dialect.MAV_RESULT_FAILED
         try:
             await self._actions[command.id].handler(command)

@@ -21,7 +21,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.stall import STALL
 from anafi_mav.services.command_targets import height, place
-from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect
+from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.gimbal import gimbal_messages, mount, targets
 from anafi_mav.services.gimbal.control import Answer, ClientId, GimbalControl, Heartbeats
@@ -99,35 +99,35 @@ class GimbalService(Service):
         return dialect.MAV_PROTOCOL_CAPABILITY_COMPONENT_IMPLEMENTS_GIMBAL_MANAGER
 
     def actions(self) -> Mapping[int, Action]:
+        # MAVSDK's gimbal plugin takes an IN_PROGRESS for a failure (gimbal_impl.cpp, receive_command_result).
+        late = ProgressPolicy.LATE
+
         def aim(handler: mount.Handler) -> Action:
             return Action(
                 handler,
                 location=False,
                 altitude=Altitude.UNUSED,
                 effect=Effect.TARGET,
+                progress=late,
                 group=ActionGroup.GIMBAL,
             )
+
+        def look(
+            handler: mount.Handler, altitude: Altitude = Altitude.UNUSED, effect: Effect = Effect.CHANGE
+        ) -> Action:
+            has_location = altitude is not Altitude.UNUSED
+            return Action(handler, location=has_location, altitude=altitude, effect=effect, progress=late)
 
         return {
             dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: aim(self._pitch_yaw),
             dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE: aim(self._configure),
             dialect.MAV_CMD_DO_MOUNT_CONFIGURE: aim(self._mount_configure),
             dialect.MAV_CMD_DO_MOUNT_CONTROL: aim(self._mount_control),
-            dialect.MAV_CMD_DO_SET_ROI_LOCATION: Action(
-                self._look_at, location=True, altitude=Altitude.AMSL, effect=Effect.CHANGE
-            ),
-            dialect.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET: Action(
-                self._look_beside, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
-            ),
-            dialect.MAV_CMD_DO_SET_ROI_SYSID: Action(
-                self._look_at_system, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
-            ),
-            dialect.MAV_CMD_DO_SET_ROI_NONE: Action(
-                self._look_anywhere, location=False, altitude=Altitude.UNUSED, effect=Effect.STOP
-            ),
-            dialect.MAV_CMD_DO_SET_ROI: Action(
-                self._legacy_roi, location=True, altitude=Altitude.BY_FRAME, effect=Effect.CHANGE
-            ),
+            dialect.MAV_CMD_DO_SET_ROI_LOCATION: look(self._look_at, Altitude.AMSL),
+            dialect.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET: look(self._look_beside),
+            dialect.MAV_CMD_DO_SET_ROI_SYSID: look(self._look_at_system),
+            dialect.MAV_CMD_DO_SET_ROI_NONE: look(self._look_anywhere, effect=Effect.STOP),
+            dialect.MAV_CMD_DO_SET_ROI: look(self._legacy_roi, Altitude.BY_FRAME),
         }
 
     def messages(self) -> Mapping[int, MessageHandler]:

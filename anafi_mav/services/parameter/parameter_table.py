@@ -89,7 +89,8 @@ def _switch(
     )
 
 
-FLIGHT, HOME, GIMBAL, GATEWAY = "ANAFI flight", "ANAFI home", "ANAFI gimbal", "Gateway"
+FLIGHT, HOME, GIMBAL, CONTROLLER = "ANAFI flight", "ANAFI home", "ANAFI gimbal", "Skycontroller"
+GATEWAY = "Gateway"
 
 MAX_TILT = _range(
     "ANF_MAX_TILT",
@@ -343,6 +344,36 @@ GIMBAL_SPEED = _range(
     unit="deg/s",
     step=1.0,
     group=GIMBAL,
+)
+CONTROLLER_WHEELS = Parameter(
+    "ANF_SC_WHEELS",
+    ParamType.INT32,
+    "Clients read the Skycontroller's two wheels",
+    read=lambda host: number(host.vehicle.controller_inputs.wheels),
+    write=lambda host, value: host.vehicle.controller_inputs.request_wheels(value == 1),
+    values=OFF_ON,
+    updates=(events.GrabState,),
+    present=lambda drone: drone.controller.present,
+    group=CONTROLLER,
+    long="On: RC_CHANNELS 5 (tilt) and 6 (zoom) and ANAFI_CONTROLLER_INPUT report them. They do not move camera and "
+    "zoom.",
+    source=events.GrabState.NAME,
+    models="behind a Skycontroller",
+)
+CONTROLLER_BUTTONS = Parameter(
+    "ANF_SC_BUTTONS",
+    ParamType.INT32,
+    "Clients read the two buttons at the Skycontroller's back",
+    read=lambda host: number(host.vehicle.controller_inputs.buttons),
+    write=lambda host, value: host.vehicle.controller_inputs.request_buttons(value == 1),
+    values=OFF_ON,
+    updates=(events.GrabState,),
+    present=lambda drone: drone.controller.present,
+    group=CONTROLLER,
+    long="On: RC_CHANNELS 7 (left) and 8 (right) and ANAFI_CONTROLLER_INPUT report them. They do not reset camera "
+    "and zoom. Return home and take-off/land are always the pilot's.",
+    source=events.GrabState.NAME,
+    models="behind a Skycontroller",
 )
 MODEL = Parameter(
     "ANF_MODEL",
@@ -658,6 +689,8 @@ NATIVE: tuple[Parameter, ...] = (
     PRECISE_HOME,
     HOME_TYPE,
     GIMBAL_SPEED,
+    CONTROLLER_WHEELS,
+    CONTROLLER_BUTTONS,
     MODEL,
     TAKEOFF_HEIGHT,
     HAND_LAUNCH,

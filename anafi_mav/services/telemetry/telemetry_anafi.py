@@ -19,15 +19,13 @@ from anafi_mav.drone.piloting.state import REDUCERS as PILOTING
 from anafi_mav.drone.status.alerts import Alerts
 from anafi_mav.drone.status.home import Home
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.stream import MessageStream, Times
+from anafi_mav.services.stream import INPUT_FASTEST, MessageStream, Times
+from anafi_mav.services.telemetry.telemetry_link import INPUT_EVENTS
 from anafi_mav.vehicle.vehicle import Vehicle
 
 NAN = math.nan
 UNKNOWN_U8, UNKNOWN_U16, UNKNOWN_I32 = 0xFF, 0xFFFF, 0x7FFFFFFF
 NO_AXIS = -128
-
-INPUT_FASTEST = 0.01
-"""s between two ANAFI_CONTROLLER_INPUT: anafi_ros publishes the Skycontroller's sticks a hundred times a second."""
 
 
 def _u8(value: int | None) -> int:
@@ -191,7 +189,7 @@ _MOTION = (
 )
 """Reported all the time; nothing of it is in ANAFI_FLIGHT_STATUS."""
 
-_INPUT = (events.GrabState, events.GrabAxisEvent, events.GrabButtonEvent, events.PilotingSource)
+_INPUT = (*INPUT_EVENTS, events.PilotingSource)
 
 STREAMS: Mapping[int, MessageStream] = {
     dialect.MAVLINK_MSG_ID_ANAFI_FLIGHT_STATUS: _state(

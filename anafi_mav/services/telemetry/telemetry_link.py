@@ -10,9 +10,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from anafi_mav import units
+from anafi_mav.drone import events
+from anafi_mav.drone.controller.controller import PITCH, RESET_CAMERA, RESET_ZOOM, ROLL, THROTTLE, TILT, YAW, ZOOM
+from anafi_mav.drone.controller.state import ControllerState
 from anafi_mav.drone.status.link import Link
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.stream import MessageStream, Times
+from anafi_mav.services.stream import INPUT_FASTEST, MessageStream, Times
 from anafi_mav.vehicle.vehicle import Vehicle
 
 UNKNOWN_U8 = 255
@@ -20,19 +23,56 @@ UNUSED_CHANNEL = 0xFFFF
 
 BEST_QUALITY = 5
 
+STICK_CHANNELS: Mapping[int, tuple[int, int]] = {
+    1: (ROLL, 1),
+    2: (PITCH, -1),
+    3: (THROTTLE, 1),
+    4: (YAW, 1),
+    5: (TILT, 1),
+    6: (ZOOM, 1),
+}
+"""Axis and sign of each channel. The sticks are those of RC_CHANNELS_OVERRIDE, where forward is below the middle."""
+BUTTON_CHANNELS: Mapping[int, int] = {7: RESET_CAMERA, 8: RESET_ZOOM}
+"""Button of each channel."""
+PULSE_MIDDLE, PULSE_WAY = 1500, 500
+"""us: an input at rest, and its way to an end. A button is at one of the ends (ArduPilot's RCn_MIN, TRIM, MAX)."""
+
+INPUT_EVENTS = (events.GrabState, events.GrabAxisEvent, events.GrabButtonEvent)
+"""What a Skycontroller reports of its inputs."""
+
 MEMINFO = Path("/proc/meminfo")
 """Linux reports its memory here, in KiB (proc_meminfo(5)). Other systems do not have it."""
 
 
 def rc_channels(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """RC_CHANNELS for its rssi: the quality of the drone's radio, behind a Skycontroller.
+    """Return RC_CHANNELS of the Skycontroller's grabbed inputs.
 
-    An ANAFI has no channels to show, and without sticks there is no radio of theirs: unknown.
+    Its rssi is the quality of the drone's radio. It is unknown without a Skycontroller: there is no radio of sticks.
     """
-    quality = vehicle.drone.link.state.quality if vehicle.drone.controller.present else None
+    controller = vehicle.drone.controller
+    quality = vehicle.drone.link.state.quality if controller.present else None
     rssi = UNKNOWN_U8 if quality is None else round(times.flavour.rssi_full * quality / BEST_QUALITY)
-    channels = {f"chan{number}_raw": UNUSED_CHANNEL for number in range(1, 19)}
-    return dialect.MAVLink_rc_channels_message(time_boot_ms=times.boot_ms, chancount=0, rssi=rssi, **channels)
+    read = _channels(controller.state) if controller.present else {}
+    channels = {f"chan{number}_raw": read.get(number, UNUSED_CHANNEL) for number in range(1, 19)}
+    count = max(*STICK_CHANNELS, *BUTTON_CHANNELS) if read else 0
+    return dialect.MAVLink_rc_channels_message(time_boot_ms=times.boot_ms, chancount=count, rssi=rssi, **channels)
+
+
+def _channels(state: ControllerState) -> dict[int, int]:
+    """Return the pulse width of each grabbed input, us, by channel.
+
+    An axis that is not reported yet is left out.
+    """
+    axes, buttons = state.grabbed_axes or 0, state.grabbed_buttons or 0
+    read = {
+        channel: round(PULSE_MIDDLE + sign * PULSE_WAY * state.axes[axis] / 100)
+        for channel, (axis, sign) in STICK_CHANNELS.items()
+        if axes >> axis & 1 and axis in state.axes
+    }
+    for channel, button in BUTTON_CHANNELS.items():
+        if buttons >> button & 1:
+            read[channel] = PULSE_MIDDLE + (PULSE_WAY if button in state.pressed else -PULSE_WAY)
+    return read
 
 
 def _signal(dbm: int, times: Times) -> int:
@@ -106,7 +146,9 @@ def onboard_computer_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_m
 _UPDATES = tuple(Link.REDUCERS)
 
 STREAMS: Mapping[int, MessageStream] = {
-    dialect.MAVLINK_MSG_ID_RC_CHANNELS: MessageStream(rc_channels, _UPDATES, every=1.0, repeated=True, flavoured=True),
+    dialect.MAVLINK_MSG_ID_RC_CHANNELS: MessageStream(
+        rc_channels, (*_UPDATES, *INPUT_EVENTS), every=1.0, repeated=True, flavoured=True, fastest=INPUT_FASTEST
+    ),
     dialect.MAVLINK_MSG_ID_RADIO_STATUS: MessageStream(
         radio_status, _UPDATES, every=1.0, repeated=True, flavoured=True
     ),

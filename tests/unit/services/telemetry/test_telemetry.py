@@ -11,6 +11,7 @@ import pytest
 
 from anafi_mav.clock import SystemClock
 from anafi_mav.drone import Drone
+from anafi_mav.drone.controller.state import ControllerState
 from anafi_mav.drone.piloting.state import Attitude, PilotingState, Velocity
 from anafi_mav.drone.status.battery import BatteryState
 from anafi_mav.drone.status.link import LinkState
@@ -216,7 +217,7 @@ def vehicle(**elements: Any) -> Any:
 def test_rssi_in_the_scale_of_the_family(quality: int) -> None:
     # fifths of 100, and of 254: 50.8, 101.6, 152.4, 203.2, 254
     told = vehicle(link=LinkState(quality=quality))
-    told.drone.controller = SimpleNamespace(present=True)
+    told.drone.controller = SimpleNamespace(present=True, state=ControllerState())
     for flavour, full in (
         (PX4, [20, 40, 60, 80, 100]),
         (STANDARD, [20, 40, 60, 80, 100]),
