@@ -215,6 +215,17 @@ async def test_conf_091_viewer_stays_while_the_link_fades() -> None:
             await eye.look(30)
 
 
+async def test_conf_091_switch_without_a_link_is_reported_after_it() -> None:
+    async with world(model="ai", speed=8.0) as w:
+        assert await show(w.client, 2) == ACCEPTED
+        mark = w.client.mark()
+        assert (await w.client.command(stock.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1)).result == ACCEPTED
+        # It shows its main camera when it is back: the stereo camera is the choice of a connection.
+        await w.client.wait(
+            "VIDEO_STREAM_STATUS", lambda m: m.stream_id == 1 and m.flags & RUNNING, since=mark, timeout=30.0
+        )
+
+
 @pytest.mark.parametrize(
     ("video", "host"),
     [
