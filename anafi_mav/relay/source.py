@@ -78,6 +78,11 @@ class DroneSource:
         """Number of viewers that play."""
         return len(self._viewers)
 
+    @property
+    def shown(self) -> StreamKind:
+        """The stream that the drone shows."""
+        return self._drone.streams.shown.kind
+
     def refusal(self, kind: StreamKind) -> str | None:
         """Return why a stream cannot be watched now, or None."""
         if not self._drone.connected:

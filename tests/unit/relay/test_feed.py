@@ -7,12 +7,10 @@ from collections.abc import Sequence
 from anafi_mav.arsdk.video.rtp import Packet, decode_packet
 from anafi_mav.arsdk.video.rtp_h264 import Picture, PictureReceiver
 from anafi_mav.relay import feed as feed_module
+from anafi_mav.relay.admission import MAX_ENTRY_WAIT, MAX_WAITING, RESUME_BELOW
 from anafi_mav.relay.feed import (
     BURST_STEP,
-    MAX_ENTRY_WAIT,
     MAX_KEPT_PICTURES,
-    MAX_WAITING,
-    RESUME_BELOW,
     Feed,
     FeedReader,
     is_entry,
