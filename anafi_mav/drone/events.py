@@ -110,6 +110,7 @@ from anafi_mav.arsdk.messages.thermal import RenderingMode as RenderingMode
 from anafi_mav.arsdk.messages.thermal import ShutterTrigger as ShutterTrigger
 from anafi_mav.arsdk.messages.thermal import SpotType as SpotType
 from anafi_mav.arsdk.messages.thermal import ThermalMode as ThermalMode
+from anafi_mav.arsdk.messages.user_storage import Feature as StorageFeature
 from anafi_mav.arsdk.messages.user_storage import FormattingType as FormattingType
 from anafi_mav.arsdk.messages.user_storage import FsState as FsState
 from anafi_mav.arsdk.messages.user_storage import PhyState as PhyState
@@ -215,6 +216,7 @@ __all__ = [
     "SensorsStatesListChanged",
     "ShutterTrigger",
     "SpeedChanged",
+    "StorageFeature",
     "TakeoffChecklist",
     "TakeoffChecklistType",
     "TakeoffLocation",

@@ -263,7 +263,7 @@ class _Connection:
                     self._write(dialogue.done(request))
                     self._end_session()
         except NotShown as error:
-            log.info("video: %s: %s", self._name, error)
+            log.debug("video: %s: %s", self._name, error)  # a station retries each second
             self._write(dialogue.refused(request, Status.SERVICE_UNAVAILABLE, str(error)))
 
     async def _describe(self, wanted: ViewerRequest) -> Response:

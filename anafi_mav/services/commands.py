@@ -77,6 +77,7 @@ class Effect(enum.Enum):
     LAND = "a STOP that another client's Hold may have ended since: it is then not repeated"
     RETURN = "asks for the way home: when that is flown already, it is carried out again; never cancelled"
     LAPSING = "a mode that ends without another command: asked for after its end, it begins again, or is refused"
+    EACH = "counts each time: after its end it is executed again, unless its confirmation says that it is repeated"
     TARGET = "a target that may be set twice: carried out each time it arrives, and never cancelled"
     IRREVOCABLE = "cannot be cancelled: the drone does it whatever is sent then, so CANCELLED would be a lie"
 
@@ -152,6 +153,8 @@ class Definition:
     """The mode that it names, None for one that we do not have. Only for commands that name modes."""
     progress: ProgressPolicy = ProgressPolicy.PROMPT
     group: ActionGroup = ActionGroup.FLIGHT
+    offered: Callable[[Flavour], bool] = lambda flavour: True
+    """Return True for flavours whose clients have the command."""
 
     def check(self, id: int) -> None:
         """Raise `ValueError` when this contradicts MAVLink's definition of the MAV_CMD, or itself."""
@@ -198,6 +201,8 @@ class Command:
     """The autopilot that the sender takes us for."""
     at: float = 0.0
     """When it arrived, on the monotonic clock."""
+    confirmation: int = 0
+    """Above 0 in a COMMAND_LONG that is sent again because no answer was received."""
     counted: bool = True
     """Its effect is HOLD, and its client sent no other such command in the 5 s before."""
 
@@ -250,6 +255,7 @@ def from_long(
         None,
         client,
         flavour,
+        confirmation=message.confirmation,
     )
 
 
@@ -319,6 +325,8 @@ class CommandHistory:
         if newest.result == dialect.MAV_RESULT_IN_PROGRESS:
             return newest.result
         effect = command.effect
+        if effect is Effect.EACH and not command.confirmation:
+            return None
         landing_ended = effect is Effect.LAND and newest.superseded and landing_ended_at >= newest.ended
         if effect.is_repeatable and not landing_ended:
             return None

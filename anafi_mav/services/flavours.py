@@ -96,6 +96,9 @@ class Flavour:
     """A stick that leaves the middle takes the drone over from what flies it (PX4's COM_RC_OVERRIDE)."""
     data_streams: bool = False
     """REQUEST_DATA_STREAM sets rates. PX4 ignores it, and MAVProxy would slow a PX4 down by it."""
+    camera_at_autopilot: bool = False
+    """Component 1 carries out camera commands as well, for camera id 0 or 1: clients of this family address them there.
+    """
     packed_files: bool = False
     """Parameters and plans are also files (`@PARAM/param.pck` and others). PX4's clients do not look for them."""
     text_version: bool = False
@@ -263,6 +266,7 @@ ARDUPILOT = Flavour(
     guided_setpoints=True,
     first_answer_as_final=True,
     data_streams=True,
+    camera_at_autopilot=True,
     packed_files=True,
     text_version=True,
     sik_radio=True,

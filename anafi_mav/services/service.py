@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine, Hashable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Protocol
 
 from anafi_mav.clock import Clock
@@ -50,12 +51,16 @@ class Host(Protocol):
     capabilities: int
     """MAV_PROTOCOL_CAPABILITY bits of all services of the component."""
     memory: Memory
+    download_folder: Path | None
+    """Folder for copies of the drone's media after a landing; None: they are not copied."""
     uris: GatewayUris
     """What the gateway serves beside MAVLink."""
     has_picture_pose: bool
     """True when the configuration allows pose from the live video."""
     definition: DefinitionLink
     """Camera definition of the component."""
+    camera_flags: int
+    """CAMERA_CAP_FLAGS of all services of the component that do not depend on the drone."""
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -157,6 +162,10 @@ class Service:
 
     def capabilities(self) -> int:
         """MAV_PROTOCOL_CAPABILITY bits that this service is the reason for."""
+        return 0
+
+    def camera_flags(self) -> int:
+        """CAMERA_CAP_FLAGS bits that this service is the reason for."""
         return 0
 
     def messages(self) -> Mapping[int, MessageHandler]:

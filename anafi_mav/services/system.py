@@ -20,6 +20,9 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.mavlink.router import EVERY_COMPONENT
+from anafi_mav.services.camera.camera_service import CameraService
+from anafi_mav.services.camera.capture_service import CaptureService
+from anafi_mav.services.camera.storage_service import StorageService
 from anafi_mav.services.camera_definition.param_ext_service import ParamExtService
 from anafi_mav.services.command.calibration_service import CalibrationService
 from anafi_mav.services.command.command_service import SETTLE
@@ -39,6 +42,7 @@ from anafi_mav.services.ground_station.node_status_service import NodeStatusServ
 from anafi_mav.services.ground_station.shell_service import ShellService
 from anafi_mav.services.ground_station.time_service import TimeService
 from anafi_mav.services.ground_station.tune_service import TuneService
+from anafi_mav.services.media.download_service import DownloadService
 from anafi_mav.services.media.media_service import MediaService
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.monitor import takeoff_point_service
@@ -113,7 +117,15 @@ AUTOPILOT_SERVICES: tuple[type[Service], ...] = (
 )
 """Services of component 1, beside commands, messages and files themselves."""
 
-CAMERA_SERVICES: tuple[type[Service], ...] = (ParamExtService, MediaService, VideoStreamService)
+CAMERA_SERVICES: tuple[type[Service], ...] = (
+    CameraService,
+    CaptureService,
+    StorageService,
+    VideoStreamService,
+    ParamExtService,
+    MediaService,
+    DownloadService,
+)
 """Services of component 100."""
 
 AUTOPILOT = dialect.MAV_COMP_ID_AUTOPILOT1
@@ -157,14 +169,20 @@ class System:
         *,
         allow_kill: bool,
         state: Path | None = None,
+        download_folder: Path | None = None,
         uris: GatewayUris = GatewayUris(),  # noqa: B008  # frozen
         has_picture_pose: bool = True,
     ) -> None:
+        """`state`: folder of stored state.
+
+        `download_folder`: for copies of the drone's media after a landing; None: they are not copied.
+        """
         self.sysid = sysid
         self.has_picture_pose = has_picture_pose
         self.drone = drone
         self.clock = clock
         self.memory = Memory(state)
+        self.download_folder = download_folder
         self.uris = uris
         self.active = False
         self._node = node

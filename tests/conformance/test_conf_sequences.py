@@ -214,7 +214,12 @@ async def test_conf_120_mission_planner() -> None:
         await client.wait("STATUSTEXT", lambda m: m.text.startswith("ArduCopter V4.5"), since=mark)
         values = await fetch(client, "ardupilot")
         assert {"SYSID_THISMAV", "RTL_ALT"} <= set(values)
-        for target, message, result in (((1, 1), 259, UNSUPPORTED), ((1, 1), 280, ACCEPTED), ((0, 0), 280, ACCEPTED)):
+        for target, message, result in (
+            ((1, 1), 259, UNSUPPORTED),
+            ((0, 0), 259, ACCEPTED),
+            ((1, 1), 280, ACCEPTED),
+            ((0, 0), 280, ACCEPTED),
+        ):
             began = time.monotonic()
             assert (await client.command(REQUEST, message, target=target)).result == result
             assert time.monotonic() - began < 0.2

@@ -47,6 +47,8 @@ ZOOM_STILL = 1e-3
 SERIES = frozenset({PhotoMode.TIME_LAPSE, PhotoMode.GPS_LAPSE})
 """Photo modes that go on until they are stopped."""
 
+BEGUN = (CaptureProgress.STARTED, CaptureProgress.TAKEN)
+
 _SPEECH: Mapping[str, type[ClassicCamera] | type[ModernCamera]] = {
     camera_classic.FEATURE: ClassicCamera,
     camera_modern.FEATURE: ModernCamera,
@@ -66,6 +68,26 @@ class Camera(Commanding[CamerasState]):
 
     NOTHING = CamerasState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {**camera_classic.REDUCERS, **camera_modern.REDUCERS}
+
+    PHOTO_EVENTS: ClassVar[tuple[type[Message], ...]] = (*ClassicCamera.photo_events, *ModernCamera.photo_events)
+    """Events about a photo; `photo_update` reads them."""
+    RECORDING_EVENTS: ClassVar[tuple[type[Message], ...]] = (
+        *ClassicCamera.recording_events,
+        *ModernCamera.recording_events,
+    )
+    """Events about a recording; `recording_update` reads them."""
+
+    @staticmethod
+    def photo_update(message: Message) -> CaptureUpdate | None:
+        """Return the progress that one of `PHOTO_EVENTS` reports, if any."""
+        classic = isinstance(message, ClassicCamera.photo_events)
+        return ClassicCamera.photo_news(message) if classic else ModernCamera.photo_news(message)
+
+    @staticmethod
+    def recording_update(message: Message) -> CaptureUpdate | None:
+        """Return the progress that one of `RECORDING_EVENTS` reports, if any."""
+        classic = isinstance(message, ClassicCamera.recording_events)
+        return ClassicCamera.recording_news(message) if classic else ModernCamera.recording_news(message)
 
     FREQUENT: ClassVar[frozenset[type[Message]]] = frozenset(
         {*camera_classic.FREQUENT, *camera_modern.FREQUENT},
@@ -93,10 +115,12 @@ class Camera(Commanding[CamerasState]):
             number(wish.interval, "interval")
         return (await self._ask(id, "photo", lambda s, now: s.photo(id, now, wish))).photo
 
-    async def take_photo(self, id: int = MAIN, timeout: float = SAVE_TIMEOUT) -> str | None:
+    async def take_photo(
+        self, id: int = MAIN, timeout: float = SAVE_TIMEOUT, *, until_saved: bool = True
+    ) -> str | None:
         """Take a photo; return its media id once it is stored.
 
-        A series returns None as soon as it has begun.
+        A series returns None as soon as it has begun, and so does any photo with `until_saved` False.
 
         Raises `CommandRejected` when no photo can be taken (in mode RECORDING, or the storage is full).
         """
@@ -110,7 +134,7 @@ class Camera(Commanding[CamerasState]):
                 return update.media
             if update.progress is CaptureProgress.FAILED:
                 return CommandRejected(f"photo: {update.reason}")
-            return True if series and update.progress is CaptureProgress.STARTED else None
+            return True if (series or not until_saved) and update.progress in BEGUN else None
 
         result = await self._capture(
             id, speech.take_photo(id), speech.photo_events, speech.photo_news, judge, ANSWER_TIMEOUT, timeout
@@ -214,6 +238,33 @@ class Camera(Commanding[CamerasState]):
         speech, now = self._known(id)
         self._zoom_max(now)
         self._order(("zoom", id), speech.zoom_rate(id, clip(number(share, "zoom rate"), -1.0, 1.0)))
+
+    async def start_zoom(self, share: float, id: int = MAIN) -> float:
+        """Zoom by rate as `zoom_rate`; return the factor once the zoom moves or is at its end.
+
+        The command is repeated until the drone reports that.
+        """
+        speech, now = self._known(id)
+        most = self._zoom_max(now)
+        wanted = clip(number(share, "zoom rate"), -1.0, 1.0)
+        if wanted == 0.0:
+            return await self.stop_zoom(id)
+        if not now.zoom_may_degrade:
+            most = min(most, now.zoom_max_lossless or most)
+        first: float | None = now.zoom
+
+        def judge(message: Any) -> float | None:
+            nonlocal first
+            if speech.camera_of(message) != id:
+                return None
+            if first is None:
+                first = message.level
+            moves = (message.level - first) * wanted > 0.0 and abs(message.level - first) > ZOOM_STILL
+            ends = message.level <= 1.0 + ZOOM_ARRIVED if wanted < 0.0 else message.level >= most * (1.0 - ZOOM_ARRIVED)
+            return float(message.level) if moves or ends else None
+
+        answer = self._commander.expect((speech.zoom_event,), judge)
+        return await self._insist(("zoom", id), speech.zoom_rate(id, wanted), answer, ANSWER_TIMEOUT)
 
     async def stop_zoom(self, id: int = MAIN) -> float:
         """Stop the zoom; return the factor at which it stands."""

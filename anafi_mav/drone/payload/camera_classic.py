@@ -319,8 +319,10 @@ def photo_news(m: Any) -> CaptureUpdate | None:
     if isinstance(m, wire.PhotoState):
         return CaptureUpdate(m.cam_id, CaptureProgress.STARTED if m.state == State.ACTIVE else CaptureProgress.ENDED)
     if m.result == PhotoResult.PHOTO_SAVED:
-        return CaptureUpdate(m.cam_id, CaptureProgress.SAVED, m.media_id)
-    if m.result in (PhotoResult.TAKING_PHOTO, PhotoResult.PHOTO_TAKEN):
+        return CaptureUpdate(m.cam_id, CaptureProgress.SAVED, m.media_id, count=m.photo_count or None)
+    if m.result == PhotoResult.PHOTO_TAKEN:
+        return CaptureUpdate(m.cam_id, CaptureProgress.TAKEN, count=m.photo_count or None)
+    if m.result == PhotoResult.TAKING_PHOTO:
         return CaptureUpdate(m.cam_id, CaptureProgress.STARTED)
     return CaptureUpdate(m.cam_id, CaptureProgress.FAILED, reason=spoken(m.result))
 

@@ -318,14 +318,15 @@ def photo_news(m: Any) -> CaptureUpdate | None:
 
     The events are START, then STOP with the media id, once for a series as for a single picture.
     """
-    if m.type in (wire.PhotoEvent.START, wire.PhotoEvent.TAKING_PHOTO):
+    if m.type == wire.PhotoEvent.START:
         return CaptureUpdate(m.camera_id, CaptureProgress.STARTED)
+    if m.type == wire.PhotoEvent.TAKING_PHOTO:
+        return CaptureUpdate(m.camera_id, CaptureProgress.TAKEN)
     if m.type != wire.PhotoEvent.STOP:
         return None
     if m.media_id:
-        return CaptureUpdate(
-            m.camera_id, CaptureProgress.SAVED, m.media_id, "" if m.stop_reason in _DONE else spoken(m.stop_reason)
-        )
+        reason = "" if m.stop_reason in _DONE else spoken(m.stop_reason)
+        return CaptureUpdate(m.camera_id, CaptureProgress.SAVED, m.media_id, reason, is_last=True)
     if m.stop_reason in _DONE:
         return CaptureUpdate(m.camera_id, CaptureProgress.ENDED)
     return CaptureUpdate(m.camera_id, CaptureProgress.FAILED, reason=spoken(m.stop_reason))

@@ -236,6 +236,8 @@ class CaptureProgress(enum.Enum):
     """Progress of a requested photo or recording."""
 
     STARTED = enum.auto()
+    TAKEN = enum.auto()
+    """Photo: the shutter has opened."""
     SAVED = enum.auto()
     """Photo: the media is stored."""
     ENDED = enum.auto()
@@ -252,3 +254,7 @@ class CaptureUpdate(msgspec.Struct, frozen=True):
     """Media id, of SAVED and ENDED."""
     reason: str = ""
     """Reason of FAILED, and of an end that was not requested."""
+    count: int | None = None
+    """Pictures so far, of TAKEN and SAVED, modulo 256; None where the drone does not report it."""
+    is_last: bool = False
+    """SAVED: it is also the end of the photo or series."""

@@ -238,6 +238,14 @@ class Storage(Commanding[Storages]):
         v3.FormattingResult: lambda state, m: _with(state, m.id, step=None, percent=None),
     }
 
+    RESULT_EVENTS: ClassVar[tuple[type[Message], ...]] = (v1.FormatResult, v2.FormatResult, v3.FormattingResult)
+    """Events at the end of a format; `formatted` reads them."""
+
+    @staticmethod
+    def formatted(message: Message) -> int | None:
+        """Return the id of the storage that a result reports as formatted; None: it was not."""
+        return _id(message) if _result(message) == FormattingResult.SUCCESS else None
+
     def __getitem__(self, id: int) -> StorageState:
         """The state of this storage, an empty one when the drone has not reported it."""
         return self.state.get(id, StorageState())

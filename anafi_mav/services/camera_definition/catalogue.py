@@ -65,6 +65,14 @@ class CatalogueEntry(NamedTuple):
     options: tuple[Option, ...]
     limits: ValueLimits | None
 
+    @property
+    def default(self) -> float:
+        """The possible value that is nearest to the default of the table."""
+        wanted = self.setting.kind.normalise(self.setting.default)
+        if self.limits is not None:
+            return min(max(wanted, self.limits.low), self.limits.high)
+        return min((option.value for option in self.options), key=lambda value: abs(value - wanted))
+
 
 class Catalogue:
     """The settings of one connected drone."""

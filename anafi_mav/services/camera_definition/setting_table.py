@@ -359,7 +359,6 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         default=1,
         guard=Guard.CAPTURE,
         is_listed=False,
-        changes=("CAM_SHUTTERSPD", "CAM_ISO", "CAM_ISOMAX", "CAM_HDR"),
     ),
     # -- photos
     CameraSetting(
@@ -370,7 +369,6 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         write=lambda drone, id, value: set_photo(drone, id, PhotoSettings(mode=word_of(PHOTO_MODES, value))),
         options=lambda view: choices(PHOTO_MODES, union(one.modes for one in view.camera.photos)),
         guard=Guard.CAPTURE,
-        changes=("CAM_PHOTOPROJ", "CAM_PHOTOFMT", "CAM_PHOTOLAPSE", "CAM_PHOTODIST"),
         only_in={"CAM_MODE": PHOTO},
     ),
     CameraSetting(
@@ -381,7 +379,6 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         write=lambda drone, id, value: set_photo(drone, id, PhotoSettings(format=word_of(PHOTO_FORMATS, value))),
         options=lambda view: choices(PHOTO_FORMATS, union(one.formats for one in view.camera.photos)),
         guard=Guard.CAPTURE,
-        changes=("CAM_PHOTOFMT",),
         only_in={"CAM_MODE": PHOTO},
     ),
     CameraSetting(
@@ -461,7 +458,6 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         write=lambda drone, id, value: set_recording(drone, id, RecordingSettings(mode=word_of(VIDEO_MODES, value))),
         options=lambda view: choices(VIDEO_MODES, union(one.modes for one in view.camera.recordings)),
         guard=Guard.CAPTURE,
-        changes=("CAM_VIDRES", "CAM_VIDFPS", "CAM_SHUTTERSPD", "CAM_ISO", "CAM_ISOMAX"),
         only_in={"CAM_MODE": VIDEO},
     ),
     CameraSetting(
@@ -475,7 +471,6 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         options=lambda view: choices(RESOLUTIONS, union(one.resolutions for one in view.camera.recordings)),
         default=1,
         guard=Guard.CAPTURE,
-        changes=("CAM_VIDFPS", "CAM_SHUTTERSPD"),
         only_in={"CAM_MODE": VIDEO},
     ),
     CameraSetting(
@@ -490,7 +485,6 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         unit="Hz",
         default=30.0,
         guard=Guard.CAPTURE,
-        changes=("CAM_SHUTTERSPD",),
         only_in={"CAM_MODE": VIDEO},
     ),
     CameraSetting(
@@ -539,7 +533,6 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         read=lambda view: number_of(EXPOSURES, exposure(view).mode),
         write=lambda drone, id, value: set_exposure(drone, id, ExposureSettings(mode=word_of(EXPOSURES, value))),
         options=lambda view: choices(EXPOSURES, view.camera.exposures),
-        changes=("CAM_SHUTTERSPD", "CAM_ISO", "CAM_ISOMAX", "CAM_METERING", "CAM_AELOCK"),
     ),
     CameraSetting(
         "CAM_EV",
@@ -607,7 +600,6 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         read=lambda view: number_of(WHITE_BALANCES, view.camera.white_balance),
         write=lambda drone, id, value: drone.camera.set_white_balance(word_of(WHITE_BALANCES, value), id=id),
         options=lambda view: choices(WHITE_BALANCES, view.camera.white_balances),
-        changes=("CAM_WBTEMP", "CAM_WBLOCK"),
     ),
     CameraSetting(
         "CAM_WBTEMP",
@@ -650,7 +642,6 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         read=lambda view: number_of(STYLES, style(view).style),
         write=lambda drone, id, value: drone.camera.set_style(word_of(STYLES, value), id),
         options=lambda view: choices(STYLES, view.camera.styles),
-        changes=("CAM_SATURATION", "CAM_CONTRAST", "CAM_SHARPNESS"),
     ),
     level("saturation", "CAM_SATURATION", "Saturation"),
     level("contrast", "CAM_CONTRAST", "Contrast"),

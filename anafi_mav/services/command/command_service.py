@@ -177,7 +177,7 @@ class CommandService(Service):
     def _receive(self, inbound: Inbound, decode: _Decode) -> None:
         id = inbound.message.command
         definition: Definition | None = QUERY if id in self._queries else self._actions.get(id)
-        if definition is None:
+        if definition is None or not definition.offered(flavour_of(inbound.channel)):
             self._acknowledge(inbound, id, dialect.MAV_RESULT_UNSUPPORTED)
             return
         command = decode(inbound.message, definition, client_of(inbound), flavour_of(inbound.channel))

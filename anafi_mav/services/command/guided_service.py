@@ -216,7 +216,7 @@ class GuidedService(Service):
         if math.isinf(rate) or rate < 0.0 or 0.0 < rate < SLOWEST_TURN or math.isinf(way):
             raise Refused(texts.TURN, texts.PARAM2_RATE.fill(slowest=SLOWEST_TURN), lasting=True)
         if not (math.isnan(relative) or relative in (0.0, 1.0)):  # ArduCopter refuses it too
-            raise Refused(texts.TURN, texts.PARAM4_RELATIVE, lasting=True)
+            raise Refused(texts.TURN, texts.PARAM4_BINARY, lasting=True)
         vehicle = self.host.vehicle
         attitude = vehicle.drone.piloting.state.attitude
         if not vehicle.in_air or attitude is None:

@@ -44,6 +44,9 @@ class VideoStreamService(Service):
         self._informed: set[Channel] = set()
         """Channels that received the text which explains a missing URI."""
 
+    def camera_flags(self) -> int:
+        return dialect.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
+
     def requests(self) -> Mapping[int, Request]:
         return {
             dialect.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION: self._information,
@@ -88,6 +91,8 @@ class VideoStreamService(Service):
         streams = self.host.drone.streams
         if stream.kind is streams.shown.kind:
             return
+        if self.host.vehicle.mission_needs_camera:
+            raise Refused(texts.VIDEO_STREAM, texts.MISSION_USES_CAMERA)
         if streams.is_recording:
             raise Refused(texts.VIDEO_STREAM, texts.CAMERA_RECORDS)
         if self.host.vehicle.mission_needs_camera:

@@ -44,6 +44,8 @@ CORES = [
     *("vehicle/circle.py", "vehicle/follow.py", "vehicle/hold_rule.py", "vehicle/initiator.py"),
     *("vehicle/joystick_override.py", "web/h264_offer.py"),
     *("services/capabilities.py", "services/checksum.py", "services/commands.py", "services/component_metadata.py"),
+    *("services/camera/camera_messages.py", "services/camera/photo_log.py", "services/camera/pose_track.py"),
+    "services/camera/shot_tracker.py",
     "services/gateway_uris.py",
     *("services/camera_definition/camera_setting.py", "services/camera_definition/catalogue.py"),
     *("services/camera_definition/definition_file.py", "services/camera_definition/param_ext_codec.py"),

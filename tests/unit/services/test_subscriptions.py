@@ -40,11 +40,12 @@ def test_handlers_of_several_tables_keep_table_order() -> None:
         (
             events.FlyingStateChanged,
             "Vehicle MessageService GuidedService EventService FenceService RollSignService OffboardFlight "
-            "WarningService TakeoffPointService",
+            "WarningService TakeoffPointService DownloadService",
         ),
         (
             events.SpeedChanged,
-            "MessageService OrbitService FenceService RollSignService OffboardFlight FollowFlight HighLatencyService",
+            "MessageService OrbitService FenceService RollSignService OffboardFlight FollowFlight HighLatencyService "
+            "PhotoReporter",
         ),
         (events.MavlinkFilePlayingStateChanged, "MessageService MissionFlight System"),
         (events.MissionItemExecuted, "MissionFlight"),

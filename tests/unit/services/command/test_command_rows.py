@@ -59,6 +59,15 @@ ROWS: dict[str, tuple[bool, Altitude, object, ProgressPolicy]] = {
     "NAV_RETURN_TO_LAUNCH": (False, Altitude.UNUSED, Effect.RETURN, ProgressPolicy.PROMPT),
     "NAV_TAKEOFF": (True, Altitude.BY_FRAME, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),
     "PREFLIGHT_CALIBRATION": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.FINAL_ONLY),
+    "IMAGE_START_CAPTURE": (False, Altitude.UNUSED, BY_PARAMETER, ProgressPolicy.PROMPT),
+    "IMAGE_STOP_CAPTURE": (False, Altitude.UNUSED, Effect.STOP, ProgressPolicy.PROMPT),
+    "RESET_CAMERA_SETTINGS": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),
+    "SET_CAMERA_MODE": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "SET_CAMERA_SOURCE": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),
+    "SET_CAMERA_ZOOM": (False, Altitude.UNUSED, BY_PARAMETER, ProgressPolicy.PROMPT),
+    "STORAGE_FORMAT": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),
+    "VIDEO_START_CAPTURE": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),
+    "VIDEO_STOP_CAPTURE": (False, Altitude.UNUSED, Effect.STOP, ProgressPolicy.PROMPT),
     "PREFLIGHT_REBOOT_SHUTDOWN": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.FINAL_ONLY),
 }
 """What a system carries out: location, height, effect, progress. The other MAV_CMD are queries or UNSUPPORTED."""

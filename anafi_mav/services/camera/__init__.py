@@ -1,0 +1,1 @@
+"""The camera component: information, settings, storages, photos and recordings."""

@@ -1,0 +1,74 @@
+"""Checks that the camera's commands have in common: camera, owner, storage."""
+
+from __future__ import annotations
+
+import math
+
+from anafi_mav import texts
+from anafi_mav.drone import Drone
+from anafi_mav.drone.events import FsState, PhyState
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.flavours import Flavour
+from anafi_mav.texts import OperatorText, Reason
+from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.vehicle import Vehicle
+
+OURS = (0.0, 1.0, float(dialect.MAV_COMP_ID_CAMERA))
+"""Target camera ids that mean the drone's camera: all cameras, the autopilot's first, this component."""
+
+PROBLEMS: dict[PhyState, Reason] = {
+    PhyState.UNDETECTED: texts.NO_STORAGE,
+    PhyState.TOO_SMALL: texts.STORAGE_TOO_SMALL,
+    PhyState.TOO_SLOW: texts.STORAGE_TOO_SLOW,
+    PhyState.USB_MASS_STORAGE: texts.STORAGE_USB,
+}
+FILE_SYSTEM_PROBLEMS: dict[FsState, Reason] = {
+    FsState.FORMAT_NEEDED: texts.STORAGE_UNFORMATTED,
+    FsState.FORMATTING: texts.STORAGE_FORMATTING,
+    FsState.ERROR: texts.STORAGE_ERROR,
+    FsState.PASSWORD_NEEDED: texts.STORAGE_PASSWORD,
+    FsState.CHECKING: texts.STORAGE_CHECKING,
+}
+PASSING = (texts.STORAGE_FORMATTING, texts.STORAGE_CHECKING)
+"""Problems that end by themselves; others need another card."""
+
+
+def is_at_autopilot(flavour: Flavour) -> bool:
+    """Return True for flavours whose clients address camera commands to component 1."""
+    return flavour.camera_at_autopilot
+
+
+def require_camera(what: OperatorText, id: float) -> None:
+    """Refuse a command for a camera that does not exist."""
+    if not math.isnan(id) and id not in OURS:
+        raise Refused(what, texts.NO_SUCH_CAMERA.fill(number=f"{id:g}"), lasting=True)
+
+
+def require_free(vehicle: Vehicle, what: OperatorText) -> None:
+    """Refuse a change of the camera while the items of a flown mission need it."""
+    if vehicle.mission_needs_camera:
+        raise Refused(what, texts.MISSION_USES_CAMERA)
+
+
+def require_idle(drone: Drone, what: OperatorText) -> None:
+    """Refuse a change that would end a recording or the photos that are being taken."""
+    if any(camera.recording_now for camera in drone.camera.state.cameras.values()):
+        raise Refused(what, texts.CAMERA_RECORDS)
+    if any(camera.taking for camera in drone.camera.state.cameras.values()):
+        raise Refused(what, texts.CAMERA_TAKES_PHOTOS)
+
+
+def storage_problem(drone: Drone, id: int | None = None) -> Reason | None:
+    """Return the reason why nothing can be stored; None for a storage that is ready or unknown."""
+    state = drone.storage[drone.storage.main if id is None else id]
+    if state.physical is not None and state.physical in PROBLEMS:
+        return PROBLEMS[state.physical]
+    if state.file_system is not None and state.file_system in FILE_SYSTEM_PROBLEMS:
+        return FILE_SYSTEM_PROBLEMS[state.file_system]
+    return None
+
+
+def require_storage(drone: Drone, what: OperatorText) -> None:
+    """Refuse a photo or recording that could not be stored."""
+    if (problem := storage_problem(drone)) is not None:
+        raise Refused(what, problem, lasting=problem not in PASSING)

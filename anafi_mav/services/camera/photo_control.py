@@ -1,0 +1,167 @@
+"""Photos and series of the active camera by command of a client.
+
+A command starts or ends them after the one before it has been answered, so that a stop never overtakes a start.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+
+from msgspec.structs import replace
+
+from anafi_mav import texts
+from anafi_mav.drone.payload.camera_enums import CameraMode, PhotoMode
+from anafi_mav.drone.payload.camera_state import CameraState, CaptureProgress, CaptureUpdate, PhotoSettings
+from anafi_mav.errors import AnafiMavError
+from anafi_mav.services.camera.camera_targets import require_free, require_idle, require_storage
+from anafi_mav.services.service import Host
+from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.severity import Severity
+
+SERIES = (PhotoMode.TIME_LAPSE, PhotoMode.GPS_LAPSE)
+
+
+class PhotoControl:
+    """The photos of one drone."""
+
+    def __init__(self, host: Host) -> None:
+        self.host = host
+        self._commands = asyncio.Lock()
+        self._limit: int | None = None
+        """Pictures after which the series under way is ended."""
+        self._restore: PhotoSettings | None = None
+        """Photo settings to restore after the series under way."""
+
+    def link_up(self) -> None:
+        """Forget the series of an earlier connection."""
+        self._commands = asyncio.Lock()
+        self._limit = self._restore = None
+
+    @property
+    def camera(self) -> CameraState:
+        """The active camera."""
+        return self.host.drone.camera[self.host.drone.camera.active_id]
+
+    @property
+    def is_series(self) -> bool:
+        """True when a photo of the camera is a series that lasts until it is stopped."""
+        photo = self.camera.photo
+        return photo is not None and photo.mode in SERIES
+
+    def receive(self, update: CaptureUpdate, taken: int) -> None:
+        """Handle an event about a photo; `taken`: pictures of the series so far."""
+        if update.progress is CaptureProgress.TAKEN and self._limit is not None and taken >= self._limit:
+            self._limit = None
+            self.host.spawn(self._end_series())
+        saved = update.progress is CaptureProgress.SAVED and not self.host.drone.camera[update.camera].taking
+        if saved or update.progress in (CaptureProgress.ENDED, CaptureProgress.FAILED):
+            self._limit = None
+            if self._restore is not None:
+                restore, self._restore = self._restore, None
+                self.host.spawn(self._restore_photo(restore, update.camera))
+
+    # Commands.
+
+    async def take(self) -> None:
+        """Take a photo as the camera is set; return when it has begun."""
+        async with self._commands:
+            self._require_photo()
+            if self.is_series:
+                require_free(self.host.vehicle, texts.PHOTO)
+            await self._shoot()
+
+    async def begin_series(self, mode: PhotoMode, interval: float | None, limit: int | None) -> None:
+        """Begin a series; the settings are restored at its end.
+
+        `interval`: s or m between two pictures; None: as the camera is set. `limit`: pictures after which it ends;
+        None: when it is stopped.
+        """
+        async with self._commands:
+            require_free(self.host.vehicle, texts.PHOTO)
+            self._require_photo()
+            before = self.camera.photo
+            is_set = before is not None and before.mode is mode and interval in (None, before.interval)
+            if not is_set:
+                await self._set_series(mode, interval)
+            try:
+                await self._shoot()
+            except AnafiMavError:
+                if not is_set and before is not None:
+                    await self._restore_photo(before, self.host.drone.camera.active_id)
+                raise
+            self._limit = limit
+            self._restore = None if is_set else before
+
+    async def follow_distance(self, distance: float) -> None:
+        """Take a photo each `distance` m, in place of a series under way."""
+        photo = self.camera.photo
+        if self.camera.taking and photo is not None and (photo.mode, photo.interval) == (PhotoMode.GPS_LAPSE, distance):
+            return
+        await self.stop_series()
+        await self.enter(CameraMode.PHOTO, texts.PHOTO)
+        await self.begin_series(PhotoMode.GPS_LAPSE, distance, None)
+
+    async def stop_series(self) -> None:
+        """End a series; does nothing without one."""
+        async with self._commands:
+            photo = self.camera.photo
+            if not self.camera.taking or (photo is not None and photo.mode is PhotoMode.SINGLE):
+                return
+            if not self.is_series:
+                raise Refused(texts.PHOTO, texts.NO_SERIES)
+            require_free(self.host.vehicle, texts.PHOTO)
+            await self.host.drone.camera.stop_photo(self.host.drone.camera.active_id)
+
+    async def enter(self, mode: CameraMode, what: texts.Subject) -> None:
+        """Change the mode for a command whose clients know no modes."""
+        drone = self.host.drone
+        id = drone.camera.active_id
+        state = drone.camera[id]
+        if state.mode is mode:
+            return
+        if mode not in (state.modes or ()):
+            raise Refused(what, texts.CAMERA_MODE_KEPT, lasting=True)
+        require_free(self.host.vehicle, what)
+        require_idle(drone, what)
+        if await drone.camera.set_mode(mode, id) is not mode:
+            raise Refused(what, texts.CAMERA_MODE_KEPT)
+
+    def _require_photo(self) -> None:
+        """Refuse a photo that cannot be taken in this mode, or not be stored."""
+        camera = self.camera
+        if camera.mode is None:
+            raise Refused(texts.PHOTO, texts.CAMERA_UNKNOWN)
+        if camera.mode is not CameraMode.PHOTO:
+            raise Refused(texts.PHOTO, texts.CAMERA_IN_VIDEO_MODE)
+        if camera.taking:
+            raise Refused(texts.PHOTO, texts.CAMERA_TAKES_PHOTOS)
+        require_storage(self.host.drone, texts.PHOTO)
+
+    async def _shoot(self) -> None:
+        await self.host.drone.camera.take_photo(self.host.drone.camera.active_id, until_saved=False)
+
+    async def _set_series(self, mode: PhotoMode, interval: float | None) -> None:
+        camera = self.host.drone.camera
+        settings = await camera.set_photo(PhotoSettings(mode=mode, interval=interval), camera.active_id)
+        if settings is None or settings.mode is not mode:
+            raise Refused(texts.PHOTO, texts.CAMERA_MODE_KEPT)
+        if interval is None or settings.interval is None or math.isclose(interval, settings.interval, rel_tol=1e-3):
+            return
+        if mode is PhotoMode.GPS_LAPSE:
+            self.host.text(Severity.NOTICE, texts.PHOTO_DISTANCE.fill(metres=settings.interval))
+        else:
+            self.host.text(Severity.NOTICE, texts.PHOTO_INTERVAL.fill(seconds=settings.interval))
+
+    async def _end_series(self) -> None:
+        """End the series that has all its pictures."""
+        try:
+            await self.host.drone.camera.stop_photo(self.host.drone.camera.active_id)
+        except AnafiMavError as error:
+            self.host.text(Severity.WARNING, texts.PHOTO_SERIES_FAILED.fill(error=texts.from_below(error)))
+
+    async def _restore_photo(self, settings: PhotoSettings, camera: int) -> None:
+        try:
+            await self.host.drone.camera.set_photo(replace(settings, megapixels=None), camera)
+        except AnafiMavError as error:
+            self.host.text(Severity.WARNING, texts.PHOTO_MODE_KEPT.fill(error=texts.from_below(error)))

@@ -1,0 +1,155 @@
+"""Pose of drone and camera at a moment, for the geotag of a photo. No I/O.
+
+Positions, heights and angles arrive in events of their own, and together with each picture of the live video. A moment
+between two of them is interpolated; after the newest position the drone goes on at its reported velocity.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import msgspec
+
+from anafi_mav import geo
+from anafi_mav.units import quaternion_from_euler, wrap_pi
+
+SAMPLES = 256
+"""Samples of each kind: eight seconds of pictures at 30 Hz."""
+
+FURTHEST = 1.5
+"""s from the nearest sample at which a value is still taken for the moment; a position arrives once a second."""
+
+NEAR = 0.2
+"""s from a picture within which the pictures of the video are the source: six of them."""
+
+
+class CameraPose(msgspec.Struct, frozen=True):
+    """Pose at a moment. None: unknown."""
+
+    place: tuple[float, float] | None = None
+    """Latitude, longitude, deg."""
+    height: float | None = None
+    """m above take-off."""
+    camera: tuple[float, float, float] | None = None
+    """Roll, pitch, yaw of the camera to the horizon and true north, rad."""
+
+    @property
+    def quaternion(self) -> tuple[float, float, float, float] | None:
+        """Orientation of the camera, (w, x, y, z)."""
+        return None if self.camera is None else quaternion_from_euler(*self.camera)
+
+
+class SampleTrack:
+    """Values of one kind over time; angles (rad) are unwrapped."""
+
+    def __init__(self, *, angles: bool = False) -> None:
+        self._angles = angles
+        self._samples: deque[tuple[float, tuple[float, ...]]] = deque(maxlen=SAMPLES)
+
+    def add(self, at: float, *values: float) -> None:
+        """Add a sample; one that is not newer than the last, or not finite, is left out."""
+        if not all(map(math.isfinite, values)) or (self._samples and at <= self._samples[-1][0]):
+            return
+        if self._angles and self._samples:
+            last = self._samples[-1][1]
+            values = tuple(old + wrap_pi(new - old) for old, new in zip(last, values, strict=True))
+        self._samples.append((at, values))
+
+    def clear(self) -> None:
+        """Forget all samples."""
+        self._samples.clear()
+
+    @property
+    def newest(self) -> float:
+        """Time of the newest sample."""
+        return self._samples[-1][0] if self._samples else -math.inf
+
+    def distance(self, at: float) -> float:
+        """Return how far the nearest sample is from a moment, s."""
+        return min((abs(time - at) for time, _ in self._samples), default=math.inf)
+
+    def value(self, at: float) -> tuple[float, ...] | None:
+        """Return the values at a moment.
+
+        Before the first and after the last sample they are those of that sample. None without a sample within
+        `FURTHEST`.
+        """
+        before = after = None
+        for sample in reversed(self._samples):
+            if sample[0] <= at:
+                before = sample
+                break
+            after = sample
+        if before is not None and after is not None and after[0] - before[0] <= 2.0 * FURTHEST:
+            share = (at - before[0]) / (after[0] - before[0])
+            return tuple(one + share * (two - one) for one, two in zip(before[1], after[1], strict=True))
+        nearest = min((s for s in (before, after) if s is not None), key=lambda s: abs(s[0] - at), default=None)
+        return nearest[1] if nearest is not None and abs(nearest[0] - at) <= FURTHEST else None
+
+
+class PoseSource:
+    """Samples of one source: the drone's events, or the pictures of its video."""
+
+    def __init__(self) -> None:
+        self.places = SampleTrack()
+        """Latitude, longitude, deg."""
+        self.velocities = SampleTrack()
+        """North, east, m/s."""
+        self.heights = SampleTrack()
+        """m above take-off."""
+        self.gimbals = SampleTrack(angles=True)
+        """Roll and pitch of the camera to the horizon, its yaw to `headings`, rad."""
+        self.headings = SampleTrack(angles=True)
+        """Yaw of the drone, rad; 0 in a source whose camera's yaw is that to true north."""
+
+    def clear(self) -> None:
+        """Forget all samples."""
+        for track in (self.places, self.velocities, self.heights, self.gimbals, self.headings):
+            track.clear()
+
+    def place(self, at: float) -> tuple[float, float] | None:
+        """Return latitude and longitude at a moment."""
+        found = self.places.value(at)
+        if found is None:
+            return None
+        latitude, longitude = found[0], found[1]
+        late = at - self.places.newest
+        velocity = self.velocities.value(at)
+        if late <= 0.0 or velocity is None:
+            return latitude, longitude
+        return geo.destination(latitude, longitude, velocity[0] * late, velocity[1] * late)
+
+    def camera(self, at: float) -> tuple[float, float, float] | None:
+        """Return roll, pitch and yaw of the camera to the horizon and true north at a moment, rad."""
+        gimbal, heading = self.gimbals.value(at), self.headings.value(at)
+        if gimbal is None or heading is None:
+            return None
+        return gimbal[0], gimbal[1], wrap_pi(heading[0] + gimbal[2])
+
+
+class PoseTrack:
+    """The pose of the last seconds, from events and from pictures."""
+
+    def __init__(self) -> None:
+        self.events = PoseSource()
+        self.pictures = PoseSource()
+
+    def clear(self) -> None:
+        """Forget all samples: the link was lost."""
+        self.events.clear()
+        self.pictures.clear()
+
+    def is_complete(self, at: float) -> bool:
+        """True when nothing that is still to come makes the pose of this moment better."""
+        sources = (self.events, self.pictures)
+        return any(min(source.places.newest, source.gimbals.newest) >= at for source in sources)
+
+    def pose(self, at: float) -> CameraPose:
+        """Return the pose at a moment, by the pictures if one is near it, else by the events."""
+        events, pictures = self.events, self.pictures
+        by_picture = pictures.gimbals.distance(at) <= NEAR
+        place = pictures.place(at) if by_picture and pictures.places.distance(at) <= NEAR else events.place(at)
+        height = (pictures.heights if pictures.heights.distance(at) <= NEAR else events.heights).value(at)
+        camera = (pictures if by_picture else events).camera(at)
+        return CameraPose(place, None if height is None else height[0], camera)

@@ -1,0 +1,449 @@
+"""Items 84 to 93, 96, 97, 128, 129, 136, 138, 154: the camera component, judged by the simulator's own state."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from support.cameras import ACCEPTED, PHOTO, VIDEO, command, enter, photos, press, request, shoot, texts, videos
+from support.ext_params import write
+from support.flavours import both
+from support.ftp import Ftp
+from support.mav import CAMERA, Client
+from support.world import HOME, world
+
+from anafi_mav import geo
+from anafi_mav.arsdk.messages import camera as camera_messages
+from anafi_mav.arsdk.messages import user_storage
+from anafi_mav.arsdk.messages.user_storage import FsState, PhyState
+from anafi_mav.mavlink import dialect
+
+DENIED, REJECTED, UNSUPPORTED = (
+    dialect.MAV_RESULT_DENIED,
+    dialect.MAV_RESULT_TEMPORARILY_REJECTED,
+    dialect.MAV_RESULT_UNSUPPORTED,
+)
+START_PHOTO, STOP_PHOTO = dialect.MAV_CMD_IMAGE_START_CAPTURE, dialect.MAV_CMD_IMAGE_STOP_CAPTURE
+START_VIDEO, STOP_VIDEO = dialect.MAV_CMD_VIDEO_START_CAPTURE, dialect.MAV_CMD_VIDEO_STOP_CAPTURE
+ZOOM, FORMAT = dialect.MAV_CMD_SET_CAMERA_ZOOM, dialect.MAV_CMD_STORAGE_FORMAT
+
+models = pytest.mark.parametrize("model", ["4k", "thermal", "usa", "ai"])
+
+BASE = (
+    dialect.CAMERA_CAP_FLAGS_CAPTURE_VIDEO
+    | dialect.CAMERA_CAP_FLAGS_CAPTURE_IMAGE
+    | dialect.CAMERA_CAP_FLAGS_HAS_MODES
+    | dialect.CAMERA_CAP_FLAGS_HAS_BASIC_ZOOM
+    | dialect.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
+)
+THERMAL = BASE | dialect.CAMERA_CAP_FLAGS_HAS_THERMAL_RANGE
+FLAGS = {"4k": BASE, "thermal": THERMAL, "usa": THERMAL, "ai": BASE}
+SIZES = {"4k": (5344, 4016), "thermal": (5344, 4016), "usa": (5344, 4016), "ai": (8000, 6000)}
+
+LEGACY = {
+    dialect.MAV_CMD_REQUEST_CAMERA_INFORMATION: "CAMERA_INFORMATION",
+    dialect.MAV_CMD_REQUEST_CAMERA_SETTINGS: "CAMERA_SETTINGS",
+    dialect.MAV_CMD_REQUEST_STORAGE_INFORMATION: "STORAGE_INFORMATION",
+    dialect.MAV_CMD_REQUEST_CAMERA_CAPTURE_STATUS: "CAMERA_CAPTURE_STATUS",
+    dialect.MAV_CMD_REQUEST_VIDEO_STREAM_INFORMATION: "VIDEO_STREAM_INFORMATION",
+    dialect.MAV_CMD_REQUEST_VIDEO_STREAM_STATUS: "VIDEO_STREAM_STATUS",
+}
+
+
+@both
+@models
+async def test_conf_084_information_is_true_to_the_model(flavour: str, model: str) -> None:
+    async with world(flavour=flavour, model=model) as w:
+        await w.client.wait("CAMERA_HEARTBEAT", since=0)
+        about = await request(w.client, "CAMERA_INFORMATION")
+        assert (about.flags, (about.resolution_h, about.resolution_v)) == (FLAGS[model], SIZES[model])
+        assert bytes(about.vendor_name).rstrip(b"\0") == b"Parrot"
+        assert (about.gimbal_device_id, about.camera_device_id) == (1, 0)
+        assert about.cam_definition_version
+        assert about.cam_definition_uri.startswith("mftp://")
+
+
+@both
+async def test_conf_085_older_requests_and_request_message_agree(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
+        for id, kind in LEGACY.items():
+            by_message, mark = await request(w.client, kind), w.client.mark()
+            assert await command(w.client, id, 1) == ACCEPTED
+            old = (await w.client.wait(kind, since=mark)).to_dict()
+            new = by_message.to_dict()
+            for message in (old, new):
+                message.pop("time_boot_ms", None)
+            assert str(old) == str(new)
+        assert await command(w.client, dialect.MAV_CMD_REQUEST_CAMERA_IMAGE_CAPTURE, 0) == DENIED
+
+
+@both
+@models
+async def test_conf_086_photo_is_reported_with_file(flavour: str, model: str) -> None:
+    async with world(flavour=flavour, model=model, web=True) as w:
+        await enter(w.client, PHOTO)
+        for index in range(2):
+            mark = w.client.mark()
+            image = await shoot(w.client)
+            assert (image.image_index, image.capture_result) == (index, 1)
+            assert (image.lat / 1e7, image.lon / 1e7) == pytest.approx(HOME[:2], abs=2e-6)
+            day, _, name = image.file_url.removeprefix("mftp://[;comp=100]/media/").partition("/")
+            resource = photos(w)[index].resources[0]
+            assert name == resource.id
+            assert await Ftp(w.client, component=CAMERA).download(f"/media/{day}/{name}") == resource.content()
+            await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 0 and s.image_count, since=mark)
+            states = [status.image_status for _, status in w.client.since(mark, "CAMERA_CAPTURE_STATUS")]
+            assert states[0] == 1
+            assert states[-1] == 0
+
+
+async def test_conf_086_geotag_is_that_of_the_shutter() -> None:
+    """The drone accelerates with its camera turned down; the simulator knows the pose at the shutter."""
+    async with world(web=True, speed=1.0) as w:
+        await w.take_off(8.0)
+        await enter(w.client, PHOTO)
+        turned = dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
+        assert (await w.client.command(turned, -40, math.nan, x=0.0, z=0.0)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["gimbal_pitch"] + 40.0) < 0.5, 10.0)
+        w.client.send_command(dialect.MAV_CMD_DO_REPOSITION, 6, 1, x=HOME[0] + 3e-4, y=HOME[1], z=12.0, frame=6)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 6.0, 20.0)
+        image = await shoot(w.client)
+        scene = photos(w)[0].resources[0].scene
+        away = geo.distance(image.lat / 1e7, image.lon / 1e7, scene.latitude, scene.longitude)
+        assert away < 0.6  # 0.1 s at 6 m/s
+        assert image.alt / 1e3 == pytest.approx(scene.altitude, abs=0.7)
+        w0, x, y, z = image.q
+        pitch = math.degrees(math.asin(2 * (w0 * y - z * x)))
+        assert pitch == pytest.approx(scene.pitch, abs=2.0)
+
+
+@both
+async def test_conf_087_series_counts_and_ends(flavour: str) -> None:
+    async with world(flavour=flavour, web=True) as w:
+        await enter(w.client, PHOTO)
+        mark = w.client.mark()
+        assert await command(w.client, START_PHOTO, 0, 2, 3) == ACCEPTED
+        status = await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status >= 2, since=mark)
+        assert status.image_interval == pytest.approx(2.0)
+        await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 0, since=w.client.mark(), timeout=20.0)
+        await w.drone.wait_log(lambda e: e.name == "camera.set_photo_mode" and "SINGLE" in str(e.args), 5.0)
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", lambda image: image.image_index == 2, since=mark)
+        (series,) = photos(w)
+        assert (series.mode, len(series.resources)) == ("TIMELAPSE", 3)
+        images = [image for _, image in w.client.since(mark, "CAMERA_IMAGE_CAPTURED")]
+        assert [image.image_index for image in images] == [0, 1, 2]
+        assert len({image.file_url for image in images}) == 3
+        times = [image.time_boot_ms / 1e3 for image in images]
+        assert all(later - earlier == pytest.approx(2.0 / 3.0, abs=0.2) for earlier, later in pairwise(times))
+
+        assert await command(w.client, START_PHOTO, 0, 2, 0) == ACCEPTED
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", lambda image: image.image_index == 4, timeout=20.0)
+        mark = w.client.mark()
+        assert await command(w.client, STOP_PHOTO, 0) == ACCEPTED
+        await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 0, since=mark)
+        assert len(w.commands("camera.stop_photo")) == 2
+        assert await command(w.client, STOP_PHOTO, 0) == ACCEPTED
+
+
+async def test_conf_087_burst_is_one_message_per_file() -> None:
+    for model in ("4k", "ai"):
+        async with world(model=model, web=True) as w:
+            await enter(w.client, PHOTO)
+            assert (await write(w.client, "CAM_PHOTOMODE", 2.0, 1)).param_result == dialect.PARAM_ACK_ACCEPTED
+            mark = w.client.mark()
+            assert await command(w.client, START_PHOTO, 0, 0, 1) == ACCEPTED
+            await w.client.wait("CAMERA_IMAGE_CAPTURED", lambda image: image.image_index == 13, since=mark)
+            images = [image for _, image in w.client.since(mark, "CAMERA_IMAGE_CAPTURED")]
+            assert [image.file_url.rpartition("/")[2] for image in images] == [
+                resource.id for resource in photos(w)[0].resources
+            ]
+
+
+@both
+async def test_conf_088_repeated_sequence_number_takes_one_photo(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
+        await enter(w.client, PHOTO)
+        for _ in range(3):
+            assert await command(w.client, START_PHOTO, 0, 0, 1, 7) == ACCEPTED
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", since=0)
+        assert await command(w.client, START_PHOTO, 0, 0, 1, 8) == ACCEPTED
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", lambda image: image.image_index == 1, since=0)
+        assert len(photos(w)) == 2
+
+
+@both
+@models
+async def test_conf_089_recording_runs_and_ends(flavour: str, model: str) -> None:
+    async with world(flavour=flavour, model=model) as w:
+        await enter(w.client, VIDEO)
+        mark = w.client.mark()
+        assert await command(w.client, START_VIDEO, 0, 5) == ACCEPTED
+        await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.recording_time_ms > 1000, since=mark)
+        times = [s.recording_time_ms for _, s in w.client.since(mark, "CAMERA_CAPTURE_STATUS") if s.video_status]
+        assert len(times) >= 5
+        assert times == sorted(times)
+        assert await command(w.client, dialect.MAV_CMD_SET_CAMERA_MODE, 0, PHOTO) == REJECTED
+        assert await command(w.client, STOP_VIDEO, 0) == ACCEPTED
+        assert len(videos(w)) == 1
+        status = await request(w.client, "CAMERA_CAPTURE_STATUS")
+        assert (status.video_status, status.recording_time_ms) == (0, 0)
+        assert await command(w.client, STOP_VIDEO, 0) == ACCEPTED
+
+
+async def test_conf_089_recording_that_ends_by_itself_is_a_text() -> None:
+    async with world() as w:
+        await enter(w.client, VIDEO)
+        assert await command(w.client, START_VIDEO, 0, 0) == ACCEPTED
+        mark = w.client.mark()
+        w.drone.inject(
+            camera_messages.RecordingProgress(0, camera_messages.RecordingResult.STOPPED_NO_STORAGE_SPACE, "")
+        )
+        text = await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Recording ended"), since=mark)
+        assert text.severity == dialect.MAV_SEVERITY_WARNING
+
+
+@both
+@models
+async def test_conf_090_mode_is_changed_and_reported(flavour: str, model: str) -> None:
+    async with world(flavour=flavour, model=model) as w:
+        for mode, wrong in ((PHOTO, START_VIDEO), (VIDEO, START_PHOTO)):
+            mark = w.client.mark()
+            await enter(w.client, mode)
+            assert (await w.client.wait("CAMERA_SETTINGS", since=mark)).mode_id == mode
+            assert await command(w.client, wrong, 0, 0, 1) == REJECTED
+            assert any("mode" in text for text in texts(w.client, mark))
+        assert await command(w.client, dialect.MAV_CMD_SET_CAMERA_MODE, 0, dialect.CAMERA_MODE_IMAGE_SURVEY) == DENIED
+        assert await command(w.client, dialect.MAV_CMD_SET_CAMERA_MODE, 2, PHOTO) == DENIED
+
+
+@both
+@models
+async def test_conf_092_each_storage_is_reported(flavour: str, model: str) -> None:
+    async with world(flavour=flavour, model=model) as w:
+        count = 2 if model == "ai" else 1
+        mark = w.client.mark()
+        assert await command(w.client, dialect.MAV_CMD_REQUEST_MESSAGE, 261, 0) == ACCEPTED
+        found = [message for _, message in w.client.since(mark, "STORAGE_INFORMATION")]
+        assert [(s.storage_id, s.storage_count, s.status) for s in found] == [
+            (number, count, dialect.STORAGE_STATUS_READY) for number in range(1, count + 1)
+        ]
+        card = found[-1]
+        assert card.total_capacity == pytest.approx(64e9 / 2**20)
+        assert card.used_capacity + card.available_capacity == pytest.approx(card.total_capacity)
+        assert await command(w.client, dialect.MAV_CMD_REQUEST_MESSAGE, 261, count + 1) == DENIED
+
+
+PROBLEMS = [
+    (PhyState.UNDETECTED, FsState.UNKNOWN, dialect.STORAGE_STATUS_EMPTY, DENIED),
+    (PhyState.TOO_SLOW, FsState.UNKNOWN, dialect.STORAGE_STATUS_NOT_SUPPORTED, DENIED),
+    (PhyState.AVAILABLE, FsState.FORMAT_NEEDED, dialect.STORAGE_STATUS_UNFORMATTED, DENIED),
+    (PhyState.AVAILABLE, FsState.PASSWORD_NEEDED, dialect.STORAGE_STATUS_NOT_SUPPORTED, DENIED),
+    (PhyState.AVAILABLE, FsState.FORMATTING, dialect.STORAGE_STATUS_UNFORMATTED, REJECTED),
+]
+
+
+async def test_conf_092_unusable_storage_is_pushed_and_refuses_photos() -> None:
+    async with world() as w:
+        await enter(w.client, PHOTO)
+        for physical, file_system, status, result in PROBLEMS:
+            mark = w.client.mark()
+            w.drone.inject(user_storage.State(physical, file_system, 0, 1, 5))
+            await w.client.wait("STORAGE_INFORMATION", is_in(status), since=mark)
+            assert await command(w.client, START_PHOTO, 0, 0, 1) == result
+            assert any(text.startswith("Photo refused: ") for text in texts(w.client, mark))
+        mark = w.client.mark()
+        w.drone.inject(user_storage.State(PhyState.AVAILABLE, FsState.READY, 0, 1, 5))
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Storage 1: ready", since=mark)
+        await shoot(w.client)
+
+
+def is_in(status: int) -> Callable[[Any], bool]:
+    """Return a test for STORAGE_INFORMATION with this status."""
+    return lambda message: bool(message.status == status)
+
+
+@both
+@models
+async def test_conf_093_format_erases_and_resets_the_index(flavour: str, model: str) -> None:
+    async with world(flavour=flavour, model=model, web=True) as w:
+        number = 2 if model == "ai" else 1
+        await enter(w.client, PHOTO)
+        await shoot(w.client)
+        assert await command(w.client, FORMAT, number, 0) == DENIED
+        assert await command(w.client, FORMAT, 3, 1) == DENIED
+        if model == "ai":
+            assert await command(w.client, FORMAT, math.nan, 1) == DENIED
+        mark = w.client.mark()
+        assert await command(w.client, FORMAT, number, 1) == ACCEPTED
+        assert not photos(w)
+        await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_count == 0, since=mark)
+        await w.client.wait("STORAGE_INFORMATION", lambda s: s.status == dialect.STORAGE_STATUS_READY, since=mark)
+        assert (await shoot(w.client)).image_index == 0
+
+
+async def test_conf_093_format_is_refused_in_flight_and_while_recording() -> None:
+    async with world() as w:
+        await enter(w.client, VIDEO)
+        assert await command(w.client, START_VIDEO, 0, 0) == ACCEPTED
+        assert await command(w.client, FORMAT, 1, 1) == REJECTED
+        assert await command(w.client, STOP_VIDEO, 0) == ACCEPTED
+        await w.take_off()
+        assert await command(w.client, FORMAT, 1, 1) == REJECTED
+        assert not w.commands("user_storage.format_with_type")
+
+
+async def test_conf_129_format_goes_on_after_a_cancel() -> None:
+    """The drone cannot end a format, so CANCELLED would be a lie."""
+    async with world() as w:
+        mark = w.client.mark()
+        w.client.send_command(FORMAT, 1, 1, target=(1, CAMERA))
+        await w.drone.wait_log(lambda e: e.name == "user_storage.format_with_type")
+        w.client.send(dialect.MAVLink_command_cancel_message(1, CAMERA, FORMAT))
+        ack = await w.client.wait(
+            "COMMAND_ACK",
+            lambda m: m.command == FORMAT and m.result != dialect.MAV_RESULT_IN_PROGRESS,
+            since=mark,
+            timeout=10.0,
+        )
+        assert ack.result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.name == "user_storage.format_result")
+
+
+@both
+async def test_conf_096_change_by_the_pilot_is_pushed(flavour: str) -> None:
+    async with world(flavour=flavour, clients=2) as w:
+        await enter(w.client, VIDEO)
+        marks = [client.mark() for client in w.clients]
+        press(w, camera_messages.SetCameraMode(0, camera_messages.CameraCameraMode.PHOTO))
+        for client, mark in zip(w.clients, marks, strict=True):
+            assert (await client.wait("CAMERA_SETTINGS", since=mark)).mode_id == PHOTO
+        marks = [client.mark() for client in w.clients]
+        press(w, camera_messages.TakePhoto(0))
+        for client, mark in zip(w.clients, marks, strict=True):
+            assert (await client.wait("CAMERA_IMAGE_CAPTURED", since=mark)).capture_result == 1
+
+
+async def zoomed(client: Client, kind: int, value: float) -> float:
+    """Zoom; return the level that the camera reports once it stands."""
+    assert await command(client, ZOOM, kind, value) == ACCEPTED
+    return float((await request(client, "CAMERA_SETTINGS")).zoomLevel)
+
+
+@both
+@models
+async def test_conf_097_zoom_by_range_step_and_rate(flavour: str, model: str) -> None:
+    async with world(flavour=flavour, model=model) as w:
+        client = w.client
+        assert await zoomed(client, dialect.ZOOM_TYPE_RANGE, 50) == pytest.approx(50.0, abs=1.0)
+        assert await zoomed(client, dialect.ZOOM_TYPE_STEP, 1) > 55.0
+        assert await zoomed(client, dialect.ZOOM_TYPE_STEP, -1) == pytest.approx(50.0, abs=1.0)
+        assert await zoomed(client, dialect.ZOOM_TYPE_STEP, -1) < 45.0
+        assert await zoomed(client, dialect.ZOOM_TYPE_RANGE, 150) == pytest.approx(100.0, abs=1.0)
+        mark = client.mark()
+        assert await command(client, ZOOM, dialect.ZOOM_TYPE_CONTINUOUS, -1) == ACCEPTED
+        await client.wait("CAMERA_SETTINGS", lambda s: s.zoomLevel < 90.0, since=mark)
+        stood = await zoomed(client, dialect.ZOOM_TYPE_CONTINUOUS, 0)
+        assert 0.0 <= stood < 95.0
+        assert await command(client, ZOOM, dialect.ZOOM_TYPE_RANGE, math.nan) == DENIED
+        assert await command(client, ZOOM, dialect.ZOOM_TYPE_FOCAL_LENGTH, 30) == UNSUPPORTED
+        assert await command(client, dialect.MAV_CMD_SET_CAMERA_FOCUS, 0, 1) == UNSUPPORTED
+
+
+@both
+async def test_conf_128_component_information_of_the_camera(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
+        about = await request(w.client, "COMPONENT_INFORMATION_BASIC")
+        assert about.vendor_name == "Parrot"
+        assert about.capabilities & dialect.MAV_PROTOCOL_CAPABILITY_FTP
+
+
+async def test_conf_136_field_of_view_on_request() -> None:
+    async with world() as w:
+        ground = await request(w.client, "CAMERA_FOV_STATUS")
+        assert ground.lat_image == -(2**31)  # the camera looks level
+        await w.take_off(10.0)
+        await w.client.command(dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, -45, math.nan, x=0.0, z=0.0)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["gimbal_pitch"] + 45.0) < 0.5, 10.0)
+        await w.client.wait("GIMBAL_DEVICE_ATTITUDE_STATUS")
+        seen = await request(w.client, "CAMERA_FOV_STATUS")
+        assert 60.0 < seen.hfov < 80.0
+        away = geo.distance(seen.lat_image / 1e7, seen.lon_image / 1e7, seen.lat_camera / 1e7, seen.lon_camera / 1e7)
+        assert away == pytest.approx(10.0, abs=1.0)
+
+
+@both
+async def test_conf_138_history_by_index_and_range(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
+        client = w.client
+        await enter(client, PHOTO)
+        for _ in range(3):
+            await shoot(client)
+        for params, indices in (
+            ((1,), [1]),
+            ((0, 1), [0, 1]),
+            ((1, -1), [1, 2]),
+            ((-1,), [0, 1, 2]),
+            ((-1, 0), [0, 1, 2]),
+        ):
+            assert await again(client, dialect.MAV_CMD_REQUEST_MESSAGE, 263, *params) == indices
+        assert await again(client, dialect.MAV_CMD_REQUEST_CAMERA_IMAGE_CAPTURE, 2) == [2]
+        for missing in ((3,), (7, 9)):
+            mark = client.mark()
+            assert await command(client, dialect.MAV_CMD_REQUEST_MESSAGE, 263, *missing) == DENIED
+            assert len(client.since(mark, "COMMAND_ACK")) == 1
+
+
+async def again(client: Client, id: int, *params: float) -> list[int]:
+    """The indices of the photos that a request sends."""
+    mark = client.mark()
+    assert await command(client, id, *params) == ACCEPTED
+    return [image.image_index for _, image in client.since(mark, "CAMERA_IMAGE_CAPTURED")]
+
+
+@both
+async def test_conf_154_tracking_is_unsupported_and_not_announced(flavour: str) -> None:
+    async with world(flavour=flavour, model="ai") as w:
+        for id in (
+            dialect.MAV_CMD_CAMERA_TRACK_POINT,
+            dialect.MAV_CMD_CAMERA_TRACK_RECTANGLE,
+            dialect.MAV_CMD_CAMERA_STOP_TRACKING,
+        ):
+            assert await command(w.client, id, 0.5, 0.5) == UNSUPPORTED
+        flags = (await request(w.client, "CAMERA_INFORMATION")).flags
+        assert not flags & (
+            dialect.CAMERA_CAP_FLAGS_HAS_TRACKING_POINT
+            | dialect.CAMERA_CAP_FLAGS_HAS_TRACKING_RECTANGLE
+            | dialect.CAMERA_CAP_FLAGS_HAS_TRACKING_GEO_STATUS
+        )
+
+
+async def test_conf_120_camera_panel_of_the_autopilot() -> None:
+    """Clients of ArduPilot's family address the camera at component 1, and know no modes."""
+    async with world(flavour="ardupilot", also="px4") as w:
+        client = w.client
+        for id, params in (
+            (START_PHOTO, (0, 0, 1)),
+            (dialect.MAV_CMD_DO_DIGICAM_CONTROL, (0, 0, 0, 0)),
+            (START_VIDEO, (0, 0)),
+            (STOP_VIDEO, (0,)),
+            (ZOOM, (dialect.ZOOM_TYPE_RANGE, 50)),
+            (dialect.MAV_CMD_DO_SET_CAM_TRIGG_DIST, (5,)),
+            (STOP_PHOTO, (1,)),
+            (dialect.MAV_CMD_DO_CONTROL_VIDEO, (1, 0, 0, 1)),
+            (dialect.MAV_CMD_DO_CONTROL_VIDEO, (1, 0, 0, 0)),
+        ):
+            mark = client.mark()
+            x = 1.0 if id == dialect.MAV_CMD_DO_DIGICAM_CONTROL else math.nan
+            assert (await client.command(id, *params, x=x)).result == ACCEPTED, id
+            if id in (START_PHOTO, dialect.MAV_CMD_DO_DIGICAM_CONTROL):
+                await client.wait("CAMERA_IMAGE_CAPTURED", since=mark)
+                await client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 0, since=mark)
+        assert (len(videos(w)), [media.mode for media in photos(w)]) == (2, ["SINGLE", "SINGLE", "GPSLAPSE"])
+        assert (await client.command(START_PHOTO, 2, 0, 1)).result == DENIED
+        other = await w.connect(port=5761)
+        assert (await other.command(START_PHOTO, 0, 0, 1)).result == UNSUPPORTED
+        for id in (200, 203, 204, 205, 206):
+            assert (await other.command(id, 2 if id == dialect.MAV_CMD_DO_MOUNT_CONFIGURE else 0)).result == ACCEPTED
