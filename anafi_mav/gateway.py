@@ -22,7 +22,7 @@ from typing_extensions import Self
 from anafi_mav import texts
 from anafi_mav.arsdk.video.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.clock import Clock, SystemClock
-from anafi_mav.config import Config, DroneConfig
+from anafi_mav.config import Config, DroneConfig, MediaConfig
 from anafi_mav.drone import Drone, events
 from anafi_mav.drone.contention import Contention
 from anafi_mav.drone.rest import HTTP_PORT
@@ -41,6 +41,8 @@ from anafi_mav.vehicle.base.flying import ON_GROUND
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.web.definition_routes import DefinitionRoutes
 from anafi_mav.web.live_page import DroneEntry, LivePage
+from anafi_mav.web.live_video import LiveVideo
+from anafi_mav.web.media_routes import MediaRoutes
 from anafi_mav.web.server import HttpServer
 
 logger = logging.getLogger(__name__)
@@ -64,6 +66,11 @@ def state_in_use(folder: Path, holder: Holder) -> ConfigError:
         f"expected a folder that no other gateway uses, but the gateway with process id {holder.pid}{drones}, "
         f"holds {folder / FILE}; end that gateway, or name another folder for this one",
     )
+
+
+def download_folder(media: MediaConfig) -> Path | None:
+    """Return the folder for copies of media; None: they are not copied."""
+    return None if media.download_folder is None else Path(media.download_folder).expanduser()
 
 
 class _Supervised:
@@ -168,7 +175,7 @@ class _Supervised:
         serial = self.drone.identity.serial if self.system.active else ""
         return HeldDrone(self.config.name, self.config.address, self.config.interface, serial)
 
-    def entry(self) -> DroneEntry:
+    def entry(self, *, has_video: bool) -> DroneEntry:
         """Return the drone as the page for browsers lists it."""
         connected = self.system.active
         return DroneEntry(
@@ -177,6 +184,7 @@ class _Supervised:
             model=self.drone.identity.model.title if connected else "",
             connected=connected,
             problem="" if connected else self.problem or "no answer yet",
+            stream=self.drone.streams.shown.kind.value if connected and has_video else "",
         )
 
     def line(self) -> str:
@@ -224,7 +232,10 @@ class Gateway:
         self.web = None if http is None else HttpServer(http.host, http.port)
         """The web server; None when it is configured off. Routes are added before `open`."""
         if self.web is not None:
-            LivePage(self.web, lambda: [supervised.entry() for supervised in self._supervised])
+            LivePage(self.web, self._entries)
+            if self.relay is not None:
+                LiveVideo(self.web, self.relay.source)
+            MediaRoutes(self.web, self._drone)
             DefinitionRoutes(self.web, self._definition)
 
     async def __aenter__(self) -> Self:
@@ -320,6 +331,7 @@ class Gateway:
                 started,
                 allow_kill=allow_kill,
                 state=self._state,
+                download_folder=download_folder(self.config.media),
                 uris=self._uris(),
                 has_picture_pose=self.config.pose == "video",
             )
@@ -336,6 +348,9 @@ class Gateway:
             return GatewayUris()
         hint = texts.VIDEO_NEEDS_PUBLIC_HOST if self.relay.is_open_to_network else texts.VIDEO_NEEDS_HOST
         return GatewayUris(rtsp=self.relay.url_for, rtsp_hint=hint)
+
+    def _entries(self) -> list[DroneEntry]:
+        return [supervised.entry(has_video=self.relay is not None) for supervised in self._supervised]
 
     async def ready(self, timeout: float) -> bool:
         """Wait until each drone is connected or one attempt has failed.
@@ -381,6 +396,10 @@ class Gateway:
     def systems(self) -> tuple[System, ...]:
         """MAVLink system of each drone, listed as in the configuration; empty before `start`."""
         return tuple(supervised.system for supervised in self._supervised)
+
+    def _drone(self, sysid: int) -> Drone | None:
+        """Return the drone with this system id."""
+        return next((supervised.drone for supervised in self._supervised if supervised.config.sysid == sysid), None)
 
     def _definition(self, sysid: int) -> tuple[bytes, bytes] | None:
         """Return the camera definition of a connected drone, plain and compressed."""

@@ -79,6 +79,14 @@ class Model(msgspec.Struct, frozen=True, kw_only=True):
     simulated: bool
     """True when `sim.world.model` has its airframe, so that a configuration may ask for a simulated one."""
 
+    @property
+    def plan_version(self) -> int | None:
+        """Version of Parrot's flight-plan format that it flies.
+
+        None when the model alone does not decide it.
+        """
+        return None if self.plan_figures is None else self.plan_figures.version
+
     def plans(self) -> PlanFigures:
         """Return the figures of its flight plans.
 

@@ -105,7 +105,7 @@ class StateLock:
         file = os.open(self._folder / FILE, os.O_RDWR | os.O_CREAT, 0o644)
         try:
             for attempt in range(TRIES):
-                if _lock(file):
+                if try_lock(file):
                     self._file, file = file, -1
                     self.write(())
                     return None
@@ -144,7 +144,7 @@ def read_holder(folder: Path | None) -> Holder | None:
     except OSError:
         return None
     try:
-        return None if _lock(file) else _read(file)
+        return None if try_lock(file) else _read(file)
     except OSError:
         return None
     finally:
@@ -168,7 +168,7 @@ if sys.platform == "win32":
     _BEYOND = 1 << 30
     """Place of the byte that is locked: Windows lets no other process read locked bytes."""
 
-    def _lock(file: int) -> bool:
+    def try_lock(file: int) -> bool:
         os.lseek(file, _BEYOND, os.SEEK_SET)
         try:
             msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
@@ -181,7 +181,7 @@ if sys.platform == "win32":
 else:
     import fcntl
 
-    def _lock(file: int) -> bool:
+    def try_lock(file: int) -> bool:
         """Lock an open file; False when another holds it.
 
         Raises `OSError` where the file system has no locks.

@@ -381,8 +381,9 @@ reports some for its present mode only.
 | while the flown mission needs the camera | FAILED, value in effect | value and a text to the client |
 | an unknown name | FAILED | – |
 
-A change by the pilot, by another client or by the drone itself is sent to every client as PARAM_EXT_VALUE. Some changes
-take others with them: a video mode selects a resolution and a frame rate that it can record. They are sent too.
+A change by the pilot, by another client or by the drone itself is sent to every client as PARAM_EXT_VALUE. It is sent
+once more after a second, because no client acknowledges it. Some changes take others with them: a video mode selects a
+resolution and a frame rate that it can record. They are sent too.
 
 ## Settings
 

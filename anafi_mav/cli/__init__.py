@@ -24,6 +24,7 @@ COMMANDS = {
     "sim": "simulated drones alone, on Parrot's own wire protocol",
     "discover": "look for drones and Skycontrollers on every network interface; prints a configuration",
     "plan": "check, convert, show and draw flight plans; upload, download and fly them",
+    "media": "list, download and delete the photos and videos of a drone",
     "info": "connect to one drone and print model, battery, features and limits",
     "doctor": "examine the way to one drone: what is wrong, and how to mend it",
 }

@@ -11,5 +11,6 @@ from anafi_mav.config.load import remarks as remarks
 from anafi_mav.config.schema import Config as Config
 from anafi_mav.config.schema import DroneConfig as DroneConfig
 from anafi_mav.config.schema import HttpConfig as HttpConfig
+from anafi_mav.config.schema import MediaConfig as MediaConfig
 from anafi_mav.config.schema import SimConfig as SimConfig
 from anafi_mav.config.schema import VideoConfig as VideoConfig

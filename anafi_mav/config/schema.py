@@ -288,6 +288,19 @@ class HttpConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     ] = None
 
 
+class MediaConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Photos and videos of the drones."""
+
+    download_folder: Annotated[
+        Annotated[str, Meta(min_length=1, max_length=MAX_PATH)] | None,
+        Meta(
+            description="Folder into which each drone's photos and videos are copied after a landing, as "
+            "`<drone>/<day>/<file>` with a JSON file for each. `~` is the user's home. Left out: they are not copied.",
+            extra=expected("the path of a folder"),
+        ),
+    ] = None
+
+
 class VideoConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The gateway's video server (RTSP), which passes on the live video of every drone.
 
@@ -377,6 +390,12 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             extra=expected("the path of a folder"),
         ),
     ] = None
+    media: Annotated[
+        MediaConfig,
+        Meta(
+            description="Photos and videos of the drones.", extra=expected("a mapping like {download_folder: ~/drone}")
+        ),
+    ] = MediaConfig()
     http: Annotated[
         HttpConfig | bool,
         Meta(
@@ -412,6 +431,7 @@ SECTIONS: dict[str, type[msgspec.Struct]] = {
     "drones[…]": DroneConfig,
     "drones[…].sim": SimConfig,
     "drones[…].sim.wind": WindConfig,
+    "media": MediaConfig,
     "http": HttpConfig,
     "video": VideoConfig,
 }

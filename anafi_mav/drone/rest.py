@@ -38,6 +38,9 @@ NOT_INDEXED = 541
 """Parrot's status for a question about media while there is no index yet (developer.parrot.com, media API)."""
 
 
+UNAVAILABLE = 503
+"""Status of a server that will answer later (RFC 9110 §15.6.4): of a gateway whose drone is not connected."""
+
 PARTIAL = 206
 """Status of an answer with one range of a file (RFC 9110 §15.3.7)."""
 
@@ -155,6 +158,8 @@ class Rest:
             async with self._session().request(
                 method, self.base + path, data=data, params=query, headers=headers, allow_redirects=False
             ) as response:
+                if response.status == UNAVAILABLE:
+                    raise LinkLost(await _refusal(what, response))
                 if response.status >= 300:
                     raise CommandRejected(await _refusal(what, response))
                 yield response
@@ -215,7 +220,7 @@ class _Translated:
             return
         if isinstance(error, asyncio.TimeoutError):
             raise CommandTimeout(self._what, ANSWER_TIMEOUT) from error
-        if isinstance(error, aiohttp.ClientConnectionError):
+        if isinstance(error, aiohttp.ClientConnectionError | aiohttp.ClientPayloadError):  # also in mid-answer
             raise LinkLost(f"the drone's web server {self._base}: {error}") from error
         if isinstance(error, aiohttp.ClientError):
             raise RemoteProtocolError(f"{self._what}: {error}") from error

@@ -18,19 +18,13 @@ from anafi_mav.arsdk.video.rtp import HEADER, VERSION
 from anafi_mav.arsdk.video.rtp_h264 import CLOCK_RATE, PAYLOAD_TYPE, Picture, split_units
 from anafi_mav.arsdk.video.rtsp import encode_interleaved
 from anafi_mav.arsdk.video.sdp import MediaDescription, SessionDescription, format_description
+from anafi_mav.relay.admission import Admission, PictureGate
 
 MAX_KEPT_BYTES = 4 << 20
-"""Bytes kept for new viewers: six seconds of an ANAFI's 5 Mbit/s, and no less than one picture may have."""
+"""Bytes of packets kept for new viewers: six seconds of an ANAFI's 5 Mbit/s, and no less than one picture may have. The
+NAL units are kept beside them, twice as much in all."""
 MAX_KEPT_PICTURES = 300
 """Pictures kept for new viewers: ten seconds. What has no entry for longer is not kept."""
-
-MAX_ENTRY_WAIT = 2.0
-"""s that a viewer waits for an entry; then it gets every picture, and its decoder has to make do with that."""
-
-MAX_WAITING = 1 << 20
-"""Bytes that may wait for a slow viewer: 1.7 s of 5 Mbit/s. Later than that a picture is of no use to a pilot."""
-RESUME_BELOW = MAX_WAITING // 4
-"""Bytes that wait when a slow viewer gets pictures again, so that it does not lose the next one at once."""
 
 BURST_STEP = CLOCK_RATE // 1000
 """Between the timestamps of the pictures that a new viewer gets at once: 1 ms. With their own a player would show them
@@ -59,6 +53,8 @@ class PackedPicture:
     is_entry: bool
     size: int
     """Bytes of all datagrams."""
+    units: tuple[bytes, ...]
+    """NAL units, for viewers that pack them in their own way."""
     _framed: dict[int, bytes] = field(default_factory=dict)
 
     def framed(self, channel: int) -> bytes:
@@ -98,6 +94,8 @@ class Feed:
         """Of the newest picture."""
         self._at = 0.0
         """Arrival of the newest picture."""
+        self._shot = 0.0
+        """When it was taken (s, monotonic)."""
         self._offset: int | None = None
         """From the drone's timestamps to ours; None: set at the next picture."""
         self._kept: deque[PackedPicture] = deque()
@@ -118,6 +116,10 @@ class Feed:
         """Of the newest picture."""
         return self._timestamp
 
+    def burst_time(self, number: int) -> int:
+        """Return the timestamp of a kept picture for a viewer that gets all of them at once."""
+        return self._kept[-1].timestamp - (len(self._kept) - 1 - number) * BURST_STEP & _WRAP32
+
     def set_parameters(self, sps: bytes, pps: bytes) -> None:
         """Take the parameter sets of the drone's description, unless pictures have brought others."""
         if not self.sps and sps and pps:
@@ -128,8 +130,11 @@ class Feed:
         self._offset = None
         self._drop_kept()
 
-    def add(self, picture: Picture, now: float) -> PackedPicture | None:
-        """Pack a picture that arrived `now` (s, monotonic); None when nothing of it can be used."""
+    def add(self, picture: Picture, now: float, shot: float | None = None) -> PackedPicture | None:
+        """Pack a picture that arrived `now` (s, monotonic); None when nothing of it can be used.
+
+        `shot`: when it was taken; None: unknown.
+        """
         units = [unit for unit in picture.units if unit]
         if not units:
             self.counts["empty"] += 1
@@ -143,6 +148,7 @@ class Feed:
         if entry and _SPS not in present and self.sps:
             units = [self.sps, self.pps, *units]
         packed = self._pack(units, self._time(picture.timestamp, now), entry)
+        self._shot = now if shot is None else shot
         self._keep(packed)
         return packed
 
@@ -153,8 +159,11 @@ class Feed:
         return self._encode(split_units([self.sps, self.pps]), sequence, timestamp, ends=False)
 
     def report(self, now: float, time: float, packets: int, octets: int) -> SenderReport:
-        """Return the sender report of a viewer's packets; `time` is `now` in s since 1970."""
-        timestamp = self._timestamp + round((now - self._at) * CLOCK_RATE)
+        """Return the sender report of a viewer's packets; `time` is `now` in s since 1970.
+
+        A timestamp is the moment when its picture was taken: with SYSTEM_TIME a viewer finds the pose of that moment.
+        """
+        timestamp = self._timestamp + round((now - self._shot) * CLOCK_RATE)
         return SenderReport(self.ssrc, round(time * 1e6), timestamp & _WRAP32, packets & _WRAP32, octets & _WRAP32)
 
     def description(self, name: str, info: str, tool: str, control: str) -> bytes:
@@ -178,7 +187,7 @@ class Feed:
 
     def _pack(self, units: Sequence[bytes], timestamp: int, entry: bool) -> PackedPicture:
         datagrams = tuple(self._encode(split_units(units), self._sequence, timestamp, ends=True))
-        packed = PackedPicture(datagrams, self._sequence, timestamp, entry, sum(map(len, datagrams)))
+        packed = PackedPicture(datagrams, self._sequence, timestamp, entry, sum(map(len, datagrams)), tuple(units))
         self._sequence = self._sequence + len(datagrams) & _WRAP16
         return packed
 
@@ -224,23 +233,20 @@ class FeedReader:
         self._feed = feed
         self._shift = 0
         """Added to the feed's sequence numbers."""
-        self._awaits_entry = True
-        self._since: float | None = None
-        """When it began to wait for an entry, or was too slow."""
-        self._is_slow = False
+        self._gate = PictureGate()
 
     @property
     def start(self) -> tuple[int, int] | None:
         """Return sequence number and timestamp of the first packet of `begin`, or None."""
         kept = self._feed.kept
-        return (kept[0].sequence, self._burst_time(0)) if kept else None
+        return (kept[0].sequence, self._feed.burst_time(0)) if kept else None
 
     def begin(self, now: float) -> list[bytes]:
         """Return what the viewer gets at once: everything since the last entry."""
-        self._since, self._is_slow, self._shift = now, False, 0
-        self._awaits_entry = not self._feed.kept
+        self._shift = 0
+        self._gate.begin(now, has_entry=bool(self._feed.kept))
         datagrams = [
-            _renumbered(datagram, 0, self._burst_time(number))
+            _renumbered(datagram, 0, self._feed.burst_time(number))
             for number, picture in enumerate(self._feed.kept)
             for datagram in picture.datagrams
         ]
@@ -252,32 +258,20 @@ class FeedReader:
 
         `waiting` bytes wait for it already. The datagrams are the picture's own where they fit as they are.
         """
-        if waiting > MAX_WAITING and not self._is_slow:
-            self._is_slow = self._awaits_entry = True
-            self._since = now
-        if self._is_slow and waiting <= RESUME_BELOW:
-            self._is_slow = False
-        extra: list[bytes] = []
-        if self._is_slow or (self._awaits_entry and not picture.is_entry and not self._has_waited(now)):
+        admission = self._gate.admit(picture.is_entry, waiting, now)
+        if admission is Admission.DROP:
             if self.packets:
                 self.counts["dropped pictures"] += 1
             self._shift -= len(picture.datagrams)
             return ()
-        if self._awaits_entry and not picture.is_entry:
+        extra: list[bytes] = []
+        if admission is Admission.PASS_WITHOUT_ENTRY:
             extra = self._feed.parameters(picture.sequence + self._shift & _WRAP16, picture.timestamp)
             self._shift += len(extra)
-        self._awaits_entry = False
         self.counts["pictures"] += 1
         if not self._shift & _WRAP16:
             return self._sent(picture.datagrams)
         return self._sent([*extra, *(_renumbered(one, self._shift, picture.timestamp) for one in picture.datagrams)])
-
-    def _has_waited(self, now: float) -> bool:
-        return self._since is not None and now - self._since >= MAX_ENTRY_WAIT
-
-    def _burst_time(self, number: int) -> int:
-        kept = self._feed.kept
-        return kept[-1].timestamp - (len(kept) - 1 - number) * BURST_STEP & _WRAP32
 
     def _sent(self, datagrams: Sequence[bytes]) -> Sequence[bytes]:
         self.packets += len(datagrams)

@@ -1,6 +1,6 @@
 """Ways of a viewer's packets: datagrams of UDP, or frames inside its RTSP connection.
 
-Neither ever waits: what a viewer does not take waits in a queue of its own, whose size `FeedReader` is told.
+Neither ever waits: what a viewer does not read stays in a queue of its own, whose size `FeedReader` receives.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ class UdpOutlet:
 async def _bind(
     local: str, peer: str, port: int, protocol: Callable[[], asyncio.DatagramProtocol]
 ) -> asyncio.DatagramTransport:
-    """Return a socket that sends to one port of the peer and hears that port only."""
+    """Return a socket that sends to one port of the peer and receives from that port only."""
     transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
         protocol, local_addr=(local, 0), remote_addr=(peer, port)
     )

@@ -161,11 +161,15 @@ class RelayServer:
         count = self.viewers
         return f"rtsp://{self.host}:{self.port}/SYSTEM/STREAM: {count} viewer{'' if count == 1 else 's'}"
 
+    def source(self, name: str) -> DroneSource | None:
+        """Return the source of a drone, by its system id or its name."""
+        return self._sources.get(name)
+
     def find(self, path: tuple[str, ...]) -> tuple[DroneSource, StreamKind] | None:
         """Return the source and stream of a path; None when there is no such stream."""
         if len(path) != 2:
             return None
-        source = self._sources.get(path[0])
+        source = self.source(path[0])
         kind = next((kind for kind in StreamKind if kind.value == path[1]), None)
         return (source, kind) if source is not None and kind is not None and source.has(kind) else None
 
@@ -259,7 +263,7 @@ class _Connection:
                     self._write(dialogue.done(request))
                     self._end_session()
         except NotShown as error:
-            log.info("video: %s: %s", self._name, error)
+            log.debug("video: %s: %s", self._name, error)  # a station retries each second
             self._write(dialogue.refused(request, Status.SERVICE_UNAVAILABLE, str(error)))
 
     async def _describe(self, wanted: ViewerRequest) -> Response:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Protocol
 
 from anafi_mav.clock import Clock
@@ -57,6 +58,7 @@ class ComponentSystem(Protocol):
     vehicle: Vehicle
     clock: Clock
     memory: Memory
+    download_folder: Path | None
     uris: GatewayUris
     has_picture_pose: bool
     """True when the configuration allows pose from the live video."""
@@ -102,6 +104,7 @@ class Component:
         self.vehicle = system.vehicle
         self.clock = system.clock
         self.memory = system.memory
+        self.download_folder = system.download_folder
         self.uris = system.uris
         self.has_picture_pose = system.has_picture_pose
         self.definition = DefinitionLink()

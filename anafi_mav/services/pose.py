@@ -64,14 +64,14 @@ def picture_pose(vehicle: Vehicle, frame: VideoFrame, altitude: float | None, he
     The sign of roll is that of a quaternion from forward, right, down to north, east, down; `roll_sign` concerns the
     angle of AttitudeChanged only.
     """
-    said = frame.metadata
-    speed, location = said.speed, said.location
+    metadata = frame.metadata
+    speed, location = metadata.speed, metadata.location
     is_placed = location is not None and vehicle.drone.gps.state.fixed is True
     return VehiclePose(
         frame.attitude,
         None if speed is None else Velocity(speed.north, speed.east, speed.down),
-        altitude if said.altitude_ato is None else said.altitude_ato,
-        height if said.ground_distance is None else said.ground_distance,
+        altitude if metadata.altitude_ato is None else metadata.altitude_ato,
+        height if metadata.ground_distance is None else metadata.ground_distance,
         GeoPoint(location.latitude, location.longitude) if location is not None and is_placed else None,
         None if location is None else location.altitude_amsl,
         frame,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine, Hashable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Protocol
 
 from anafi_mav.clock import Clock
@@ -50,6 +51,8 @@ class Host(Protocol):
     capabilities: int
     """MAV_PROTOCOL_CAPABILITY bits of all services of the component."""
     memory: Memory
+    download_folder: Path | None
+    """Folder for copies of the drone's media after a landing; None: they are not copied."""
     uris: GatewayUris
     """What the gateway serves beside MAVLink."""
     has_picture_pose: bool

@@ -43,6 +43,7 @@ from anafi_mav.services.ground_station.node_status_service import NodeStatusServ
 from anafi_mav.services.ground_station.shell_service import ShellService
 from anafi_mav.services.ground_station.time_service import TimeService
 from anafi_mav.services.ground_station.tune_service import TuneService
+from anafi_mav.services.media.download_service import DownloadService
 from anafi_mav.services.media.media_service import MediaService
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.monitor import takeoff_point_service
@@ -125,6 +126,7 @@ CAMERA_SERVICES: tuple[type[Service], ...] = (
     VideoStreamService,
     ParamExtService,
     MediaService,
+    DownloadService,
 )
 """Services of component 100."""
 
@@ -169,14 +171,20 @@ class System:
         *,
         allow_kill: bool,
         state: Path | None = None,
+        download_folder: Path | None = None,
         uris: GatewayUris = GatewayUris(),  # noqa: B008  # frozen
         has_picture_pose: bool = True,
     ) -> None:
+        """`state`: folder of stored state.
+
+        `download_folder`: for copies of the drone's media after a landing; None: they are not copied.
+        """
         self.sysid = sysid
         self.has_picture_pose = has_picture_pose
         self.drone = drone
         self.clock = clock
         self.memory = Memory(state)
+        self.download_folder = download_folder
         self.uris = uris
         self.active = False
         self._node = node

@@ -212,10 +212,11 @@ class WebServer:
         response.content_type = _TYPES[resource.kind]
         response.content_length = end - first
         await response.prepare(request)
-        for part in resource.parts(first, end, SENT_PART):
-            await self._audible.wait()
-            await response.write(part)
-        await response.write_eof()
+        with contextlib.suppress(ConnectionError):  # the client has left
+            for part in resource.parts(first, end, SENT_PART):
+                await self._audible.wait()
+                await response.write(part)
+            await response.write_eof()
         return response
 
     async def _thumbnail(self, request: web.Request) -> web.Response:

@@ -1,7 +1,7 @@
-"""The page for browsers: the drones of the gateway, at "/".
+"""The pages for browsers: the list of drones at "/", the live picture at "/drone/SYSID".
 
-Its files lie in the folder `page` and are read once. The list of drones is JSON at "/drones", which the page requests
-every second.
+Their files lie in the folder `page` and are read once. The list of drones is JSON at "/drones", which the pages request
+every second. The picture comes from `live_video`.
 """
 
 from __future__ import annotations
@@ -21,8 +21,12 @@ FILES: Final = {
     "/": ("index.html", "text/html"),
     "/live.css": ("live.css", "text/css"),
     "/live.js": ("live.js", "text/javascript"),
+    "/drone.js": ("drone.js", "text/javascript"),
 }
 """Path: file and its type. Nothing else of the folder is served."""
+
+DRONE_PAGE: Final = (r"/drone/{sysid:\d{1,3}}", "drone.html")
+"""The path of each drone, and its file."""
 
 
 class DroneEntry(msgspec.Struct, frozen=True, kw_only=True):
@@ -35,16 +39,20 @@ class DroneEntry(msgspec.Struct, frozen=True, kw_only=True):
     connected: bool
     problem: str
     """Reason why it is not connected; empty while it is."""
+    stream: str
+    """The stream that it shows; empty: no picture can be watched."""
 
 
 class LivePage:
-    """Serves the page and its list."""
+    """Serves the pages and their list."""
 
     def __init__(self, server: HttpServer, drones: Callable[[], Sequence[DroneEntry]]) -> None:
         """`drones` returns the entries in the order of the configuration."""
         self._drones = drones
         for path, (name, kind) in FILES.items():
             server.add_get(path, _file((FOLDER / name).read_bytes(), kind))
+        path, name = DRONE_PAGE
+        server.add_get(path, _file((FOLDER / name).read_bytes(), "text/html"))
         server.add_get("/drones", self._list)
 
     async def _list(self, request: web.Request) -> web.Response:

@@ -7,7 +7,7 @@
 `gateway` registers the routes before the start; a handler takes an `aiohttp.web.Request` and returns a response.
 
 HTTP has no password here, so it is open to this computer only unless it is configured otherwise, and even there a web
-page of somebody else's must not reach it through the user's browser:
+page of another site must not reach it through the user's browser:
 
 - The Host header has to be an IP address or a name of this gateway. A page whose own name was made to point to
   127.0.0.1 (DNS rebinding) sends that name.

@@ -44,11 +44,12 @@ def loopback() -> str:
 
 
 @contextmanager
-def product(*arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """`anafi-mav ...` from its line that begins with "ready" to the end of the block."""
-    with subprocess.Popen(
-        [sys.executable, "-m", "anafi_mav", *arguments], stdout=subprocess.PIPE, text=True
-    ) as process:
+def product(*arguments: str, program: Sequence[str] = ("-m", "anafi_mav")) -> Iterator[subprocess.Popen[str]]:
+    """`anafi-mav ...` from its line that begins with "ready" to the end of the block.
+
+    `program` is another script that runs it.
+    """
+    with subprocess.Popen([sys.executable, *program, *arguments], stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout is not None
             while not (line := process.stdout.readline()).startswith("ready"):

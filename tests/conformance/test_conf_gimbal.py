@@ -29,6 +29,8 @@ from support.world import World, world
 
 from anafi_mav import units
 from anafi_mav.arsdk.messages.gimbal import Axis, AxisLockState
+from anafi_mav.mavlink import dialect as newer
+from anafi_mav.sim.world.faults import Impairment
 
 ACCEPTED, DENIED, REJECTED, UNSUPPORTED = (
     dialect.MAV_RESULT_ACCEPTED,
@@ -213,6 +215,19 @@ async def test_control_ends_without_heartbeats_of_the_owner() -> None:
         assert (await other.command(PITCHYAW, -5.0, x=LEVEL)).result == ACCEPTED
 
 
+async def test_takeover_cancels_the_command_of_another_client() -> None:
+    async with world() as w:
+        other = await w.connect(245, 190)
+        assert await angles(w, 0.0) == ACCEPTED
+        w.drone.faults.untold = frozenset({"gimbal.attitude"})  # so that it is not confirmed
+        mark = w.client.mark()
+        w.client.send_command(PITCHYAW, -40.0, NAN, NAN, NAN, x=LEVEL)
+        await w.drone.wait_log(lambda e: e.name == "gimbal.set_target" and e.args["pitch"] == -40.0, 3.0)
+        assert await configure(other, -2, -2, -1, -1) == ACCEPTED
+        ack = await w.client.wait("COMMAND_ACK", since=mark)
+        assert (ack.command, ack.result) == (PITCHYAW, newer.MAV_RESULT_CANCELLED)
+
+
 # -- rates
 
 
@@ -293,6 +308,34 @@ async def test_rate_ends_at_the_limit_by_release_and_by_takeover() -> None:
             assert await rates(w, 5.0) == ACCEPTED
             assert await configure(taker, *ids) == ACCEPTED
             await stands(w, 4)
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.5])
+async def test_axis_without_a_newer_target_does_not_turn_on(loss: float) -> None:
+    """An Ai turns by rates of both axes; then one gets an angle, and the other one is named no longer, or held.
+
+    The drone may lose targets: it acknowledges none.
+    """
+    async with world(model="ai", speed=1.0) as w:
+        for by_message, hold in ((False, NAN), (False, 0.0), (True, NAN)):
+            assert await angles(w, 0.0, 0.0) == ACCEPTED
+            await looks(w, pitch_absolute=0.0, yaw_relative=0.0)
+            if by_message:
+                send_rates(w.client, 5.0, 5.0)
+                await next_truth(w)
+            else:
+                assert await rates(w, 5.0, 5.0) == ACCEPTED
+            w.drone.faults.up = Impairment(loss=loss)
+            ack = await w.client.command(PITCHYAW, -30.0, NAN, NAN, hold, x=LEVEL)
+            assert ack.result == ACCEPTED
+            await looks(w, pitch_absolute=-30.0)
+            for _ in range(12):
+                before, after = await next_truth(w), await next_truth(w)
+                if after == before:
+                    break
+            w.drone.faults.up = Impairment()
+            assert after == before
+            assert abs(after.yaw_relative) < 40.0  # not by the end of its range
 
 
 # -- frames

@@ -25,6 +25,7 @@ from support.gimbal import (
     send_rates,
     truth,
 )
+from support.mav import Client
 from support.missions import ACTIVE, PAUSED, put, start, state, takeoff, way
 from support.plans import Item
 from support.world import HOME, World, world
@@ -90,11 +91,10 @@ async def test_region_is_locked_until_a_client_aims_the_gimbal() -> None:
         # Locked again, and freed by a message.
         assert (await w.client.command(ROI, x=EAST[0], y=EAST[1], z=HOME[2])).result == ACCEPTED
         await looks(w, pitch_absolute=-45.0)
-        for _ in range(6):
-            send_rates(w.client, 10.0)
-            await next_truth(w)
+        pitch = 25.0 * units.RAD_PER_DEG
+        w.client.send(dialect.MAVLink_gimbal_manager_set_pitchyaw_message(1, 1, LEVEL, 1, pitch, NAN, NAN, NAN))
+        await looks(w, pitch_absolute=25.0)
         assert pois(w)[-1]["mode"] == PoiMode.FREE_GIMBAL
-        assert truth(w).pitch_absolute > -44.0
         assert (await w.client.command(NO_ROI, 2.0)).result == DENIED
         assert (await w.client.command(NO_ROI)).result == ACCEPTED
         assert len(w.commands("ardrone3.Piloting.StopPilotedPOI")) == 1
@@ -218,6 +218,9 @@ async def test_mount_commands_and_messages_have_the_same_signs() -> None:
         for mode in (dialect.MAV_MOUNT_MODE_RETRACT, dialect.MAV_MOUNT_MODE_RC_TARGETING):
             assert (await w.client.command(MOUNT_MODE, mode)).result == UNSUPPORTED
             assert (await w.client.command(MOUNT, 10.0, 0.0, 0.0, 0.0, z=mode)).result == UNSUPPORTED
+        w.client.send(dialect.MAVLink_mount_configure_message(1, 1, dialect.MAV_MOUNT_MODE_NEUTRAL, 1, 1, 1))
+        w.client.send(dialect.MAVLink_mount_control_message(1, 1, 1500, 0, 0, 0))  # no angles in this mode
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Gimbal refused: mount mode 1 unsupported", since=0)
         assert truth(w).pitch_absolute == 0.0
 
         # A place: degE7 in single precision as MAVProxy sends it, and by message.
@@ -229,9 +232,13 @@ async def test_mount_commands_and_messages_have_the_same_signs() -> None:
         assert pois(w)[-1]["altitude"] == pytest.approx(0.0, abs=0.01)
         w.client.send(dialect.MAVLink_mount_configure_message(1, 1, GPS_POINT, 1, 1, 1))
         places = [round(value * 1e7) for value in NORTH]
-        w.client.send(dialect.MAVLink_mount_control_message(1, 1, *places, 300, 0))
+        count = len(pois(w))
+        for _ in range(5):  # a stream of one place is one region
+            w.client.send(dialect.MAVLink_mount_control_message(1, 1, *places, 300, 0))
+            await next_truth(w)
         await heads(w, 0.0)
         assert pois(w)[-1]["altitude"] == pytest.approx(3.0, abs=0.01)
+        assert len(pois(w)) == count + 1
 
 
 async def test_conf_099_components_refuse_what_is_not_theirs_at_once() -> None:
@@ -311,3 +318,104 @@ async def test_pitch_up_is_positive_in_every_message(sign: float) -> None:
         assert euler(await w.client.wait(ATTITUDE))[1] == pytest.approx(sign * 30.0, abs=0.5)
         send_rates(w.client, sign * 12.0)
         assert await rate(w, "pitch_absolute", 2) == pytest.approx(sign * 12.0, rel=0.1)
+
+
+# QGroundControl 5 (GimbalController.cc): what it sends, in its order, with its unset parameters of 0.
+
+
+async def station_command(client: Client, id: int, *params: float, target: int = 1) -> Any:
+    """A COMMAND_LONG of QGroundControl: seven parameters, 0 where it sets none."""
+    seven = [*params, *[0.0] * (7 - len(params))]
+    return await client.command(id, *seven[:4], x=seven[4], y=seven[5], z=seven[6], target=(1, target))
+
+
+@pytest.mark.parametrize(("model", "flavour"), [("4k", "px4"), ("ai", "ardupilot")])
+async def test_requests_of_qgroundcontrol_turn_the_gimbal(model: str, flavour: str) -> None:
+    has_yaw = model == "ai"
+    async with world(model=model, flavour=flavour, speed=1.0) as w:
+        station = w.client
+        information = dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION
+        # Each component with a heartbeat is asked; it then waits for status and attitude of the same device.
+        ack = await station_command(station, dialect.MAV_CMD_REQUEST_MESSAGE, information, target=100)
+        assert ack.result == UNSUPPORTED
+        mark = station.mark()
+        ack = await station_command(station, dialect.MAV_CMD_REQUEST_MESSAGE, information)
+        assert ack.result == ACCEPTED
+        manager = await station.wait("GIMBAL_MANAGER_INFORMATION", since=mark)
+        device = manager.gimbal_device_id
+        assert 1 <= device <= 6
+        for kind in (STATUS, ATTITUDE):
+            seen = await station.wait(kind)
+            assert (seen.get_srcComponent(), seen.gimbal_device_id) == (1, device)
+        # Its default rates, requested where one is late.
+        for message in (dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS, information + 5):
+            assert (await station_command(station, INTERVAL, message, 0.0)).result == ACCEPTED
+
+        # A click: it takes control and aims at once, without waiting for the acknowledgement.
+        beat(station)
+        mark = station.mark()
+        take = dialect.MAVLink_command_long_message(1, 1, CONFIGURE, 0, 255, 190, -1, -1, NAN, NAN, device)
+        flags = LEVEL | VEHICLE_FRAME
+        click = dialect.MAVLink_command_long_message(1, 1, PITCHYAW, 0, -20.0, 15.0, NAN, NAN, flags, 0, device)
+        station.send_raw(station.pack(take) + station.pack(click))
+        for command in (CONFIGURE, PITCHYAW):
+            ack = await station.wait("COMMAND_ACK", lambda ack, command=command: ack.command == command, since=mark)
+            assert ack.result == ACCEPTED
+        await looks(w, pitch_absolute=-20.0, yaw_relative=15.0 if has_yaw else 0.0)
+        status = await station.wait(STATUS, since=mark)
+        assert owner(status) == (255, 190)
+
+        # Buttons: the same command with rates each 0.5 s while one is pressed, then zeros.
+        for _ in range(3):
+            beat(station)
+            ack = await station_command(station, PITCHYAW, NAN, NAN, 10.0, -4.0, LEVEL, 0.0, device)
+            assert ack.result == ACCEPTED
+            assert await rate(w, "pitch_absolute", 2) == pytest.approx(10.0, rel=0.1)
+        ack = await station_command(station, PITCHYAW, NAN, NAN, 0.0, 0.0, LEVEL, 0.0, device)
+        assert ack.result == ACCEPTED
+        assert await next_truth(w) == await next_truth(w)
+
+        # Yaw lock: the angles that it shows, to north; and back.
+        shown = await station.wait(ATTITUDE)
+        pitch, yaw = euler(shown)[1], euler(shown)[2] + math.degrees(shown.delta_yaw)
+        ack = await station_command(station, PITCHYAW, pitch, yaw, NAN, NAN, LEVEL | YAW_LOCK, 0.0, device)
+        assert ack.result == ACCEPTED
+        locked = await station.wait(ATTITUDE, lambda m: not has_yaw or m.flags & YAW_LOCK)
+        frame = EARTH_FRAME if has_yaw else VEHICLE_FRAME
+        assert locked.flags & (VEHICLE_FRAME | EARTH_FRAME) == frame
+        ack = await station_command(station, PITCHYAW, 0.0, 0.0, NAN, NAN, flags, 0.0, device)
+        assert ack.result == ACCEPTED
+        await looks(w, pitch_absolute=0.0, yaw_relative=0.0)
+
+        mark = station.mark()
+        ack = await station_command(station, CONFIGURE, -3.0, -3.0, -1.0, -1.0, NAN, NAN, device)
+        assert ack.result == ACCEPTED
+        assert owner(await station.wait(STATUS, since=mark)) == (0, 0)
+        assert not [m.text for _, m in station.since(0, "STATUSTEXT") if "Gimbal" in m.text]
+
+
+# The end of things.
+
+
+async def test_calibrating_gimbal_refuses_targets_at_once() -> None:
+    async with world() as w:
+        w.client.send_command(dialect.MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, x=2.0)
+        await w.client.wait(ATTITUDE, lambda m: m.failure_flags & dialect.GIMBAL_DEVICE_ERROR_FLAGS_CALIBRATION_RUNNING)
+        assert (await w.client.command(PITCHYAW, -20.0, x=LEVEL, timeout=1.0)).result == REJECTED
+        assert w.commands("gimbal.set_target") == []
+
+
+async def test_rate_in_force_is_stopped_after_a_lost_link() -> None:
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(PITCHYAW, NAN, NAN, 4.0, NAN, x=LEVEL)).result == ACCEPTED
+        w.drone.faults.mute = True
+        await w.client.silence("HEARTBEAT", 1.5)
+        turned = truth(w).pitch_absolute
+        w.drone.faults.mute = False
+        await w.client.wait(ATTITUDE, timeout=30.0)
+        await w.drone.wait_log(
+            lambda e: e.name == "gimbal.set_target" and (e.args["control_mode"], e.args["pitch"]) == (1, 0.0), 10.0
+        )
+        before = await next_truth(w)
+        assert before == await next_truth(w)
+        assert before.pitch_absolute > turned - 1.0

@@ -54,7 +54,6 @@ class Described:
     low: Value | None = None
     high: Value | None = None
     step: Value | None = None
-    updates: list[str] = field(default_factory=list)
 
 
 @dataclass
@@ -136,6 +135,7 @@ def _parameter(element: ET.Element) -> Described:
     attributes, kind = element.attrib, element.attrib["type"]
     description = element.findtext("description")
     assert description
+    assert element.find("updates") is None  # MAVSDK loses the values of the settings in it
     one = Described(
         attributes["name"],
         kind,
@@ -144,7 +144,6 @@ def _parameter(element: ET.Element) -> Described:
         attributes.get("control") != "0",
         [_choice(option, kind) for option in element.findall("options/option")],
         *(typed(kind, attributes[name]) if name in attributes else None for name in ("min", "max", "step")),
-        updates=[update.text or "" for update in element.findall("updates/update")],
     )
     assert attributes.keys() <= {*("name", "type", "default", "control", "min", "max", "step", "decimalPlaces", "unit")}
     return one
@@ -177,8 +176,6 @@ def _check(one: Described, read: ReadDefinition) -> None:
         assert one.low is not None
         assert one.high is not None
         assert one.low <= one.default <= one.high
-    for name in one.updates:
-        assert name in read.parameters
     for option in one.options:
         for name in option.exclusions:
             assert name in read.parameters

@@ -58,7 +58,10 @@ REACHED: dict[str, Reach] = {
     "camera/exposure_time": Reach(
         "`ANAFI_CAMERA_EXPOSURE`.exposure_time", _ANAFI + "test_video_runs_while_a_stream_needs_its_metadata"
     ),
-    "camera/image": Reach("", waits=PAYLOAD),
+    "camera/image": Reach(
+        "`VIDEO_STREAM_INFORMATION`.uri, [RTSP](video.md)",
+        "conformance/test_conf_video.py::test_conf_091_each_uri_opens_once_its_stream_is_shown",
+    ),
     "camera/hfov": Reach("`ANAFI_CAMERA_EXPOSURE`.hfov", _ANAFI + "test_video_runs_while_a_stream_needs_its_metadata"),
     "camera/iso_gain": Reach(
         "`ANAFI_CAMERA_EXPOSURE`.iso", _ANAFI + "test_video_runs_while_a_stream_needs_its_metadata"
@@ -136,7 +139,10 @@ REACHED: dict[str, Reach] = {
         "`ANAFI_CONTROLLER_INPUT`.source; the gateway takes it when it is told to move",
         _SAFETY + "test_a_pilots_stick_ends_offboard_for_good",
     ),
-    "storage/download": Reach("", waits=PAYLOAD),
+    "storage/download": Reach(
+        "MAVLink FTP of component 100, `/media`; `anafi-mav media download`",
+        "conformance/test_conf_media.py::test_conf_113_media_is_listed_read_and_removed",
+    ),
     "storage/format": Reach("", waits=PAYLOAD),
     "camera/autorecord": Reach(
         "extended parameter `CAM_AUTOREC`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"
@@ -177,5 +183,8 @@ REACHED: dict[str, Reach] = {
     "home/min_altitude": Reach("`ANF_RTH_ALT`", _TWIN),
     "home/precise": Reach("`ANF_RTH_PRECISE`", _PARAMETER),
     "home/type": Reach("`ANF_HOME_TYPE`", _PARAMETER),
-    "storage/download_folder": Reach("", waits="nothing: a setting of the computer, not of the drone"),
+    "storage/download_folder": Reach(
+        "waits for nothing: the configuration key `media: {download_folder}` of the gateway",
+        "conformance/test_media_download.py::test_photo_of_a_flight_is_copied_after_landing",
+    ),
 }

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from anafi_mav.config import Config, DroneConfig, VideoConfig
+from anafi_mav.config import Config, DroneConfig, HttpConfig, MediaConfig, VideoConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 from support import flavours
@@ -147,6 +147,7 @@ async def world(
     udp: bool = False,
     video: VideoConfig | None = None,
     video_latency: float = 0.0,
+    media: MediaConfig | None = None,
     pose: Literal["video", "events"] = "video",
 ) -> AsyncIterator[World]:
     """One simulated drone, one gateway with a TCP endpoint, and its clients, connected and ready.
@@ -177,6 +178,8 @@ async def world(
             DroneConfig(name="alpha", sysid=sysid, address=drone_address, http_port=WEB_PORT, rtsp_port=VIDEO_PORT),
         ),
         video=video or VideoConfig(),
+        media=media or MediaConfig(),
+        http=HttpConfig(port=0),
         allow_kill=allow_kill,
         pose=pose,
     )

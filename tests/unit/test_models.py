@@ -107,5 +107,5 @@ def test_plan_of_a_model_without_figures_is_not_checked() -> None:
 
 def test_unknown_product_number_gets_a_neutral_record() -> None:
     unknown = models.unknown(0x0ABC)
-    assert (unknown.key, unknown.title, unknown.plan_figures) == ("0x0abc", "unknown model", None)
+    assert (unknown.key, unknown.title, unknown.plan_version) == ("0x0abc", "unknown model", None)
     assert (unknown.lens, unknown.battery_cells, unknown.firmware) == (None, None, ())

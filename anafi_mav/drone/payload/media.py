@@ -29,7 +29,7 @@ from anafi_mav.drone.payload.media_index import MediaIndex
 from anafi_mav.drone.payload.media_reader import MediaReader, OpenedFile
 from anafi_mav.drone.rest import Rest
 from anafi_mav.drone.settings import Commanding
-from anafi_mav.errors import RemoteProtocolError
+from anafi_mav.errors import CommandRejected, RemoteProtocolError
 
 log = logging.getLogger("anafi_mav")
 
@@ -89,10 +89,10 @@ class Notification(msgspec.Struct, frozen=True):
         return _item(self.data.get("media"))
 
 
-def _item(told: Any) -> MediaItem | None:
+def _item(received: Any) -> MediaItem | None:
     """Return a media of the drone; None when the data is not readable as one."""
     try:
-        return msgspec.convert(told, MediaItem, strict=False)
+        return msgspec.convert(received, MediaItem, strict=False)
     except (msgspec.ValidationError, RecursionError):
         return None
 
@@ -110,10 +110,10 @@ class MediaClient:
     async def list(self, *, newest_first: bool = True) -> tuple[MediaItem, ...]:
         """Return all media."""
         query = {"sort_order": "newest" if newest_first else "oldest"}
-        told = await self._rest.json("GET", f"{API}/medias", query=query)
-        if not isinstance(told, list):
-            raise RemoteProtocolError("the drone's list of media is none")
-        items = [_item(one) for one in told]
+        answer = await self._rest.json("GET", f"{API}/medias", query=query)
+        if not isinstance(answer, list):
+            raise RemoteProtocolError("the drone's list of media is not readable")
+        items = [_item(one) for one in answer]
         if None in items:
             log.warning("%d media of the drone are not readable", items.count(None))
         return tuple(item for item in items if item is not None)
@@ -127,18 +127,25 @@ class MediaClient:
 
     async def md5(self, resource: Resource) -> str:
         """Return the MD5 of a file on the drone, hexadecimal."""
-        told = resource.md5
-        if told is None:
+        md5 = resource.md5
+        if md5 is None:
             answer = await self._rest.json("GET", f"{API}/md5/{file_name(resource.resource_id)}")
-            told = answer.get("md5") if isinstance(answer, dict) else None
-        if not isinstance(told, str) or not told:
+            md5 = answer.get("md5") if isinstance(answer, dict) else None
+        if not isinstance(md5, str) or not md5:
             raise RemoteProtocolError(f"no MD5 of {resource.resource_id}")
-        return told.lower()
+        return md5.lower()
+
+    async def known_md5(self, resource: Resource) -> str | None:
+        """Return the MD5 of a file; None when the drone has none."""
+        try:
+            return await self.md5(resource)
+        except (CommandRejected, RemoteProtocolError):
+            return None
 
     async def thumbnail(self, of: MediaItem | Resource) -> bytes:
         """Return a small JPEG. Raises `CommandRejected` when the drone has none."""
         if not of.thumbnail:
-            raise RemoteProtocolError("no thumbnail was told")
+            raise RemoteProtocolError("the drone has no thumbnail of it")
         return await self._rest.read("GET", of.thumbnail, limit=THUMBNAIL_LIMIT)
 
     def open(self, resource: Resource, offset: int = 0) -> OpenedFile:
@@ -147,6 +154,15 @@ class MediaClient:
         Where its bytes begin (0 where the web server has no ranges), and the bytes.
         """
         return self._rest.open_file(resource.url, offset, resource.size)
+
+    async def read_from(self, resource: Resource, offset: int = 0) -> AsyncGenerator[bytes, None]:
+        """Iterate over the bytes of a file from `offset` on, for its only reader."""
+        async with self.open(resource, offset) as (start, chunks):
+            skipped = offset - start
+            async for chunk in chunks:
+                if len(chunk) > skipped:
+                    yield chunk[skipped:]
+                skipped = max(skipped - len(chunk), 0)
 
     async def delete(self, media_id: str) -> None:
         """Delete a media with all its files."""
@@ -228,6 +244,10 @@ class Media(Commanding[MediaState]):
     async def md5(self, resource: Resource) -> str:
         """Return the MD5 of a file on the drone, hexadecimal."""
         return await self._available().md5(resource)
+
+    async def known_md5(self, resource: Resource) -> str | None:
+        """Return the MD5 of a file; None when the drone has none."""
+        return await self._available().known_md5(resource)
 
     async def thumbnail(self, of: MediaItem | Resource) -> bytes:
         """Return a small JPEG. Raises `CommandRejected` when the drone has none."""

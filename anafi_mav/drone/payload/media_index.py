@@ -71,7 +71,10 @@ class MediaIndex:
         """True while the drone's notifications are received."""
 
     def kept(self, counters: object) -> Listing | None:
-        """Return the listing if it is still true; `counters`: as the drone has reported last."""
+        """Return the listing if it is still true; else None.
+
+        `counters` are those that the drone has reported last.
+        """
         if self._kept is None:
             return None
         listing, then, made = self._kept
@@ -81,7 +84,8 @@ class MediaIndex:
     async def get(self, counters: object) -> Listing:
         """Return the listing, from the drone where it is not kept.
 
-        Simultaneous callers share one request."""
+        Simultaneous callers share one request.
+        """
         if (kept := self.kept(counters)) is not None:
             return kept
         if self._fetching is None or self._fetching.done():

@@ -1,7 +1,7 @@
 """Reads parts of files from the drone's web server, for any number of readers at a time.
 
 A read is one HTTP answer. It begins where a reader wants it (RFC 9110 §14, Range) and stays a few pieces ahead of its
-readers. There are at most `READS` of them; a reader of a third file ends the one that nobody waits for, and later
+readers. There are at most `READS` of them; a reader of a third file ends the one that has no waiting reader, and later
 continues it by another Range. A web server without ranges sends the file from its beginning, which is skipped.
 """
 

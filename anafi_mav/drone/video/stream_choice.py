@@ -1,7 +1,8 @@
 """Streams of a drone's cameras, the shown one, and the command that changes it.
 
 An ANAFI sends one stream to the gateway. On Thermal and USA the thermal camera's mode and rendering decide what it
-shows, whoever sets them. On the Ai the gateway chooses among the stereo camera's pictures and the main camera's.
+shows, whichever client sets them. On the Ai the gateway chooses among the stereo camera's pictures and the main
+camera's.
 """
 
 from __future__ import annotations

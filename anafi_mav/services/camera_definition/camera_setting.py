@@ -76,8 +76,6 @@ class CameraSetting:
     guard: Guard = Guard.PICTURE
     is_listed: bool = True
     """False: stations have a control of their own for it, and leave it out of their list."""
-    changes: tuple[str, ...] = ()
-    """Settings that the drone or the gateway may adapt to this one: clients read them again."""
     only_in: Mapping[str, frozenset[int]] = field(default_factory=dict)
     """Values of other settings in which it counts; stations hide it in all others."""
 

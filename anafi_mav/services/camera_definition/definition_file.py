@@ -2,6 +2,9 @@
 
 MAVLink camera_def.md. What the readers of the format require beyond it: a default for each parameter, which must be one
 of its options (MAVSDK camera_definition.cpp); one option at least (QGroundControl VehicleCameraControl.cc).
+
+It has no <updates>: every changed value is sent to all clients. MAVSDK drops the named values when it reads the setting
+and requests them after the next write only (camera_definition.cpp set_setting).
 """
 
 from __future__ import annotations
@@ -43,7 +46,7 @@ def _content(catalogue: Catalogue, model: str, version: int) -> bytes:
     parameters = ET.SubElement(root, "parameters")
     exclusions, restrictions = catalogue.exclusions(), catalogue.restrictions()
     for entry in catalogue.entries:
-        element = _parameter(parameters, entry, catalogue)
+        element = _parameter(parameters, entry)
         if not entry.options:
             continue
         options = ET.SubElement(element, "options")
@@ -60,9 +63,9 @@ def _content(catalogue: Catalogue, model: str, version: int) -> bytes:
     return content + b"\n"
 
 
-def _parameter(parent: ET.Element, entry: CatalogueEntry, catalogue: Catalogue) -> ET.Element:
+def _parameter(parent: ET.Element, entry: CatalogueEntry) -> ET.Element:
     setting, kind = entry.setting, entry.setting.kind
-    attributes = {"name": setting.name, "type": kind.xml, "default": kind.text(_default(entry))}
+    attributes = {"name": setting.name, "type": kind.xml, "default": kind.text(entry.default)}
     if not setting.is_listed:
         attributes["control"] = "0"
     if entry.limits is not None:
@@ -75,20 +78,7 @@ def _parameter(parent: ET.Element, entry: CatalogueEntry, catalogue: Catalogue) 
         attributes["unit"] = setting.unit
     element = ET.SubElement(parent, "parameter", attributes)
     ET.SubElement(element, "description").text = setting.title
-    changed = [name for name in setting.changes if name in catalogue.index]
-    if changed:
-        updates = ET.SubElement(element, "updates")
-        for name in changed:
-            ET.SubElement(updates, "update").text = name
     return element
-
-
-def _default(entry: CatalogueEntry) -> float:
-    """Return the possible value that is nearest to the default of the table."""
-    wanted = entry.setting.kind.normalise(entry.setting.default)
-    if entry.limits is not None:
-        return min(max(wanted, entry.limits.low), entry.limits.high)
-    return min((option.value for option in entry.options), key=lambda value: abs(value - wanted))
 
 
 def _option(parent: ET.Element, tag: str, option: Option, kind: ExtType) -> ET.Element:

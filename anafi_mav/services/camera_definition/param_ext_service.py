@@ -44,13 +44,16 @@ URI = f"mftp://{PATH.lstrip('/')}{COMPRESSED}"
 component that announces it. Compressed it is a tenth, and all three unpack it."""
 
 SETTLE = 0.5
-"""s after the last change before the definition is made again: a list of capabilities is several events."""
+"""s after a report until the definition is made again: a list of capabilities is several events."""
 
 PROGRESS_AFTER = 0.25
 """s after which a write that the drone has not answered is reported as IN_PROGRESS: MAVSDK repeats after 0.5 s."""
 
 MAX_WAITING = 128
 """Writes that wait for their turn: all settings from two clients. What comes beyond that is repeated by its client."""
+
+REPEAT_AFTER = 1.0
+"""s after which a changed value is sent once more: no client acknowledges it, and only MAVProxy reads values again."""
 
 REFUSAL_EVERY = 5.0
 """s between texts to one channel about refused writes: QGroundControl repeats a failed one three times."""
@@ -85,6 +88,8 @@ class ParamExtService(Service):
         self._sender = PacedSender(host)
         self._sent: dict[str, float] = {}
         """The value of each setting that was last reported to all clients."""
+        self._repeats: dict[str, float] = {}
+        """When the value of a changed setting is sent once more, s, monotonic."""
         self._learn_at = math.inf
         """When the definition is made again, s, monotonic."""
         self._waiting: deque[Write] = deque()
@@ -110,6 +115,7 @@ class ParamExtService(Service):
 
     def link_down(self) -> None:
         self._sender.clear()
+        self._repeats.clear()
         self._waiting.clear()
         self._current = self._worker = None  # the task ends with the host's
         self._learn_at = math.inf
@@ -122,13 +128,17 @@ class ParamExtService(Service):
         return dict.fromkeys(EVENTS, self._on_report)
 
     def _on_report(self, message: Message, now: float) -> None:
-        self._learn_at = now + SETTLE
+        self._learn_at = min(self._learn_at, now + SETTLE)
         self._report_changes()
 
     def tick(self, now: float) -> None:
         if now >= self._learn_at:
             self._learn()
             self._report_changes()
+        for name in [name for name, due in self._repeats.items() if now >= due]:
+            del self._repeats[name]
+            if name in self._catalogue.index:
+                self.host.send(self._message(self._catalogue.index[name]))
         for write in (*([self._current] if self._current else []), *self._waiting):
             if not write.is_reported and now >= write.since + PROGRESS_AFTER:
                 write.is_reported = True
@@ -140,8 +150,7 @@ class ParamExtService(Service):
         """Make the list of settings and the definition from what the drone reports now."""
         self._learn_at = math.inf
         drone = self.host.drone
-        self._catalogue.learn(drone.camera.state, drone.thermal.state)
-        if not self._catalogue.entries:
+        if not self._catalogue.learn(drone.camera.state, drone.thermal.state) or not self._catalogue.entries:
             return
         made = definition_file(self._catalogue, drone.identity.model.title)
         if made.content != self.host.definition.content.plain:
@@ -157,7 +166,10 @@ class ParamExtService(Service):
     # Values.
 
     def _value(self, entry: CatalogueEntry) -> float:
-        """Return the value of the camera at work; of another one where it has no such setting."""
+        """Return the value of the camera at work; of another one where it has no such setting.
+
+        The default stands for a setting that no camera reports now, as the interval of a series in another photo mode.
+        """
         drone = self.host.drone
         cameras, thermal = drone.camera.state, drone.thermal.state
         active = drone.camera.active_id
@@ -165,7 +177,7 @@ class ParamExtService(Service):
             value = entry.setting.value_of(View(drone.camera[id], cameras, thermal))
             if value is not None:
                 return value
-        return entry.setting.kind.normalise(entry.setting.default)
+        return entry.default
 
     def _message(self, place: int) -> dialect.MAVLink_message:
         """PARAM_EXT_VALUE of one setting."""
@@ -180,11 +192,13 @@ class ParamExtService(Service):
         )
 
     def _report_changes(self) -> None:
-        """Send every value that differs from the last reported one to all clients."""
+        """Send each changed value to all clients, now and once more later."""
+        repeat_at = self.host.clock.monotonic() + REPEAT_AFTER
         for place, entry in enumerate(self._catalogue.entries):
             name, value = entry.setting.name, self._value(entry)
             if self._sent.get(name, value) != value:
                 self.host.send(self._message(place))
+                self._repeats[name] = repeat_at
             self._sent[name] = value
 
     # Reading.
@@ -320,4 +334,5 @@ def _accepts(entry: CatalogueEntry, value: float) -> bool:
     if entry.options:
         return any(option.value == value for option in entry.options)
     assert entry.limits is not None
-    return entry.limits.low <= value <= entry.limits.high
+    low, high, step = entry.limits
+    return low <= value <= high and (step is None or math.isclose(math.remainder(value - low, step), 0.0, abs_tol=1e-6))

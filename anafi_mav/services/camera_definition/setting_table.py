@@ -30,9 +30,11 @@ from anafi_mav.drone import (
     RecordingMode,
     RecordingSettings,
     Resolution,
+    StoragePolicy,
     Streaming,
     Style,
     StyleSettings,
+    VideoCodec,
     WhiteBalance,
 )
 from anafi_mav.errors import CommandRejected, NotSupported
@@ -142,6 +144,13 @@ STYLES: Choice[Style] = {
     Style.PASTEL: (3, "Pastel"),
     Style.CUSTOM: (4, "Custom"),
     Style.PHOTOGRAMMETRY: (5, "Photogrammetry"),
+}
+CODECS: Choice[VideoCodec] = {VideoCodec.H264: (0, "H.264"), VideoCodec.H265: (1, "H.265")}
+STORAGES: Choice[StoragePolicy] = {
+    StoragePolicy.PRIORITY_REMOVABLE: (0, "Card, else internal"),
+    StoragePolicy.REMOVABLE: (1, "Card"),
+    StoragePolicy.PRIORITY_INTERNAL: (2, "Internal, else card"),
+    StoragePolicy.INTERNAL: (3, "Internal"),
 }
 STREAMINGS: Choice[Streaming] = {
     Streaming.LOW_LATENCY: (0, "Low latency"),
@@ -359,7 +368,6 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         default=1,
         guard=Guard.CAPTURE,
         is_listed=False,
-        changes=("CAM_SHUTTERSPD", "CAM_ISO", "CAM_ISOMAX", "CAM_HDR"),
     ),
     # -- photos
     CameraSetting(
@@ -370,7 +378,6 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         write=lambda drone, id, value: set_photo(drone, id, PhotoSettings(mode=word_of(PHOTO_MODES, value))),
         options=lambda view: choices(PHOTO_MODES, union(one.modes for one in view.camera.photos)),
         guard=Guard.CAPTURE,
-        changes=("CAM_PHOTOPROJ", "CAM_PHOTOFMT", "CAM_PHOTOLAPSE", "CAM_PHOTODIST"),
         only_in={"CAM_MODE": PHOTO},
     ),
     CameraSetting(
@@ -381,7 +388,6 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         write=lambda drone, id, value: set_photo(drone, id, PhotoSettings(format=word_of(PHOTO_FORMATS, value))),
         options=lambda view: choices(PHOTO_FORMATS, union(one.formats for one in view.camera.photos)),
         guard=Guard.CAPTURE,
-        changes=("CAM_PHOTOFMT",),
         only_in={"CAM_MODE": PHOTO},
     ),
     CameraSetting(
@@ -454,6 +460,26 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     # -- videos
     CameraSetting(
+        "CAM_PHOTOSIGN",
+        ExtType.UINT8,
+        "Sign photos",
+        read=lambda view: flag(photo(view).signed),
+        write=lambda drone, id, value: set_photo(drone, id, PhotoSettings(signed=value != 0.0)),
+        options=lambda view: OFF_ON if view.camera.signable else (),
+        guard=Guard.CAPTURE,
+        only_in={"CAM_MODE": PHOTO},
+    ),
+    CameraSetting(
+        "CAM_PHOTOLIVE",
+        ExtType.UINT8,
+        "Live video while a photo is taken",
+        read=lambda view: flag(photo(view).keeps_live_video),
+        write=lambda drone, id, value: set_photo(drone, id, PhotoSettings(keeps_live_video=value != 0.0)),
+        options=lambda view: OFF_ON if view.camera.live_video_keepable else (),
+        guard=Guard.CAPTURE,
+        only_in={"CAM_MODE": PHOTO},
+    ),
+    CameraSetting(
         "CAM_VIDMODE",
         ExtType.UINT8,
         "Video mode",
@@ -461,7 +487,6 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         write=lambda drone, id, value: set_recording(drone, id, RecordingSettings(mode=word_of(VIDEO_MODES, value))),
         options=lambda view: choices(VIDEO_MODES, union(one.modes for one in view.camera.recordings)),
         guard=Guard.CAPTURE,
-        changes=("CAM_VIDRES", "CAM_VIDFPS", "CAM_SHUTTERSPD", "CAM_ISO", "CAM_ISOMAX"),
         only_in={"CAM_MODE": VIDEO},
     ),
     CameraSetting(
@@ -475,7 +500,6 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         options=lambda view: choices(RESOLUTIONS, union(one.resolutions for one in view.camera.recordings)),
         default=1,
         guard=Guard.CAPTURE,
-        changes=("CAM_VIDFPS", "CAM_SHUTTERSPD"),
         only_in={"CAM_MODE": VIDEO},
     ),
     CameraSetting(
@@ -490,7 +514,6 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         unit="Hz",
         default=30.0,
         guard=Guard.CAPTURE,
-        changes=("CAM_SHUTTERSPD",),
         only_in={"CAM_MODE": VIDEO},
     ),
     CameraSetting(
@@ -513,6 +536,25 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         options=lambda view: numbers(view.camera.bitrates, lambda rate: f"{rate / 1e6:g} Mbit/s"),
         guard=Guard.CAPTURE,
         only_in={"CAM_MODE": VIDEO},
+    ),
+    CameraSetting(
+        "CAM_VIDCODEC",
+        ExtType.UINT8,
+        "Video codec",
+        read=lambda view: number_of(CODECS, recording(view).codec),
+        write=lambda drone, id, value: set_recording(drone, id, RecordingSettings(codec=word_of(CODECS, value))),
+        options=lambda view: choices(CODECS, view.camera.codecs),
+        guard=Guard.CAPTURE,
+        only_in={"CAM_MODE": VIDEO},
+    ),
+    CameraSetting(
+        "CAM_STORAGE",
+        ExtType.UINT8,
+        "Storage",
+        read=lambda view: number_of(STORAGES, view.camera.storage_policy),
+        write=lambda drone, id, value: drone.camera.set_storage_policy(word_of(STORAGES, value), id),
+        options=lambda view: choices(STORAGES, view.camera.storage_policies),
+        guard=Guard.CAPTURE,
     ),
     CameraSetting(
         "CAM_AUTOREC",
@@ -539,7 +581,6 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         read=lambda view: number_of(EXPOSURES, exposure(view).mode),
         write=lambda drone, id, value: set_exposure(drone, id, ExposureSettings(mode=word_of(EXPOSURES, value))),
         options=lambda view: choices(EXPOSURES, view.camera.exposures),
-        changes=("CAM_SHUTTERSPD", "CAM_ISO", "CAM_ISOMAX", "CAM_METERING", "CAM_AELOCK"),
     ),
     CameraSetting(
         "CAM_EV",
@@ -607,7 +648,6 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         read=lambda view: number_of(WHITE_BALANCES, view.camera.white_balance),
         write=lambda drone, id, value: drone.camera.set_white_balance(word_of(WHITE_BALANCES, value), id=id),
         options=lambda view: choices(WHITE_BALANCES, view.camera.white_balances),
-        changes=("CAM_WBTEMP", "CAM_WBLOCK"),
     ),
     CameraSetting(
         "CAM_WBTEMP",
@@ -650,7 +690,6 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         read=lambda view: number_of(STYLES, style(view).style),
         write=lambda drone, id, value: drone.camera.set_style(word_of(STYLES, value), id),
         options=lambda view: choices(STYLES, view.camera.styles),
-        changes=("CAM_SATURATION", "CAM_CONTRAST", "CAM_SHARPNESS"),
     ),
     level("saturation", "CAM_SATURATION", "Saturation"),
     level("contrast", "CAM_CONTRAST", "Contrast"),

@@ -93,10 +93,6 @@ THERMAL_SETTINGS: tuple[CameraSetting, ...] = (
             if mode in (view.thermal.modes or ())
         ),
         guard=Guard.CAPTURE,
-        changes=(
-            *("CAM_MODE", "CAM_PHOTOMODE", "CAM_VIDMODE", "CAM_VIDRES", "CAM_VIDFPS", "CAM_EXPMODE", "CAM_EV"),
-            *("CAM_WBMODE", "CAM_STYLE", "CAM_HDR", "CAM_AUTOREC", "CAM_STREAMING"),
-        ),
     ),
     CameraSetting(
         "CAM_THM_RENDER",

@@ -60,9 +60,9 @@ MAX_REPETITIONS = 16
 another number."""
 
 RESTARTED = 1 << 15
-"""Distance of a sequence number from the last kept one, modulo 2**16, from which it is an older number.
+"""Distance from one sequence number to another, modulo 2**16, from which the second is not newer.
 
-A client that restarts counts from the beginning, and its TerminateSession may equal one of before.
+A client that restarts counts from the beginning, and its TerminateSession may equal the one whose answer is kept.
 """
 
 _HEADER = struct.Struct("<HBBBBBBI")
@@ -223,10 +223,7 @@ class _Client:
     """Those that are open."""
     waits: list[Wait] = field(default_factory=list)
     kept: tuple[FtpRequest, bytes] | None = None
-    """The last request of `_KEPT` and its answer, which a repetition gets again.
-
-    Opening a file drops it: a client may number its requests from 0 again for each file.
-    """
+    """The last request of `_KEPT` and its answer, which a repetition gets again."""
     seen: float = 0.0
 
 
@@ -304,7 +301,7 @@ class FtpServer:
         if client.kept is not None:
             if client.kept[0] == request:
                 return client.kept[1]
-            if request.seq - client.kept[0].seq & 0xFFFF >= RESTARTED:
+            if not 0 < (request.seq - client.kept[0].seq) % (2 * RESTARTED) < RESTARTED:
                 client.kept = None
         if self._waits(client, request) or (len(client.waits) >= MAX_WAITS and request.opcode not in _SHORT):
             return None
@@ -483,7 +480,7 @@ class FtpServer:
         session = self._session_for(client, request, now)
         if isinstance(session, FileError):
             return session
-        client.sessions[request.session], client.kept = session, None
+        client.sessions[request.session] = session
         if session.state is not State.WRITING or session.created != request.seq:
             self._abandon(client, request.session)
             session.step(Event.CREATE)
@@ -514,7 +511,7 @@ class FtpServer:
         if isinstance(session, FileError):
             return session
         opening = files.open(request.path)
-        client.sessions[request.session], client.kept = session, None
+        client.sessions[request.session] = session
         self._abandon(client, request.session)
         session.step(Event.OPEN)
         session.path, session.source, session.used = request.path, None, now

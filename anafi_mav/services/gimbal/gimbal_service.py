@@ -1,22 +1,20 @@
 """Gimbal manager of component 1 (MAVLink gimbal_v2.md, device id 1), and older mounts.
 
-`control` says which client may move the gimbal, `rates` how long a rate goes on, `targets` reads angles and rates,
-`roi` looks at places. A command is ACCEPTED when the drone reports that the gimbal turns as commanded, or has arrived:
-stations send the next command after the acknowledgement, and operators turn on before the gimbal rests.
+`control` decides which client may move the gimbal, `targets` reads angles and rates, `motion` carries them out, `rates`
+ends a rate, `roi` looks at places. A command is ACCEPTED when the drone reports that the gimbal turns as commanded, or
+has arrived: stations send the next command after the acknowledgement, and operators turn on before the gimbal rests.
 """
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import math
 from collections.abc import Mapping
-from typing import TypedDict
 
 from anafi_mav import texts, units
-from anafi_mav.drone import Aim, GimbalState
+from anafi_mav.drone import GimbalState
 from anafi_mav.drone.events import Axis, GimbalAttitudeChanged
-from anafi_mav.errors import AnafiMavError, LinkLost
+from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.stall import STALL
@@ -25,7 +23,7 @@ from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, 
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.gimbal import gimbal_messages, mount, targets
 from anafi_mav.services.gimbal.control import Answer, ClientId, GimbalControl, Heartbeats
-from anafi_mav.services.gimbal.rates import GimbalRates
+from anafi_mav.services.gimbal.motion import GimbalMotion
 from anafi_mav.services.gimbal.roi import RegionOfInterest
 from anafi_mav.services.gimbal.targets import Frames, GimbalTarget
 from anafi_mav.services.service import Host, MessageHandler, Service
@@ -34,17 +32,8 @@ from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
 from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
-
-STOPS = 4
-"""Zero rates sent after a stop is confirmed. Targets are not acknowledged by the drone, and a gimbal that turns slowly
-looks as if it stood."""
-
-REPEATS = 3
-"""Times that the angles of a message are sent again: the drone may have lost the first."""
-
-REPEAT_EVERY = 0.3
-"""s between them; not while further messages arrive."""
 
 
 def client_id(client: object) -> ClientId:
@@ -54,18 +43,6 @@ def client_id(client: object) -> ClientId:
     raise ValueError(f"not a client: {client!r}")
 
 
-class _ByAxis(TypedDict):
-    """Arguments of the gimbal's verbs."""
-
-    yaw: Aim | None
-    pitch: Aim | None
-    roll: Aim | None
-
-
-def _by_axis(aims: Mapping[Axis, Aim]) -> _ByAxis:
-    return {"yaw": aims.get(Axis.YAW), "pitch": aims.get(Axis.PITCH), "roll": aims.get(Axis.ROLL)}
-
-
 class GimbalService(Service):
     """Gimbal of one vehicle, as a MAVLink gimbal manager."""
 
@@ -73,25 +50,16 @@ class GimbalService(Service):
         super().__init__(host)
         self._heartbeats = Heartbeats()
         self._control = GimbalControl(self._heartbeats)
-        self._rates = GimbalRates(self._heartbeats)
         self._roi = RegionOfInterest(host)
+        self._motion = GimbalMotion(host, self._heartbeats, self._roi)
         self._mount_mode = dialect.MAV_MOUNT_MODE_MAVLINK_TARGETING
         """Of MOUNT_CONFIGURE: decides what a MOUNT_CONTROL means."""
-        self._neutral = False
-        """The last target was the reference orientation."""
-        self._command: asyncio.Task[None] | None = None
-        """The gimbal command that has not been answered yet."""
-        self._halt: asyncio.Task[None] | None = None
-        """Stops the gimbal, and makes sure of it."""
-        self._zeros = 0
-        """Zero rates that are still to be sent."""
-        self._repeat: tuple[Mapping[Axis, Aim], int, float] | None = None
-        """Angles of a message, how often they are to be sent again, and when next."""
+        self._mount_place: tuple[ClientId, GeoPoint, float] | None = None
+        """Sender, place and height (m above take-off) of the newest MOUNT_CONTROL that is still to be looked at."""
+        self._mount_look: asyncio.Task[None] | None = None
         self._ticked = math.inf
         self._status: tuple[object, ...] = ()
         """Content of the last GIMBAL_MANAGER_STATUS."""
-        self._was_turning = False
-        """A rate was in force when the link was lost: the drone may still turn its gimbal."""
 
     # Tables.
 
@@ -156,7 +124,9 @@ class GimbalService(Service):
                 lambda vehicle, times: gimbal_messages.device_information(vehicle, gimbal(vehicle), times)
             ),
             dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS: MessageStream(
-                lambda vehicle, times: gimbal_messages.attitude_status(gimbal(vehicle), times, neutral=self._neutral),
+                lambda vehicle, times: gimbal_messages.attitude_status(
+                    gimbal(vehicle), times, neutral=self._motion.is_neutral
+                ),
                 attitude,
                 every=0.1,
                 from_pictures=True,
@@ -173,24 +143,20 @@ class GimbalService(Service):
 
     def link_up(self) -> None:
         self._ticked = math.inf
-        if self._was_turning:
-            self._was_turning = False
-            self._stop_turning()
+        self._motion.link_up()
 
     def link_down(self) -> None:
-        self._was_turning = self._rates.turns or self._halt is not None
-        with contextlib.suppress(AnafiMavError):
-            if self._rates.turns:  # the gateway ends, and the drone is still connected
-                for _ in range(STOPS):
-                    self._turn({axis: Aim(0.0, aim.frame) for axis, aim in self._rates.rates.items()})
-        self._rates.end_unless(())
+        self._motion.link_down()
         self._control = GimbalControl(self._heartbeats)
         self._roi.link_down()
-        self._command = self._halt = self._repeat = None
-        self._zeros, self._neutral, self._status = 0, False, ()
+        self._mount_look = self._mount_place = None
+        self._status = ()
 
     def heartbeat(self, inbound: Inbound) -> None:
         self._heartbeats.receive((inbound.sysid, inbound.compid), inbound.now)
+
+    def subscriptions(self) -> Subscriptions:
+        return {GimbalAttitudeChanged: lambda message, now: self._motion.watch_attitude()}
 
     def tick(self, now: float) -> None:
         if (
@@ -198,69 +164,37 @@ class GimbalService(Service):
         ) >= STALL:  # heartbeats that arrived meanwhile were not read: no silence of theirs
             self._heartbeats.add_stall(gap)
             self._control.add_stall(gap)
-            self._rates.add_stall(gap)
+            self._motion.add_stall(gap)
         self._ticked = now
         self._watch_control(now)
-        self._watch_rates(now)
+        self._motion.tick(now)
         self._roi.tick(now)
         self._announce()
-        with contextlib.suppress(AnafiMavError):
-            self._send_again(now)
 
     def _watch_control(self, now: float) -> None:
         self._watch_mission()
         silent = self._control.expire(now)
         if silent is not None:
             self.host.text(Severity.NOTICE, texts.GIMBAL_RELEASED.fill(system=silent[0]))
-            if self._rates.client == silent and self._rates.end_unless(()):
-                self._stop_turning()
+            if self._motion.turner == silent:
+                self._motion.end_rates()
 
     def _watch_mission(self) -> None:
         """Give the gimbal to the mission that is flown while it needs it."""
         if self._control.mission(needs_gimbal=self.host.vehicle.mission_needs_gimbal) and self._control.is_of_mission:
             self._roi.forget_system()
-            turns = self._rates.end_unless(()) or self._halt is not None
-            self._begin()
-            self._neutral, self._zeros = False, STOPS if turns else 0  # soon: its first target may follow
-
-    def _watch_rates(self, now: float) -> None:
-        client = self._rates.client
-        by_command = self._rates.is_by_command
-        if client is not None and self._rates.expire(now):
-            self._stop_turning()
-            if by_command:
-                reason = texts.RATE_CLIENT_SILENT.fill(system=client[0])
-                self.host.text(Severity.NOTICE, texts.GIMBAL_STOPPED.fill(reason=reason))
-            return
-        if self._command is not None:
-            return  # the command ends when the gimbal turns, or is at the end of its range
-        gimbal = self.host.drone.gimbal.main
-        at_end = [axis for axis, aim in self._rates.rates.items() if aim.value and gimbal.is_at_end(axis, aim.value)]
-        if at_end and self._rates.limit(at_end):
-            self._stop_turning()
-
-    def _send_again(self, now: float) -> None:
-        """Repeat what the drone may have lost: rates in force, a stop, the angles of a message."""
-        if self._command is not None or self._halt is not None:
-            return  # they repeat it themselves
-        if self._rates.turns:
-            self._turn(self._rates.rates)
-        elif self._zeros > 0:
-            self._zeros -= 1
-            self.host.drone.gimbal.halt()
-        if self._repeat is not None and now >= self._repeat[2]:
-            angles, left, _ = self._repeat
-            self.host.drone.gimbal.aim(**_by_axis(angles))
-            self._repeat = (angles, left - 1, now + REPEAT_EVERY) if left > 1 else None
+            self._motion.leave_to_mission()
 
     def _manager_status(self, times: Times) -> dialect.MAVLink_message | None:
         gimbal = self.host.drone.gimbal.main
-        return gimbal_messages.manager_status(gimbal, self._control, self.host.sysid, times, neutral=self._neutral)
+        return gimbal_messages.manager_status(
+            gimbal, self._control, self.host.sysid, times, neutral=self._motion.is_neutral
+        )
 
     def _announce(self) -> None:
         """Send GIMBAL_MANAGER_STATUS at once when control or a flag has changed."""
         control, gimbal = self._control, self.host.drone.gimbal.main
-        flags = gimbal_messages.device_flags(gimbal, neutral=self._neutral)
+        flags = gimbal_messages.device_flags(gimbal, neutral=self._motion.is_neutral)
         status = (control.state, control.primary, control.secondary, flags)
         if status != self._status:
             self._status = status
@@ -280,17 +214,14 @@ class GimbalService(Service):
             raise Refused(texts.GIMBAL, texts.GIMBAL_OF_MISSION)
         if answer is Answer.INVALID:
             raise Refused(texts.GIMBAL, texts.GIMBAL_IDS, lasting=True)
-        self._end_rates_of_others(client_id(command.client))
+        self._end_of_others(client_id(command.client))
         self._announce()
 
-    def _end_rates_of_others(self, sender: ClientId) -> None:
-        """Stop a rate whose client has control no longer, or has just released it."""
-        turner = self._rates.client
-        if turner is None:
-            return
-        released = turner == sender and turner not in (self._control.primary, self._control.secondary)
-        if (released or not self._control.allows(turner)) and self._rates.end_unless(()):
-            self._stop_turning()
+    def _end_of_others(self, sender: ClientId) -> None:
+        """End a rate that its sender releases, and the targets of clients without control."""
+        if self._motion.turner == sender and sender not in (self._control.primary, self._control.secondary):
+            self._motion.end_rates()
+        self._motion.end_unless(self._control.allows)
 
     def _require_control(self, client: object) -> ClientId:
         """Return the id of a client that may move the gimbal. Raises `Refused` for another one."""
@@ -326,70 +257,7 @@ class GimbalService(Service):
         """Carry out the target of a command; return when the drone turns the gimbal."""
         if isinstance(target, str):
             raise _refusal(target)
-        client = self._require_control(command.client)
-        gimbal = self.host.drone.gimbal
-        if gimbal.main.axes is None:
-            raise Unsupported(texts.GIMBAL, texts.NO_GIMBAL)
-        target = target.on(gimbal.main.axes)
-        if not (target.angles or target.rates or target.neutral):
-            return  # yaw alone, of a gimbal without this axis
-        self._begin()
-        task = self._command = asyncio.current_task()
-        try:
-            await self._roi.free_gimbal()
-            self._neutral = target.neutral
-            if target.rates:
-                self._rates.take(client, target.rates, self.host.clock.monotonic(), by_message=False)
-            else:
-                self._rates.replace_by_angles()
-            if target.neutral:
-                await gimbal.reset_orientation()
-            elif target.is_zero_rate:
-                await gimbal.stop()
-            else:
-                if target.angles:
-                    await gimbal.steer(**_by_axis(target.angles))
-                if self._rates.turns:
-                    await gimbal.sweep(**_by_axis(self._rates.rates))
-        except BaseException:
-            if self._command is task and self._rates.end_unless(()):  # nothing newer, and it has not been confirmed
-                self._command = None
-                self._stop_turning()
-            raise
-        finally:
-            if self._command is task:
-                self._command = None
-                self._zeros = STOPS if target.is_zero_rate else 0
-
-    def _begin(self) -> None:
-        """End what moves the gimbal: a newer target replaces it."""
-        if self._command is not None and self._command is not asyncio.current_task():
-            self._command.cancel()
-            self._command = None
-        if self._halt is not None:
-            self._halt.cancel()
-            self._halt = None
-        self._zeros, self._repeat = 0, None
-
-    def _turn(self, rates: Mapping[Axis, Aim]) -> None:
-        self.host.drone.gimbal.turn(**_by_axis(rates))
-
-    def _stop_turning(self) -> None:
-        """Stop the gimbal in the background, until the drone reports that it stands."""
-        self._begin()
-        self._halt = self.host.spawn(self._stop())
-
-    async def _stop(self) -> None:
-        task = asyncio.current_task()
-        try:
-            await self.host.drone.gimbal.stop()
-        except LinkLost:
-            return
-        except AnafiMavError as error:
-            self.host.text(Severity.WARNING, texts.GIMBAL_STOP_FAILED.fill(error=error))
-        finally:
-            if self._halt is task:
-                self._halt, self._zeros = None, STOPS
+        await self._motion.move(self._require_control(command.client), target)
 
     # Angles and rates by message.
 
@@ -419,69 +287,15 @@ class GimbalService(Service):
             reason = target
         elif not self._control.allows(client):
             reason = self._holder
+        elif self._motion.is_calibrating:
+            reason = texts.GIMBAL_CALIBRATES
         if reason is not None or isinstance(target, str):
             self.host.warn_throttled(texts.REFUSED.fill(what=texts.GIMBAL, reason=reason))
             return
-        target = target.on(self.host.drone.gimbal.main.axes or frozenset())
-        if self._roi.holds_gimbal:
-            if self._command is None and (target.angles or target.rates or target.neutral):
-                self._command = self.host.spawn(self._free_gimbal())
-            return  # the next message moves it
         try:
-            self._apply(client, target)
+            self._motion.stream(client, target)
         except AnafiMavError as error:
             self.host.warn_throttled(texts.from_below(error))
-
-    async def _free_gimbal(self) -> None:
-        task = asyncio.current_task()
-        try:
-            await self._roi.free_gimbal()
-        except AnafiMavError as error:
-            self.host.warn_throttled(texts.from_below(error))
-        finally:
-            if self._command is task:
-                self._command = None
-
-    def _apply(self, client: ClientId, target: GimbalTarget) -> None:
-        now = self.host.clock.monotonic()
-        if target.neutral:
-            if not self._neutral:
-                self._begin()
-                self._rates.replace_by_angles()
-                self._neutral = True
-                self._halt = self.host.spawn(self._reset())
-            return
-        if target.is_zero_rate:
-            stands = self._halt is not None or self._zeros > 0
-            self._rates.take(client, target.rates, now, by_message=True)
-            self._neutral = False
-            if not stands:
-                self._stop_turning()
-            return
-        if not (target.angles or target.rates):
-            return
-        before = self._rates.rates
-        self._begin()
-        self._neutral = False
-        if target.rates:
-            self._rates.take(client, target.rates, now, by_message=True)
-        else:
-            self._rates.replace_by_angles()
-        if target.angles:
-            self.host.drone.gimbal.aim(**_by_axis(target.angles))
-            self._repeat = (target.angles, REPEATS, now + REPEAT_EVERY)
-        if self._rates.turns and self._rates.rates != before:
-            self._turn(self._rates.rates)
-
-    async def _reset(self) -> None:
-        task = asyncio.current_task()
-        try:
-            await self.host.drone.gimbal.reset_orientation()
-        except AnafiMavError as error:
-            self.host.warn_throttled(texts.from_below(error))
-        finally:
-            if self._halt is task:
-                self._halt = None
 
     # Regions of interest.
 
@@ -502,16 +316,8 @@ class GimbalService(Service):
 
     async def _look(self, command: Command, where: GeoPoint, ato: float) -> None:
         self._require_control(command.client)
-        await self._rest()
+        await self._motion.rest()
         await self._roi.look_at(where, ato)
-
-    async def _rest(self) -> None:
-        """End what moves the gimbal, before the drone aims it: a stop sent later could end that."""
-        turns = self._rates.end_unless(()) or self._halt is not None
-        self._begin()
-        self._neutral = False
-        if turns:
-            await self.host.drone.gimbal.stop()
 
     async def _look_at_system(self, command: Command) -> None:
         """Run MAV_CMD_DO_SET_ROI_SYSID: param1 system, param2 gimbal device."""
@@ -520,7 +326,7 @@ class GimbalService(Service):
 
     async def _look_at_number(self, command: Command, system: float) -> None:
         self._require_control(command.client)
-        await self._rest()
+        await self._motion.rest()
         await self._roi.look_at_system(system)
 
     async def _look_anywhere(self, command: Command) -> None:
@@ -622,37 +428,53 @@ class GimbalService(Service):
 
     def _mount_configured(self, inbound: Inbound) -> None:
         """MOUNT_CONFIGURE has no acknowledgement; it decides what the next MOUNT_CONTROL means."""
-        message = inbound.message
-        if message.mount_mode == dialect.MAV_MOUNT_MODE_NEUTRAL:
+        mode = inbound.message.mount_mode
+        if mode == dialect.MAV_MOUNT_MODE_NEUTRAL:
             self._stream(inbound, targets.DEVICES[0], GimbalTarget(neutral=True))
-        if message.mount_mode in mount.MODES:
-            self._mount_mode = message.mount_mode
+        if mode in mount.MESSAGE_MODES:
+            self._mount_mode = mode
         else:
-            reason = texts.GIMBAL_MODE.fill(mode=message.mount_mode)
-            self.host.warn_throttled(texts.REFUSED.fill(what=texts.GIMBAL, reason=reason))
+            self._warn_of_mode(mode)
 
     def _mount_controlled(self, inbound: Inbound) -> None:
         """MOUNT_CONTROL: cdeg of pitch, roll, yaw; or degE7 and cm above home of a place."""
         message = inbound.message
         if self._mount_mode == dialect.MAV_MOUNT_MODE_GPS_POINT:
             where = GeoPoint(message.input_a / 1e7, message.input_b / 1e7)
-            self.host.spawn(self._mount_looks(inbound, where, message.input_c / 100.0))
-            return
-        angles = {
-            Axis.PITCH: message.input_a / 100.0,
-            Axis.ROLL: message.input_b / 100.0,
-            Axis.YAW: message.input_c / 100.0,
-        }
-        self._stream(inbound, targets.DEVICES[0], targets.read(mount.HORIZON, angles, {}))
+            self._mount_place = (inbound.sysid, inbound.compid), where, message.input_c / 100.0
+            if self._mount_look is None:
+                self._mount_look = self.host.spawn(self._look_for_mount())
+        elif self._mount_mode == dialect.MAV_MOUNT_MODE_MAVLINK_TARGETING:
+            angles = {
+                Axis.PITCH: message.input_a / 100.0,
+                Axis.ROLL: message.input_b / 100.0,
+                Axis.YAW: message.input_c / 100.0,
+            }
+            self._stream(inbound, targets.DEVICES[0], targets.read(mount.HORIZON, angles, {}))
+        else:
+            self._warn_of_mode(self._mount_mode)
 
-    async def _mount_looks(self, inbound: Inbound, where: GeoPoint, ato: float) -> None:
+    def _warn_of_mode(self, mode: int) -> None:
+        reason = texts.GIMBAL_MODE.fill(mode=mode)
+        self.host.warn_throttled(texts.REFUSED.fill(what=texts.GIMBAL, reason=reason))
+
+    async def _look_for_mount(self) -> None:
+        """Look at the newest place of MOUNT_CONTROL, which may arrive often; at the same place once."""
+        task = asyncio.current_task()
         try:
-            if not self._control.allows((inbound.sysid, inbound.compid)):
-                raise Refused(texts.ROI, self._holder)
-            await self._rest()
-            await self._roi.look_at(where, ato)
+            while self._mount_place is not None:
+                client, where, ato = self._mount_place
+                self._mount_place = None
+                if not self._control.allows(client):
+                    raise Refused(texts.ROI, self._holder)
+                if not self._roi.is_locked_on(where, ato):
+                    await self._motion.rest()
+                    await self._roi.look_at(where, ato)
         except AnafiMavError as error:
             self.host.warn_throttled(error.text if isinstance(error, Refused) else texts.from_below(error))
+        finally:
+            if self._mount_look is task:
+                self._mount_look = self._mount_place = None
 
 
 def _check_device(id: float, subject: OperatorText = texts.GIMBAL) -> None:

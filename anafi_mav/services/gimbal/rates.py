@@ -75,7 +75,7 @@ class GimbalRates:
     def __init__(self, heartbeats: Heartbeats) -> None:
         self.state = RateState.STILL
         self.rates: Mapping[Axis, Aim] = {}
-        """deg/s of each axis that is turned, also of those that the rate in force stops (0)."""
+        """deg/s of each axis that is turned, also of those that the rate in force holds (0)."""
         self.client: ClientId | None = None
         """Sender of the rates in force."""
         self._heartbeats = heartbeats
@@ -93,24 +93,20 @@ class GimbalRates:
         return self.state is RateState.BY_COMMAND
 
     def take(self, client: ClientId, rates: Mapping[Axis, Aim], now: float, *, by_message: bool) -> None:
-        """Put rates (deg/s) in force.
-
-        An axis that turned by an earlier rate and is not among them stops: its sender has dropped it.
-        """
-        dropped = {axis: Aim(0.0, aim.frame) for axis, aim in self.rates.items() if axis not in rates}
+        """Put rates (deg/s) in force instead of earlier ones; zeros alone end those."""
         if all(aim.value == 0.0 for aim in rates.values()):
             self._enter(RateEvent.TARGET)
             return
         self._enter(RateEvent.MESSAGE if by_message else RateEvent.COMMAND)
-        self.rates, self.client, self._at = {**dropped, **rates}, client, now
+        self.rates, self.client, self._at = dict(rates), client, now
 
     def replace_by_angles(self) -> None:
         """End the rates: an angle was commanded."""
         self._enter(RateEvent.TARGET)
 
-    def end_unless(self, allowed: Iterable[ClientId]) -> bool:
-        """End the rates unless their sender is one of these; True when that stops the gimbal."""
-        if self.client is None or self.client in allowed:
+    def end(self) -> bool:
+        """End the rates; True when that stops the gimbal."""
+        if self.client is None:
             return False
         self._enter(RateEvent.CONTROL)
         return True

@@ -63,6 +63,16 @@ class GimbalTarget:
         )
 
     @property
+    def is_empty(self) -> bool:
+        """True when nothing is commanded."""
+        return not (self.angles or self.rates or self.neutral)
+
+    @property
+    def held(self) -> frozenset[Axis]:
+        """Axes with a zero rate beside the angles of others."""
+        return frozenset(axis for axis, aim in self.rates.items() if aim.value == 0.0) if self.angles else frozenset()
+
+    @property
     def is_zero_rate(self) -> bool:
         """True when nothing but zero rates is commanded."""
         return bool(self.rates) and not self.angles and all(aim.value == 0.0 for aim in self.rates.values())

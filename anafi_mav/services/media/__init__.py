@@ -1,1 +1,1 @@
-"""The drone's photos and videos: over MAVLink FTP, and brought home after a landing."""
+"""The drone's photos and videos: over MAVLink FTP, and downloaded after a landing."""

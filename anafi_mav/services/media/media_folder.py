@@ -1,7 +1,7 @@
-"""The drone's photos and videos as a folder: `<day>/<file>`, read from the drone while a client reads them.
+"""The drone's photos and videos as a folder of MAVLink FTP.
 
-A day is "2026-11-22" by the drone's clock. Nothing is kept here but checksums: `drone.media` keeps the list and the
-pieces that were read last.
+A file is `<day>/<file>` and is read from the drone while a client reads it. A day is "2026-11-22" by the drone's clock.
+Nothing is kept here but checksums: `drone.media` keeps the list and the pieces that were read last.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class MediaFolder:
             async for piece in pieces:
                 crc = crc32(piece, crc)
                 digest.update(piece)
-        md5 = await known_md5(self._drone, resource)
+        md5 = await self._drone.media.known_md5(resource)
         if md5 is not None and digest.hexdigest() != md5:
             raise FileRefused(FileError.FAIL, texts.FILE_DAMAGED)
         return crc
@@ -104,7 +104,7 @@ def busy(drone: Drone) -> texts.OperatorText | None:
 
 
 def when_listed(drone: Drone, then: Callable[[Listing], T]) -> T | Awaitable[T]:
-    """Apply `then` to the list of media: at once when it is kept, else when the drone has sent it."""
+    """Apply `then` to the list of media, at once when it is kept."""
     kept = drone.media.kept_listing
     return _after_listing(drone, then) if kept is None else then(kept)
 
@@ -112,14 +112,6 @@ def when_listed(drone: Drone, then: Callable[[Listing], T]) -> T | Awaitable[T]:
 async def _after_listing(drone: Drone, then: Callable[[Listing], T]) -> T:
     with refusing():
         return then(await drone.media.listing())
-
-
-async def known_md5(drone: Drone, resource: Resource) -> str | None:
-    """Return the MD5 of a file; None when the drone has none."""
-    try:
-        return await drone.media.md5(resource)
-    except AnafiMavError:
-        return None
 
 
 def find(listing: Listing, path: str) -> Resource:

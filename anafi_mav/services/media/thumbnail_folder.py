@@ -31,7 +31,8 @@ class ThumbnailFolder:
     def list(self, path: str) -> Sequence[Entry] | Awaitable[Sequence[Entry]]:
         """Return the thumbnails of a day.
 
-        The drone reports no size of a thumbnail: 0 until it was opened."""
+        The drone reports no size of a thumbnail: 0 until it was opened.
+        """
         return when_listed(self._drone, lambda listing: entries(listing, path, self._entry))
 
     async def open(self, path: str) -> MadeFile:

@@ -273,7 +273,7 @@ class MessageService(Service):
                 return False
             self.host.send(message, to)
         except Exception as error:
-            # A value of the drone's that nobody foresaw. The other messages, and the heartbeat, go on without it.
+            # An unforeseen value of the drone's. The other messages, and the heartbeat, are sent without it.
             now = self.host.clock.monotonic()
             if now - self._failed.get(id, -math.inf) >= LOG_EVERY:
                 self._failed[id] = now

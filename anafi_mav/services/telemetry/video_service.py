@@ -49,14 +49,14 @@ def camera_exposure(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message |
         light = (_number(camera.shutter_s), _number(camera.iso), NAN, NAN)
         view = (_number(camera.hfov_deg), NAN)
     else:
-        said = frame.metadata
+        metadata = frame.metadata
         light = (
-            _number(said.exposure_time, 1e-3),
-            _number(said.iso_gain),
-            _number(said.awb_r_gain),
-            _number(said.awb_b_gain),
+            _number(metadata.exposure_time, 1e-3),
+            _number(metadata.iso_gain),
+            _number(metadata.awb_r_gain),
+            _number(metadata.awb_b_gain),
         )
-        view = (_number(said.hfov, units.DEG_PER_RAD), _number(said.vfov, units.DEG_PER_RAD))
+        view = (_number(metadata.hfov, units.DEG_PER_RAD), _number(metadata.vfov, units.DEG_PER_RAD))
     return dialect.MAVLink_anafi_camera_exposure_message(
         times.boot_ms,
         *light,
@@ -109,15 +109,15 @@ def picture(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     frame = times.pose.frame
     if frame is None:
         return None
-    said = frame.metadata
+    metadata = frame.metadata
     return dialect.MAVLink_anafi_picture_message(
-        UNKNOWN_U64 if said.timestamp is None else said.timestamp,
+        UNKNOWN_U64 if metadata.timestamp is None else metadata.timestamp,
         times.boot_ms,
         frame.timestamp,
-        _quaternion(said.quat),
-        _quaternion(said.drone_quat),
-        _number(said.hfov, units.DEG_PER_RAD),
-        _number(said.vfov, units.DEG_PER_RAD),
+        _quaternion(metadata.quat),
+        _quaternion(metadata.drone_quat),
+        _number(metadata.hfov, units.DEG_PER_RAD),
+        _number(metadata.vfov, units.DEG_PER_RAD),
         min(round((frame.arrived - frame.shot) * 1e3), UNKNOWN_U16 - 1),
         dialect.ANAFI_PICTURE_CLOCK_REPORT if frame.is_clock_known else dialect.ANAFI_PICTURE_CLOCK_ARRIVAL,
     )

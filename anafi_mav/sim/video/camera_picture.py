@@ -109,8 +109,8 @@ class CameraPicture:
         focal = self._width / 2.0 / math.tan(view.hfov / 2.0)
         below = np.add.outer(down * self._rows + forward * focal, right * self._columns)
         cells: Cells = np.where(below > 0.0, self._ground, self._sky).astype(np.uint8)
-        steep = math.hypot(right, down)
-        cells[np.abs(below) < 0.5 * steep] = HORIZON
+        half = 0.5 * math.hypot(right, down)
+        cells[(below >= -half) & (below < half)] = HORIZON
         if self._width < WIDE:
             return cells
         try:

@@ -11,7 +11,7 @@ function row(drone) {
   if (item === undefined) {
     item = document.createElement("li");
     for (const name of ["name", "state"]) {
-      const part = document.createElement("span");
+      const part = document.createElement(name === "name" ? "a" : "span");
       part.className = name;
       item.append(part);
     }
@@ -25,6 +25,7 @@ function show(drones) {
   for (const drone of drones) {
     const item = row(drone);
     item.querySelector(".name").textContent = drone.name;
+    item.querySelector(".name").href = `/drone/${drone.sysid}`;
     item.querySelector(".state").textContent =
       `System ${drone.sysid}` + (drone.model ? `, ${drone.model}` : "") +
       (drone.connected ? ", connected" : `, not connected: ${drone.problem}`);

@@ -32,4 +32,4 @@ def test_row_is_reached_or_waits_for_its_issue(name: str) -> None:
         assert function in functions(file)
     else:
         assert name.partition("/")[0] in ("camera", "gimbal", "storage")
-        assert reach.waits == PAYLOAD or name == "storage/download_folder"
+        assert reach.waits == PAYLOAD

@@ -40,7 +40,7 @@ def test_handlers_of_several_tables_keep_table_order() -> None:
         (
             events.FlyingStateChanged,
             "Vehicle MessageService GuidedService EventService FenceService RollSignService OffboardFlight "
-            "WarningService TakeoffPointService",
+            "WarningService TakeoffPointService DownloadService",
         ),
         (
             events.SpeedChanged,

@@ -14,8 +14,8 @@ from anafi_mav.gateway import Gateway
 from anafi_mav.web.live_page import FILES, DroneEntry, LivePage
 from anafi_mav.web.server import HttpServer
 
-ALPHA = DroneEntry(name="alpha", sysid=1, model="ANAFI 4K", connected=True, problem="")
-BRAVO = DroneEntry(name="bravo", sysid=7, model="", connected=False, problem="no answer yet")
+ALPHA = DroneEntry(name="alpha", sysid=1, model="ANAFI 4K", connected=True, problem="", stream="visible")
+BRAVO = DroneEntry(name="bravo", sysid=7, model="", connected=False, problem="no answer yet", stream="")
 
 
 async def test_page_and_all_that_it_names_are_served() -> None:
@@ -42,8 +42,22 @@ async def test_list_has_each_drone_in_order() -> None:
         async with aiohttp.ClientSession() as client, client.get(f"http://127.0.0.1:{server.port}/drones") as answer:
             assert answer.content_type == "application/json"
             assert await answer.json() == [
-                {"name": "bravo", "sysid": 7, "model": "", "connected": False, "problem": "no answer yet"},
-                {"name": "alpha", "sysid": 1, "model": "ANAFI 4K", "connected": True, "problem": ""},
+                {
+                    "name": "bravo",
+                    "sysid": 7,
+                    "model": "",
+                    "connected": False,
+                    "problem": "no answer yet",
+                    "stream": "",
+                },
+                {
+                    "name": "alpha",
+                    "sysid": 1,
+                    "model": "ANAFI 4K",
+                    "connected": True,
+                    "problem": "",
+                    "stream": "visible",
+                },
             ]
     finally:
         await server.close()
@@ -55,7 +69,14 @@ async def test_gateway_lists_its_drone_and_closes_the_server() -> None:
         assert server is not None
         async with client.get(f"http://127.0.0.1:{server.port}/drones") as answer:
             (entry,) = await answer.json()
-        assert entry == {"name": "alpha", "sysid": 7, "model": "ANAFI 4K", "connected": True, "problem": ""}
+        assert entry == {
+            "name": "alpha",
+            "sysid": 7,
+            "model": "ANAFI 4K",
+            "connected": True,
+            "problem": "",
+            "stream": "visible",
+        }
         assert w.gateway.lines()[-1] == f"web page http://127.0.0.1:{server.port}/"
     assert server.port == 0
 

@@ -67,13 +67,13 @@ def test_restarted_client_with_equal_sequence_numbers_writes_again() -> None:
 def test_late_repetition_of_terminate_request_spares_the_next_session() -> None:
     b = Bench()
     b.ask(Opcode.CREATE_FILE, PATH, seq=0)
-    b.ask(Opcode.WRITE_FILE, b"w", seq=2)
+    b.ask(Opcode.WRITE_FILE, b"first", seq=2)
     b.ask(Opcode.TERMINATE_SESSION, seq=4)
     b.ask(Opcode.CREATE_FILE, PATH, seq=6)
     assert b.ask(Opcode.TERMINATE_SESSION, seq=4) == (ACK, b"")
-    b.ask(Opcode.WRITE_FILE, b"x", seq=8)
+    b.ask(Opcode.WRITE_FILE, b"second", seq=8)
     assert b.ask(Opcode.TERMINATE_SESSION, seq=10) == (ACK, b"")
-    assert b.files.written == [b"w", b"x"]
+    assert b.files.written == [b"first", b"second"]
 
 
 def test_repeated_create_request_does_not_empty_the_file() -> None:

@@ -152,11 +152,11 @@ def test_rate_by_command_outlives_messages_but_no_heartbeats() -> None:
     assert turning.expire(60.0 + COMMAND_SILENCE)
 
 
-def test_rate_of_an_axis_that_is_dropped_becomes_zero() -> None:
+def test_newer_rates_replace_all_earlier_ones() -> None:
     turning = GimbalRates(Heartbeats())
     turning.take(STATION, {**DOWN, **LEFT}, 0.0, by_message=False)
-    turning.take(STATION, DOWN, 1.0, by_message=False)
-    assert turning.rates == {**DOWN, Axis.YAW: Aim(0.0)}
+    turning.take(PROGRAM, DOWN, 1.0, by_message=True)
+    assert (turning.rates, turning.client, turning.is_by_command) == (DOWN, PROGRAM, False)
 
 
 @pytest.mark.parametrize("end", ["zero", "angle", "limit", "control"])
@@ -170,8 +170,8 @@ def test_rate_ends_by_each_other_event(end: str) -> None:
     elif end == "limit":
         assert turning.limit([Axis.PITCH])
     else:
-        assert not turning.end_unless([STATION])
-        assert turning.end_unless([PROGRAM])
+        assert turning.end()
+        assert not turning.end()
     assert (turning.turns, turning.client, turning.rates) == (False, None, {})
 
 

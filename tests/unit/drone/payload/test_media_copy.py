@@ -1,0 +1,182 @@
+"""Copies of media with their sidecars: values by hand, names, interruptions, and what lies in the folder already."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import json
+from collections.abc import AsyncGenerator
+from pathlib import Path
+
+import pytest
+
+from anafi_mav.drone.payload.media_copy import TRIES, copy, read_xmp, sidecar, sidecar_of
+from anafi_mav.drone.payload.media_file import Place, Resource
+from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost, RemoteProtocolError
+
+PHOTO = b"\xff\xd8 a photo \xff\xd9" * 1000
+DAY = "2026-11-22"
+
+
+class Source:
+    """A drone with one file in memory. `cuts` are the bytes after which its answers end, one after the other."""
+
+    def __init__(self, content: bytes = PHOTO, *, cuts: tuple[int, ...] = ()) -> None:
+        self.content = content
+        self.cuts = list(cuts)
+        self.offsets: list[int] = []
+
+    async def known_md5(self, resource: Resource) -> str | None:
+        return hashlib.md5(self.content).hexdigest()
+
+    async def read_from(self, resource: Resource, offset: int = 0) -> AsyncGenerator[bytes, None]:
+        self.offsets.append(offset)
+        end = self.cuts.pop(0) if self.cuts else len(self.content)
+        yield self.content[offset:end]
+        if end < len(self.content):
+            raise LinkLost("the drone restarts")
+
+
+def resource(content: bytes = PHOTO, name: str = "100000010001.JPG") -> Resource:
+    return Resource(name, "10000001", "PHOTO", "JPG", len(content), datetime="20261122T101112+0100")
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
+
+
+async def test_copy_has_a_sidecar_and_is_made_once(tmp_path: Path) -> None:
+    source = Source()
+    path = await copy(source, resource(), tmp_path)
+    assert path == tmp_path / DAY / "100000010001.JPG"
+    assert path.read_bytes() == PHOTO
+    assert names(tmp_path) == [f"{DAY}/100000010001.JPG", f"{DAY}/100000010001.JPG.json"]
+    told = json.loads(sidecar_of(path).read_text())
+    assert (told["md5"], told["size"]) == (hashlib.md5(PHOTO).hexdigest(), len(PHOTO))
+    assert told["time"] == "2026-11-22T10:11:12+01:00"
+    assert await copy(source, resource(), tmp_path) is None
+    sidecar_of(path).unlink()  # the copy was ended before it was written
+    assert await copy(source, resource(), tmp_path) is None
+    assert sidecar_of(path).exists()
+    assert source.offsets == [0]
+
+
+async def test_copy_of_other_content_with_one_name_keeps_both(tmp_path: Path) -> None:
+    await copy(Source(), resource(), tmp_path)
+    other = PHOTO[::-1]
+    mark = hashlib.md5(other).hexdigest()[:6]
+    assert await copy(Source(other), resource(other), tmp_path) == tmp_path / DAY / f"100000010001-{mark}.JPG"
+    assert (tmp_path / DAY / "100000010001.JPG").read_bytes() == PHOTO
+    edited = tmp_path / DAY / f"100000010001-{mark}.JPG"
+    edited.write_bytes(b"edited by the user")
+    assert await copy(Source(other), resource(other), tmp_path) == tmp_path / DAY / f"100000010001-{mark}-2.JPG"
+    assert edited.read_bytes() == b"edited by the user"
+
+
+async def test_copy_continues_after_interruptions(tmp_path: Path) -> None:
+    source = Source(cuts=(300, 300, 5000))
+    seen: list[tuple[AnafiMavError, float]] = []
+    path = await copy(source, resource(), tmp_path, interrupted=lambda error, pause: seen.append((error, pause)))
+    assert path is not None
+    assert path.read_bytes() == PHOTO
+    assert source.offsets == [0, 300, 300, 5000]
+    assert [pause for _, pause in seen] == [2.0, 4.0, 2.0]  # bytes that arrive begin the count again
+    assert names(tmp_path) == [f"{DAY}/{path.name}", f"{DAY}/{path.name}.json"]
+
+
+async def test_copy_ends_after_attempts_without_bytes(tmp_path: Path) -> None:
+    source = Source(cuts=(300,) * 20)
+    with pytest.raises(LinkLost):
+        await copy(source, resource(), tmp_path)
+    assert source.offsets == [0] + [300] * (TRIES - 1)
+    (part,) = names(tmp_path)
+    assert part.endswith(".part")
+    later = Source()
+    assert await copy(later, resource(), tmp_path) is not None
+    assert later.offsets == [300]
+
+
+async def test_copy_of_a_file_that_is_written_is_refused(tmp_path: Path) -> None:
+    begun, more = asyncio.Event(), asyncio.Event()
+
+    class Slow(Source):
+        async def read_from(self, resource: Resource, offset: int = 0) -> AsyncGenerator[bytes, None]:
+            yield self.content[:100]
+            begun.set()
+            await more.wait()
+            yield self.content[100:]
+
+    first = asyncio.ensure_future(copy(Slow(), resource(), tmp_path))
+    await begun.wait()
+    with pytest.raises(CommandRejected, match="another download"):
+        await copy(Source(), resource(), tmp_path)
+    more.set()
+    path = await first
+    assert path is not None
+    assert path.read_bytes() == PHOTO
+
+
+async def test_copy_with_another_md5_is_deleted(tmp_path: Path) -> None:
+    class Damaged(Source):
+        async def known_md5(self, resource: Resource) -> str | None:
+            return "0" * 32
+
+    with pytest.raises(RemoteProtocolError, match="MD5"):
+        await copy(Damaged(), resource(), tmp_path)
+    assert names(tmp_path) == []
+
+
+async def test_copy_of_too_many_bytes_is_not_kept(tmp_path: Path) -> None:
+    with pytest.raises(RemoteProtocolError, match="more than its 10 bytes"):
+        await copy(Source(), resource(PHOTO[:10]), tmp_path)
+    assert all(not name.endswith("JPG") for name in names(tmp_path))
+
+
+@pytest.mark.parametrize("name", ["../a.JPG", "/etc/a", "", "a/b", ".hidden", "a\0b", "ä.JPG"])
+async def test_name_that_leads_elsewhere_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(RemoteProtocolError, match="no id"):
+        await copy(Source(), resource(name=name), tmp_path / "copies")
+    assert names(tmp_path) == []
+
+
+XMP = (
+    b'noise<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf:RDF><rdf:Description drone-parrot:CameraRollDegree="-1.5">'
+    b"<drone-parrot:CameraPitchDegree>-10.25</drone-parrot:CameraPitchDegree>"
+    b"<drone-parrot:CameraYawDegree>30</drone-parrot:CameraYawDegree><exif:GPSLatitude>48,52.734000N</exif:GPSLatitude>"
+    b"<exif:GPSLongitude>2,22.062000W</exif:GPSLongitude><exif:GPSAltitude>85500/1000</exif:GPSAltitude>"
+    b"</rdf:Description></rdf:RDF></x:xmpmeta> more"
+)
+
+
+def test_sidecar_takes_the_pose_of_the_photo() -> None:
+    told = sidecar("a.JPG", resource(), "0" * 32, read_xmp(XMP))
+    assert told["camera_attitude"] == {"roll": -1.5, "pitch": -10.25, "yaw": 30.0}
+    # 52.734 / 60 = 0.8789; 22.062 / 60 = 0.3677
+    assert told["place"]["latitude"] == pytest.approx(48.8789)
+    assert told["place"]["longitude"] == pytest.approx(-2.3677)
+    assert (told["place"]["altitude_amsl"], told["place"]["source"]) == (85.5, "photo")
+
+
+def test_sidecar_prefers_the_place_that_the_drone_reports() -> None:
+    reported = Resource("a.JPG", gps=Place(48.0, 2.0, 90.0))
+    told = sidecar("a.JPG", reported, "0" * 32, read_xmp(XMP))
+    assert told["place"] == {"latitude": 48.0, "longitude": 2.0, "altitude_amsl": 90.0, "source": "drone"}
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"<x:xmpmeta",
+        b"<x:xmpmeta></x:xmpmeta>",
+        b"<x:xmpmeta><a:GPSLatitude>91;5</a:GPSLatitude></x:xmpmeta>",
+        b"<x:xmpmeta>" + b'<a:CameraRollDegree="nan">' * 99 + b"</x:xmpmeta>",
+        XMP.replace(b"-10.25", b"1e999"),
+        bytes(range(256)) * 10,
+    ],
+)
+def test_sidecar_of_unreadable_data_is_unknown(data: bytes) -> None:
+    told = sidecar("a.JPG", Resource("a.JPG", datetime="yesterday"), "0" * 32, read_xmp(data))
+    assert told["camera_attitude"] is None
+    assert told["time"] is None
+    assert json.dumps(told, allow_nan=False)
