@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 
 import pytest
+from support import camera_commands
 from support.cameras import ACCEPTED, PHOTO, VIDEO, command, enter, photos, press, request, shoot, texts, videos
 from support.ext_params import write
 from support.flavours import both
@@ -210,3 +211,20 @@ async def test_panorama_turns_the_hovering_drone_and_hold_ends_it() -> None:
         ack = await w.client.command(dialect.MAV_CMD_DO_REPOSITION, -1, 1, x=HOME[0] + 2e-4, y=HOME[1], z=10.0, frame=6)
         assert ack.result == ACCEPTED, texts(w.client, mark)
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 15.0, 30.0)
+
+
+@both
+@pytest.mark.parametrize("model", ["4k", "thermal", "usa", "ai"])
+async def test_conf_009_payload_commands_are_those_of_the_page(flavour: str, model: str) -> None:
+    """Each command of camera, gimbal, storage and video to both components: docs/camera.md is true."""
+    table = camera_commands.make_system()
+    autopilot, camera = table.components
+    async with world(flavour=flavour, model=model) as w:
+        for component, other in ((autopilot, camera), (camera, autopilot)):
+            for id, name in camera_commands.commands():
+                offered = [one.name for one in camera_commands.flavours(component, other, id)]
+                is_done = flavour in offered
+                if name in camera_commands.THERMAL_ONLY and model not in camera_commands.THERMAL_MODELS:
+                    is_done = False
+                ack = await w.client.command(id, NAN, NAN, NAN, NAN, target=(1, component.compid), timeout=20.0)
+                assert (ack.result != UNSUPPORTED, ack.get_srcComponent()) == (is_done, component.compid), name
