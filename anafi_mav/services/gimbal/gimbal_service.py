@@ -214,17 +214,14 @@ class GimbalService(Service):
             raise Refused(texts.GIMBAL, texts.GIMBAL_OF_MISSION)
         if answer is Answer.INVALID:
             raise Refused(texts.GIMBAL, texts.GIMBAL_IDS, lasting=True)
-        self._end_rates_of_others(client_id(command.client))
+        self._end_of_others(client_id(command.client))
         self._announce()
 
-    def _end_rates_of_others(self, sender: ClientId) -> None:
-        """Stop a rate whose client has control no longer, or has just released it."""
-        turner = self._motion.turner
-        if turner is None:
-            return
-        has_released = turner == sender and turner not in (self._control.primary, self._control.secondary)
-        if has_released or not self._control.allows(turner):
+    def _end_of_others(self, sender: ClientId) -> None:
+        """End a rate that its sender releases, and the targets of clients without control."""
+        if self._motion.turner == sender and sender not in (self._control.primary, self._control.secondary):
             self._motion.end_rates()
+        self._motion.end_unless(self._control.allows)
 
     def _require_control(self, client: object) -> ClientId:
         """Return the id of a client that may move the gimbal. Raises `Refused` for another one."""
