@@ -229,7 +229,7 @@ async def test_conf_095_recording_keeps_its_settings(model: str) -> None:
     async with world(model=model) as w:
         ours = await station(w)
         await w.gateway.systems[0].drone.camera.start_recording()
-        for name, value in (("CAM_VIDRES", 3.0), ("CAM_MODE", 0.0)):
+        for name, value in (("CAM_VIDRES", 3.0), ("CAM_MODE", 0.0), ("CAM_HDR", 1.0 - ours.values["CAM_HDR"])):
             before = ours.values[name]
             mark = w.client.mark()
             ack = await write(w.client, name, value, 1)
