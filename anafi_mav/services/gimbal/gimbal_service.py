@@ -250,7 +250,7 @@ class GimbalService(Service):
     def _frames(self, flags: float, flavour: Flavour) -> Frames:
         """Return the reading of GIMBAL_MANAGER_FLAGS.
 
-        The heading is the gimbal's own: of the same moment and from the same north as the yaw that it reports and takes.
+        The heading is the gimbal's own: of the same moment and north as the yaw that it reports and takes.
         """
         attitude = self.host.drone.gimbal.main.attitude
         heading = None if attitude is None else targets.wrap_180(attitude.absolute.yaw - attitude.relative.yaw)
