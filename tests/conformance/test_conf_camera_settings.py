@@ -175,6 +175,7 @@ async def test_conf_095_list_and_reads_agree() -> None:
         ("CAM_EV", 0.5, 9, UNSUPPORTED),
         ("CAM_EV", float("nan"), 9, UNSUPPORTED),
         ("CAM_ZOOMSPEED", 11.0, 9, UNSUPPORTED),
+        ("CAM_SATURATION", 1.5, 9, UNSUPPORTED),
         ("CAM_WBMODE", 200.0, 1, UNSUPPORTED),
         ("CAM_WBMODE", 2.0, 6, UNSUPPORTED),
         ("CAM_VIDFPS", 120.0, 9, UNSUPPORTED),
@@ -339,8 +340,11 @@ async def test_other_capabilities_make_another_definition() -> None:
         reports = w.drone.firmware.payload.cameras[0].settings_report()
         (exposure,) = (report for report in reports if isinstance(report, ExposureSettings))
         every = structs.replace(exposure, manual_iso_sensitivity_capabilities=0xFFFFFF)
+        mark = w.client.mark()
         w.drone.inject(every)
         await announced.wait()
+        information = await w.client.wait("CAMERA_INFORMATION", since=mark)
+        assert (information.cam_definition_uri, information.cam_definition_version) == (link.uri, link.version)
         after = await load(w.client)
         assert after.version == link.version != before.version
         assert len(after.parameters["CAM_ISO"].options) > len(before.parameters["CAM_ISO"].options)

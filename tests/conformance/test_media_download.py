@@ -7,6 +7,7 @@ import asyncio
 import fcntl
 import hashlib
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.ftp import Ftp
 from support.media import DAY, add_photo, add_video
+from support.product import program
 from support.world import World, world
 
 from anafi_mav.arsdk.messages.mediastore import MediastoreState
@@ -152,6 +154,23 @@ async def test_download_of_a_busy_file_fails_and_goes_on(folder: Path, capsys: p
         assert output.out.splitlines()[-1] == "1 files copied, 0 were there already, 1 failed"
         assert (folder / DAY / good.id).read_bytes() == good.content()
         assert not (folder / DAY / photo.id).exists()
+
+
+async def test_download_to_a_full_disk_fails_and_continues_later(folder: Path) -> None:
+    async with world(web=True) as w:
+        video = add_video(w.drone, 20 * VIDEO)
+        command = f"{sys.executable} -m anafi_mav media download {folder} --gateway {gateway_of(w)}"
+        # A limit of the size of files, in KiB, is an error of writing like a full disk.
+        async with program("bash", "-c", f"ulimit -f 10000; exec {command}") as limited:
+            assert await limited.end(60.0) == 2
+            assert limited.complaints == [f"anafi-mav: FOLDER: cannot write to {folder}: File too large"]
+        (part,) = names(folder)
+        assert part.endswith(".part")
+        assert 0 < (folder / part).stat().st_size <= 10_000 * 1024
+        async with program(*command.split()) as whole:
+            assert await whole.end(60.0) == 0
+        assert (folder / DAY / video.id).read_bytes() == video.content()
+        assert names(folder) == [f"{DAY}/{video.id}", f"{DAY}/{video.id}.json"]
 
 
 async def test_download_continues_after_the_drone_restarts(folder: Path) -> None:

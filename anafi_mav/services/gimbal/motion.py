@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TypedDict
 
 from anafi_mav import texts
@@ -60,12 +60,16 @@ class GimbalMotion:
         self._host = host
         self._rates = GimbalRates(heartbeats)
         self._roi = roi
+        self._client: ClientId | None = None
+        """Sender of the newest target; None: the drone aims the gimbal."""
         self._command: asyncio.Task[None] | None = None
         """The command that has not been answered yet, or what frees the gimbal from a region for a message."""
         self._waiting: tuple[ClientId, GimbalTarget] | None = None
         """The newest target of a message, while the gimbal is freed for it."""
         self._halt: asyncio.Task[None] | None = None
-        """Stops the gimbal, and makes sure of it."""
+        """Stops the gimbal or resets its orientation, for a message or by itself."""
+        self._is_stopping = False
+        """A stop of all axes is not confirmed yet."""
         self._zeros = 0
         """Zero rates that are still to be sent."""
         self._still: frozenset[Axis] = frozenset()
@@ -109,6 +113,7 @@ class GimbalMotion:
         if target.is_empty:
             return  # yaw alone, of a gimbal without this axis
         self._begin(target)
+        self._client = client
         task = self._command = asyncio.current_task()
         try:
             await self._roi.free_gimbal()
@@ -121,7 +126,9 @@ class GimbalMotion:
             if target.neutral:
                 await gimbal.reset_orientation()
             elif target.is_zero_rate:
+                self._is_stopping = True
                 await gimbal.stop()
+                self._is_stopping = False
             else:
                 if target.angles:
                     await gimbal.steer(**_by_axis(target.angles))
@@ -142,6 +149,7 @@ class GimbalMotion:
         target = target.on(self._gimbal.axes or frozenset())
         if target.is_empty:
             return
+        self._client = client
         if self._roi.holds_gimbal:
             self._waiting = client, target
             if self._command is None:
@@ -160,7 +168,7 @@ class GimbalMotion:
             return
         self.is_neutral = False
         if target.is_zero_rate:
-            is_stopping = self._halt is not None or self._zeros > 0
+            is_stopping = self._is_stopping or self._zeros > 0
             self._rates.take(client, target.rates, now, by_message=True)
             if not is_stopping:
                 self._stop_turning()
@@ -211,7 +219,7 @@ class GimbalMotion:
         gimbal, or all axes are stopped.
         """
         turned = set(self._still) | self._rates.rates.keys()
-        if self._halt is not None or self._zeros > 0:
+        if self._is_stopping:
             turned |= self._gimbal.axes or frozenset()
         if target is None or target.neutral:
             still: frozenset[Axis] = frozenset()
@@ -226,7 +234,7 @@ class GimbalMotion:
         if self._halt is not None:
             self._halt.cancel()
             self._halt = None
-        self._zeros, self._repeat = 0, None
+        self._zeros, self._repeat, self._is_stopping = 0, None, False
 
     def _turn(self, rates: Mapping[Axis, Aim]) -> None:
         if rates:
@@ -245,6 +253,19 @@ class GimbalMotion:
         if self._rates.end():
             self._stop_turning()
 
+    def end_unless(self, allows: Callable[[ClientId], bool]) -> None:
+        """End what a client has begun that may not move the gimbal any longer."""
+        if self._client is None or allows(self._client):
+            return
+        self._client = None
+        if self._rates.end() or self._is_stopping:
+            self._stop_turning()
+            return
+        if self._command is not None:
+            self._command.cancel()
+            self._command = None
+        self._repeat = self._waiting = None
+
     async def rest(self) -> None:
         """End what moves the gimbal, before the drone aims it: a stop sent later could end that."""
         may_turn = self._end()
@@ -257,20 +278,22 @@ class GimbalMotion:
 
     def _end(self) -> bool:
         """End what moves the gimbal; return True when it may turn by a rate."""
-        may_turn = self._rates.end() or self._halt is not None or bool(self._still)
+        may_turn = self._rates.end() or self._is_stopping or bool(self._still)
         self._begin()
-        self.is_neutral = False
+        self._client, self.is_neutral = None, False
         return may_turn
 
     def _stop_turning(self) -> None:
         """Stop the gimbal in the background, until the drone reports that it stands."""
         self._begin()
+        self._is_stopping = True
         self._halt = self._host.spawn(self._stop())
 
     async def _stop(self) -> None:
         task = asyncio.current_task()
         try:
             await self._host.drone.gimbal.stop()
+            self._is_stopping = False
         except LinkLost:
             return
         except AnafiMavError as error:
@@ -290,13 +313,13 @@ class GimbalMotion:
     def link_down(self) -> None:
         """Forget the target in force: the drone is disconnected."""
         rates = self._rates.rates
-        self._was_turning = self._rates.end() or self._halt is not None or bool(self._still)
+        self._was_turning = self._rates.end() or self._is_stopping or bool(self._still)
         with contextlib.suppress(AnafiMavError):
             for _ in range(STOPS if rates else 0):  # the gateway ends, and the drone is still connected
                 self._turn({axis: Aim(0.0, aim.frame) for axis, aim in rates.items()})
-        self._command = self._halt = self._repeat = self._waiting = self._seen = None
+        self._command = self._halt = self._repeat = self._waiting = self._seen = self._client = None
         self._zeros, self._still_zeros, self._still = 0, 0, frozenset()
-        self.is_neutral = False
+        self.is_neutral = self._is_stopping = False
 
     def add_stall(self, seconds: float) -> None:
         """Leave out a time in which the host could not receive heartbeats."""
