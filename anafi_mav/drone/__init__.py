@@ -40,8 +40,10 @@ from anafi_mav.drone.payload.camera_enums import (
     PhotoMode,
     RecordingMode,
     Resolution,
+    StoragePolicy,
     Streaming,
     Style,
+    VideoCodec,
     WhiteBalance,
 )
 from anafi_mav.drone.payload.camera_state import (
@@ -182,6 +184,7 @@ __all__ = [
     "Sound",
     "SoundState",
     "Storage",
+    "StoragePolicy",
     "StorageState",
     "Streaming",
     "Style",
@@ -192,6 +195,7 @@ __all__ = [
     "Trajectory",
     "Velocity",
     "Video",
+    "VideoCodec",
     "VideoFrame",
     "VideoState",
     "WhiteBalance",

@@ -339,8 +339,11 @@ async def test_other_capabilities_make_another_definition() -> None:
         reports = w.drone.firmware.payload.cameras[0].settings_report()
         (exposure,) = (report for report in reports if isinstance(report, ExposureSettings))
         every = structs.replace(exposure, manual_iso_sensitivity_capabilities=0xFFFFFF)
+        mark = w.client.mark()
         w.drone.inject(every)
         await announced.wait()
+        information = await w.client.wait("CAMERA_INFORMATION", since=mark)
+        assert (information.cam_definition_uri, information.cam_definition_version) == (link.uri, link.version)
         after = await load(w.client)
         assert after.version == link.version != before.version
         assert len(after.parameters["CAM_ISO"].options) > len(before.parameters["CAM_ISO"].options)

@@ -218,6 +218,9 @@ async def test_mount_commands_and_messages_have_the_same_signs() -> None:
         for mode in (dialect.MAV_MOUNT_MODE_RETRACT, dialect.MAV_MOUNT_MODE_RC_TARGETING):
             assert (await w.client.command(MOUNT_MODE, mode)).result == UNSUPPORTED
             assert (await w.client.command(MOUNT, 10.0, 0.0, 0.0, 0.0, z=mode)).result == UNSUPPORTED
+        w.client.send(dialect.MAVLink_mount_configure_message(1, 1, dialect.MAV_MOUNT_MODE_NEUTRAL, 1, 1, 1))
+        w.client.send(dialect.MAVLink_mount_control_message(1, 1, 1500, 0, 0, 0))  # no angles in this mode
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Gimbal refused: mount mode 1 unsupported", since=0)
         assert truth(w).pitch_absolute == 0.0
 
         # A place: degE7 in single precision as MAVProxy sends it, and by message.
@@ -229,9 +232,13 @@ async def test_mount_commands_and_messages_have_the_same_signs() -> None:
         assert pois(w)[-1]["altitude"] == pytest.approx(0.0, abs=0.01)
         w.client.send(dialect.MAVLink_mount_configure_message(1, 1, GPS_POINT, 1, 1, 1))
         places = [round(value * 1e7) for value in NORTH]
-        w.client.send(dialect.MAVLink_mount_control_message(1, 1, *places, 300, 0))
+        count = len(pois(w))
+        for _ in range(5):  # a stream of one place is one region
+            w.client.send(dialect.MAVLink_mount_control_message(1, 1, *places, 300, 0))
+            await next_truth(w)
         await heads(w, 0.0)
         assert pois(w)[-1]["altitude"] == pytest.approx(3.0, abs=0.01)
+        assert len(pois(w)) == count + 1
 
 
 async def test_conf_099_components_refuse_what_is_not_theirs_at_once() -> None:

@@ -18,7 +18,15 @@ from anafi_mav.drone.element import Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.payload import camera_classic, camera_modern
 from anafi_mav.drone.payload.camera_classic import ClassicCamera
-from anafi_mav.drone.payload.camera_enums import Antiflicker, CameraMode, PhotoMode, Streaming, Style, WhiteBalance
+from anafi_mav.drone.payload.camera_enums import (
+    Antiflicker,
+    CameraMode,
+    PhotoMode,
+    StoragePolicy,
+    Streaming,
+    Style,
+    WhiteBalance,
+)
 from anafi_mav.drone.payload.camera_modern import ModernCamera
 from anafi_mav.drone.payload.camera_state import (
     CamerasState,
@@ -202,6 +210,10 @@ class Camera(Commanding[CamerasState]):
         return str(
             await self._capture(id, command, speech.recording_events, speech.recording_news, judge, timeout, None)
         )
+
+    async def set_storage_policy(self, policy: StoragePolicy, id: int = MAIN) -> StoragePolicy | None:
+        """Choose the storage that pictures and videos are written to. Ai only."""
+        return (await self._ask(id, "storage_policy", lambda s, now: s.storage_policy(id, now, policy))).storage_policy
 
     async def set_autorecord(self, on: bool, id: int = MAIN) -> bool | None:
         """Switch automatic recording from take-off to landing."""

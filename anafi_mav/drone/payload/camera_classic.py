@@ -49,6 +49,7 @@ from anafi_mav.drone.payload.camera_enums import (
     PhotoMode,
     RecordingMode,
     Resolution,
+    StoragePolicy,
     Streaming,
     Style,
     WhiteBalance,
@@ -368,6 +369,8 @@ class ClassicCamera:
     def photo(id: int, now: CameraState, wish: PhotoSettings) -> tuple[Message, type[Message]]:
         if wish.megapixels is not None:
             raise NotSupported("choice of the photo resolution")
+        if wish.signed is not None or wish.keeps_live_video is not None:
+            raise NotSupported("photo setting of another camera")
         has = now.photo or PhotoSettings()
         command = wire.SetPhotoMode(
             id,
@@ -384,6 +387,8 @@ class ClassicCamera:
     def recording(id: int, now: CameraState, wish: RecordingSettings) -> tuple[Message, type[Message]]:
         if wish.bitrate is not None:
             raise NotSupported("choice of the bit rate")
+        if wish.codec is not None:
+            raise NotSupported("choice of the codec")
         has = now.recording or RecordingSettings()
         command = wire.SetRecordingMode(
             id,
@@ -451,6 +456,10 @@ class ClassicCamera:
     @staticmethod
     def autorecord(id: int, now: CameraState, on: bool) -> tuple[Message, type[Message]]:
         return wire.SetAutorecord(id, _onoff(on)), wire.Autorecord
+
+    @staticmethod
+    def storage_policy(id: int, now: CameraState, policy: StoragePolicy) -> tuple[Message, type[Message]]:
+        raise NotSupported("choice of the storage")
 
     @staticmethod
     def zoom_speed(id: int, now: CameraState, speed: float) -> tuple[Message, type[Message]]:

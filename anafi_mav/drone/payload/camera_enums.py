@@ -113,6 +113,24 @@ class Resolution(enum.Enum):
     R5K = "5K"
 
 
+class VideoCodec(enum.Enum):
+    """Codec of a video. Ai only."""
+
+    H264 = "H264"
+    H265 = "H265"
+
+
+class StoragePolicy(enum.Enum):
+    """Storage that pictures and videos are written to. Ai only."""
+
+    PRIORITY_REMOVABLE = "PRIORITY_REMOVABLE"
+    """Internal storage without a card."""
+    REMOVABLE = "REMOVABLE"
+    PRIORITY_INTERNAL = "PRIORITY_INTERNAL"
+    """Card when the internal storage is full."""
+    INTERNAL = "INTERNAL"
+
+
 class ExposureMode(enum.Enum):
     """Quantities that the camera exposes by, and those that are set by hand."""
 

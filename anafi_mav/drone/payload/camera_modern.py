@@ -29,8 +29,10 @@ from anafi_mav.drone.payload.camera_enums import (
     PhotoMode,
     RecordingMode,
     Resolution,
+    StoragePolicy,
     Streaming,
     Style,
+    VideoCodec,
     WhiteBalance,
     bare,
     ev_of,
@@ -139,6 +141,10 @@ def _config(now: CameraState, c: wire.Config) -> dict[str, Any]:
         burst=word(Burst, c.photo_burst_value),
         bracketing=word(Bracketing, c.photo_bracketing_preset),
         megapixels=_number_of_pixels(c.photo_resolution),
+        signed=None if c.photo_signature is None else c.photo_signature == wire.DigitalSignature.DRONE,
+        keeps_live_video=None
+        if c.photo_streaming_mode is None
+        else c.photo_streaming_mode == wire.PhotoStreamingMode.CONTINUOUS,
     )
     mode = photo.get("mode", now.photo.mode if now.photo is not None else None)
     interval = c.photo_gps_lapse_interval if mode is PhotoMode.GPS_LAPSE else c.photo_time_lapse_interval
@@ -148,6 +154,7 @@ def _config(now: CameraState, c: wire.Config) -> dict[str, Any]:
         resolution=word(Resolution, c.video_recording_resolution),
         framerate=quantity(c.video_recording_framerate),
         bitrate=c.video_recording_bitrate,
+        codec=word(VideoCodec, c.video_recording_codec),
     )
     exposure = _given(
         mode=word(ExposureMode, c.exposure_mode),
@@ -172,6 +179,7 @@ def _config(now: CameraState, c: wire.Config) -> dict[str, Any]:
         hdr=None if hdr_of is None else hdr_of != wire.DynamicRange.STANDARD,
         zoom_speed=None if c.zoom_max_speed is None else finite(c.zoom_max_speed),
         autorecord=None if c.auto_record_mode is None else c.auto_record_mode == wire.AutoRecordMode.FLIGHT,
+        storage_policy=word(StoragePolicy, c.storage_policy),
     )
     if c.zoom_velocity_control_quality_mode is not None:
         allowed = wire.ZoomVelocityControlQualityMode.ALLOW_DEGRADATION
@@ -221,6 +229,10 @@ def _rules(rules: tuple[wire.CapabilitiesRule, ...], style: StyleSettings | None
         "bursts": words(Burst, union("photo_burst_values")),
         "brackets": words(Bracketing, union("photo_bracketing_presets")),
         "megapixels": tuple(sorted({size for one in union("photo_resolutions") if (size := _number_of_pixels(one))})),
+        "signable": wire.DigitalSignature.DRONE in union("photo_signatures"),
+        "live_video_keepable": wire.PhotoStreamingMode.CONTINUOUS in union("photo_streaming_modes"),
+        "codecs": words(VideoCodec, union("video_recording_codecs")),
+        "storage_policies": words(StoragePolicy, union("storage_policies")),
         "bitrates": tuple(sorted(set(union("video_recording_bitrates")))),
         "shutters": quantities(union("exposure_manual_shutter_speeds")),
         "isos": quantities(union("exposure_manual_iso_sensitivities")),
@@ -378,6 +390,8 @@ class ModernCamera:
     def photo(id: int, now: CameraState, wish: PhotoSettings) -> tuple[Message, type[Message]]:
         mode = wish.mode or (now.photo.mode if now.photo is not None else None)
         interval = "photo_gps_lapse_interval" if mode is PhotoMode.GPS_LAPSE else "photo_time_lapse_interval"
+        signature = wire.DigitalSignature.DRONE if wish.signed else wire.DigitalSignature.NONE
+        live = wire.PhotoStreamingMode.CONTINUOUS if wish.keeps_live_video else wire.PhotoStreamingMode.INTERRUPT
         return _configure(
             id,
             photo_mode=_optional(wire.PhotoMode, wish.mode),
@@ -386,6 +400,8 @@ class ModernCamera:
             photo_burst_value=_optional(wire.BurstValue, wish.burst),
             photo_bracketing_preset=_optional(wire.BracketingPreset, wish.bracketing),
             photo_resolution=None if wish.megapixels is None else _pixels(wish.megapixels),
+            photo_signature=None if wish.signed is None else signature,
+            photo_streaming_mode=None if wish.keeps_live_video is None else live,
             **{interval: wish.interval},
         )
 
@@ -399,6 +415,7 @@ class ModernCamera:
             video_recording_resolution=_optional(wire.VideoResolution, wish.resolution),
             video_recording_framerate=None if wish.framerate is None else nearest(wire.Framerate, wish.framerate),
             video_recording_bitrate=wish.bitrate,
+            video_recording_codec=_optional(wire.VideoCodec, wish.codec),
         )
 
     @staticmethod
@@ -467,6 +484,10 @@ class ModernCamera:
     @staticmethod
     def autorecord(id: int, now: CameraState, on: bool) -> tuple[Message, type[Message]]:
         return _configure(id, auto_record_mode=wire.AutoRecordMode.FLIGHT if on else wire.AutoRecordMode.DISABLED)
+
+    @staticmethod
+    def storage_policy(id: int, now: CameraState, policy: StoragePolicy) -> tuple[Message, type[Message]]:
+        return _configure(id, storage_policy=parrot(wire.StoragePolicy, policy))
 
     @staticmethod
     def zoom_speed(id: int, now: CameraState, speed: float) -> tuple[Message, type[Message]]:

@@ -26,8 +26,10 @@ from anafi_mav.drone.payload.camera_enums import (
     PhotoMode,
     RecordingMode,
     Resolution,
+    StoragePolicy,
     Streaming,
     Style,
+    VideoCodec,
     WhiteBalance,
 )
 
@@ -47,6 +49,10 @@ class PhotoSettings(msgspec.Struct, frozen=True):
     """Between two pictures: s of a TIME_LAPSE, m of a GPS_LAPSE."""
     megapixels: float | None = None
     """Ai only."""
+    signed: bool | None = None
+    """True when photos carry the drone's digital signature. Ai only."""
+    keeps_live_video: bool | None = None
+    """True when the live video goes on while a photo is taken. Ai only."""
 
 
 class RecordingSettings(msgspec.Struct, frozen=True):
@@ -60,6 +66,8 @@ class RecordingSettings(msgspec.Struct, frozen=True):
     """One frame of so many. Not on the Ai."""
     bitrate: int | None = None
     """bit/s; the drone's choice."""
+    codec: VideoCodec | None = None
+    """Ai only."""
 
 
 class ExposureSettings(msgspec.Struct, frozen=True):
@@ -120,6 +128,10 @@ class CameraState(msgspec.Struct, frozen=True):
     """m; likewise."""
     megapixels: tuple[float, ...] = ()
     """Photo resolutions to choose from; Ai only."""
+    signable: bool | None = None
+    """True when the camera can sign photos."""
+    live_video_keepable: bool | None = None
+    """True when the live video can go on while a photo is taken."""
     photo_available: bool | None = None
     """True when a photo can be taken now."""
     taking: bool | None = None
@@ -135,6 +147,8 @@ class CameraState(msgspec.Struct, frozen=True):
     """Ratios to choose from. Not on the Ai."""
     bitrates: tuple[int, ...] = ()
     """bit/s to choose from; Ai only."""
+    codecs: frozenset[VideoCodec] = frozenset()
+    """To choose from; Ai only."""
     recording_available: bool | None = None
     recording_now: bool | None = None
     recording_since_ms: int | None = None
@@ -144,6 +158,8 @@ class CameraState(msgspec.Struct, frozen=True):
     last_recording: str | None = None
     autorecord: bool | None = None
     """Record from take-off to landing."""
+    storage_policy: StoragePolicy | None = None
+    storage_policies: frozenset[StoragePolicy] = frozenset()
     # -- lens
     zoom: float | None = None
     """Factor; 1: no zoom."""

@@ -36,11 +36,22 @@ KIND_OF_MODE = {
 }
 """The camera that each thermal mode makes the active one."""
 
-_SETS = ("modes", "exposures", "white_balances", "styles", "bursts", "brackets", "meterings", "streamings")
+_SETS = (
+    "modes",
+    "exposures",
+    "white_balances",
+    "styles",
+    "bursts",
+    "brackets",
+    "meterings",
+    "streamings",
+    "codecs",
+    "storage_policies",
+)
 _SORTED = ("evs", "temperatures", "shutters", "isos", "max_isos", "megapixels", "bitrates", "hyperlapses")
 _LISTS = ("photos", "recordings")
 _BOUNDS = ("zoom_speed_bounds", "time_lapse_bounds", "gps_lapse_bounds")
-_FLAGS = ("exposure_lockable", "white_balance_lockable")
+_FLAGS = ("exposure_lockable", "white_balance_lockable", "signable", "live_video_keepable")
 
 MAX_OPTIONS = 64
 """Options that are kept of a list. A camera has a dozen combinations, and Parrot's longest enumeration 50 values; more

@@ -30,9 +30,11 @@ from anafi_mav.drone import (
     RecordingMode,
     RecordingSettings,
     Resolution,
+    StoragePolicy,
     Streaming,
     Style,
     StyleSettings,
+    VideoCodec,
     WhiteBalance,
 )
 from anafi_mav.errors import CommandRejected, NotSupported
@@ -142,6 +144,13 @@ STYLES: Choice[Style] = {
     Style.PASTEL: (3, "Pastel"),
     Style.CUSTOM: (4, "Custom"),
     Style.PHOTOGRAMMETRY: (5, "Photogrammetry"),
+}
+CODECS: Choice[VideoCodec] = {VideoCodec.H264: (0, "H.264"), VideoCodec.H265: (1, "H.265")}
+STORAGES: Choice[StoragePolicy] = {
+    StoragePolicy.PRIORITY_REMOVABLE: (0, "Card, else internal"),
+    StoragePolicy.REMOVABLE: (1, "Card"),
+    StoragePolicy.PRIORITY_INTERNAL: (2, "Internal, else card"),
+    StoragePolicy.INTERNAL: (3, "Internal"),
 }
 STREAMINGS: Choice[Streaming] = {
     Streaming.LOW_LATENCY: (0, "Low latency"),
@@ -451,6 +460,26 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     # -- videos
     CameraSetting(
+        "CAM_PHOTOSIGN",
+        ExtType.UINT8,
+        "Sign photos",
+        read=lambda view: flag(photo(view).signed),
+        write=lambda drone, id, value: set_photo(drone, id, PhotoSettings(signed=value != 0.0)),
+        options=lambda view: OFF_ON if view.camera.signable else (),
+        guard=Guard.CAPTURE,
+        only_in={"CAM_MODE": PHOTO},
+    ),
+    CameraSetting(
+        "CAM_PHOTOLIVE",
+        ExtType.UINT8,
+        "Live video while a photo is taken",
+        read=lambda view: flag(photo(view).keeps_live_video),
+        write=lambda drone, id, value: set_photo(drone, id, PhotoSettings(keeps_live_video=value != 0.0)),
+        options=lambda view: OFF_ON if view.camera.live_video_keepable else (),
+        guard=Guard.CAPTURE,
+        only_in={"CAM_MODE": PHOTO},
+    ),
+    CameraSetting(
         "CAM_VIDMODE",
         ExtType.UINT8,
         "Video mode",
@@ -507,6 +536,25 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         options=lambda view: numbers(view.camera.bitrates, lambda rate: f"{rate / 1e6:g} Mbit/s"),
         guard=Guard.CAPTURE,
         only_in={"CAM_MODE": VIDEO},
+    ),
+    CameraSetting(
+        "CAM_VIDCODEC",
+        ExtType.UINT8,
+        "Video codec",
+        read=lambda view: number_of(CODECS, recording(view).codec),
+        write=lambda drone, id, value: set_recording(drone, id, RecordingSettings(codec=word_of(CODECS, value))),
+        options=lambda view: choices(CODECS, view.camera.codecs),
+        guard=Guard.CAPTURE,
+        only_in={"CAM_MODE": VIDEO},
+    ),
+    CameraSetting(
+        "CAM_STORAGE",
+        ExtType.UINT8,
+        "Storage",
+        read=lambda view: number_of(STORAGES, view.camera.storage_policy),
+        write=lambda drone, id, value: drone.camera.set_storage_policy(word_of(STORAGES, value), id),
+        options=lambda view: choices(STORAGES, view.camera.storage_policies),
+        guard=Guard.CAPTURE,
     ),
     CameraSetting(
         "CAM_AUTOREC",

@@ -7,6 +7,7 @@ has arrived: stations send the next command after the acknowledgement, and opera
 
 from __future__ import annotations
 
+import asyncio
 import math
 from collections.abc import Mapping
 
@@ -53,6 +54,9 @@ class GimbalService(Service):
         self._motion = GimbalMotion(host, self._heartbeats, self._roi)
         self._mount_mode = dialect.MAV_MOUNT_MODE_MAVLINK_TARGETING
         """Of MOUNT_CONFIGURE: decides what a MOUNT_CONTROL means."""
+        self._mount_place: tuple[ClientId, GeoPoint, float] | None = None
+        """Sender, place and height (m above take-off) of the newest MOUNT_CONTROL that is still to be looked at."""
+        self._mount_look: asyncio.Task[None] | None = None
         self._ticked = math.inf
         self._status: tuple[object, ...] = ()
         """Content of the last GIMBAL_MANAGER_STATUS."""
@@ -145,6 +149,7 @@ class GimbalService(Service):
         self._motion.link_down()
         self._control = GimbalControl(self._heartbeats)
         self._roi.link_down()
+        self._mount_look = self._mount_place = None
         self._status = ()
 
     def heartbeat(self, inbound: Inbound) -> None:
@@ -426,37 +431,53 @@ class GimbalService(Service):
 
     def _mount_configured(self, inbound: Inbound) -> None:
         """MOUNT_CONFIGURE has no acknowledgement; it decides what the next MOUNT_CONTROL means."""
-        message = inbound.message
-        if message.mount_mode == dialect.MAV_MOUNT_MODE_NEUTRAL:
+        mode = inbound.message.mount_mode
+        if mode == dialect.MAV_MOUNT_MODE_NEUTRAL:
             self._stream(inbound, targets.DEVICES[0], GimbalTarget(neutral=True))
-        if message.mount_mode in mount.MODES:
-            self._mount_mode = message.mount_mode
+        if mode in mount.MESSAGE_MODES:
+            self._mount_mode = mode
         else:
-            reason = texts.GIMBAL_MODE.fill(mode=message.mount_mode)
-            self.host.warn_throttled(texts.REFUSED.fill(what=texts.GIMBAL, reason=reason))
+            self._warn_of_mode(mode)
 
     def _mount_controlled(self, inbound: Inbound) -> None:
         """MOUNT_CONTROL: cdeg of pitch, roll, yaw; or degE7 and cm above home of a place."""
         message = inbound.message
         if self._mount_mode == dialect.MAV_MOUNT_MODE_GPS_POINT:
             where = GeoPoint(message.input_a / 1e7, message.input_b / 1e7)
-            self.host.spawn(self._mount_looks(inbound, where, message.input_c / 100.0))
-            return
-        angles = {
-            Axis.PITCH: message.input_a / 100.0,
-            Axis.ROLL: message.input_b / 100.0,
-            Axis.YAW: message.input_c / 100.0,
-        }
-        self._stream(inbound, targets.DEVICES[0], targets.read(mount.HORIZON, angles, {}))
+            self._mount_place = (inbound.sysid, inbound.compid), where, message.input_c / 100.0
+            if self._mount_look is None:
+                self._mount_look = self.host.spawn(self._look_for_mount())
+        elif self._mount_mode == dialect.MAV_MOUNT_MODE_MAVLINK_TARGETING:
+            angles = {
+                Axis.PITCH: message.input_a / 100.0,
+                Axis.ROLL: message.input_b / 100.0,
+                Axis.YAW: message.input_c / 100.0,
+            }
+            self._stream(inbound, targets.DEVICES[0], targets.read(mount.HORIZON, angles, {}))
+        else:
+            self._warn_of_mode(self._mount_mode)
 
-    async def _mount_looks(self, inbound: Inbound, where: GeoPoint, ato: float) -> None:
+    def _warn_of_mode(self, mode: int) -> None:
+        reason = texts.GIMBAL_MODE.fill(mode=mode)
+        self.host.warn_throttled(texts.REFUSED.fill(what=texts.GIMBAL, reason=reason))
+
+    async def _look_for_mount(self) -> None:
+        """Look at the newest place of MOUNT_CONTROL, which may arrive often; at the same place once."""
+        task = asyncio.current_task()
         try:
-            if not self._control.allows((inbound.sysid, inbound.compid)):
-                raise Refused(texts.ROI, self._holder)
-            await self._motion.rest()
-            await self._roi.look_at(where, ato)
+            while self._mount_place is not None:
+                client, where, ato = self._mount_place
+                self._mount_place = None
+                if not self._control.allows(client):
+                    raise Refused(texts.ROI, self._holder)
+                if not self._roi.is_locked_on(where, ato):
+                    await self._motion.rest()
+                    await self._roi.look_at(where, ato)
         except AnafiMavError as error:
             self.host.warn_throttled(error.text if isinstance(error, Refused) else texts.from_below(error))
+        finally:
+            if self._mount_look is task:
+                self._mount_look = self._mount_place = None
 
 
 def _check_device(id: float, subject: OperatorText = texts.GIMBAL) -> None:

@@ -65,7 +65,9 @@ class GimbalMotion:
         self._waiting: tuple[ClientId, GimbalTarget] | None = None
         """The newest target of a message, while the gimbal is freed for it."""
         self._halt: asyncio.Task[None] | None = None
-        """Stops the gimbal, and makes sure of it."""
+        """Stops the gimbal or resets its orientation, for a message or by itself."""
+        self._is_stopping = False
+        """A stop of all axes is not confirmed yet."""
         self._zeros = 0
         """Zero rates that are still to be sent."""
         self._still: frozenset[Axis] = frozenset()
@@ -121,7 +123,9 @@ class GimbalMotion:
             if target.neutral:
                 await gimbal.reset_orientation()
             elif target.is_zero_rate:
+                self._is_stopping = True
                 await gimbal.stop()
+                self._is_stopping = False
             else:
                 if target.angles:
                     await gimbal.steer(**_by_axis(target.angles))
@@ -160,7 +164,7 @@ class GimbalMotion:
             return
         self.is_neutral = False
         if target.is_zero_rate:
-            is_stopping = self._halt is not None or self._zeros > 0
+            is_stopping = self._is_stopping or self._zeros > 0
             self._rates.take(client, target.rates, now, by_message=True)
             if not is_stopping:
                 self._stop_turning()
@@ -211,7 +215,7 @@ class GimbalMotion:
         gimbal, or all axes are stopped.
         """
         turned = set(self._still) | self._rates.rates.keys()
-        if self._halt is not None or self._zeros > 0:
+        if self._is_stopping:
             turned |= self._gimbal.axes or frozenset()
         if target is None or target.neutral:
             still: frozenset[Axis] = frozenset()
@@ -226,7 +230,7 @@ class GimbalMotion:
         if self._halt is not None:
             self._halt.cancel()
             self._halt = None
-        self._zeros, self._repeat = 0, None
+        self._zeros, self._repeat, self._is_stopping = 0, None, False
 
     def _turn(self, rates: Mapping[Axis, Aim]) -> None:
         if rates:
@@ -257,7 +261,7 @@ class GimbalMotion:
 
     def _end(self) -> bool:
         """End what moves the gimbal; return True when it may turn by a rate."""
-        may_turn = self._rates.end() or self._halt is not None or bool(self._still)
+        may_turn = self._rates.end() or self._is_stopping or bool(self._still)
         self._begin()
         self.is_neutral = False
         return may_turn
@@ -265,12 +269,14 @@ class GimbalMotion:
     def _stop_turning(self) -> None:
         """Stop the gimbal in the background, until the drone reports that it stands."""
         self._begin()
+        self._is_stopping = True
         self._halt = self._host.spawn(self._stop())
 
     async def _stop(self) -> None:
         task = asyncio.current_task()
         try:
             await self._host.drone.gimbal.stop()
+            self._is_stopping = False
         except LinkLost:
             return
         except AnafiMavError as error:
@@ -290,13 +296,13 @@ class GimbalMotion:
     def link_down(self) -> None:
         """Forget the target in force: the drone is disconnected."""
         rates = self._rates.rates
-        self._was_turning = self._rates.end() or self._halt is not None or bool(self._still)
+        self._was_turning = self._rates.end() or self._is_stopping or bool(self._still)
         with contextlib.suppress(AnafiMavError):
             for _ in range(STOPS if rates else 0):  # the gateway ends, and the drone is still connected
                 self._turn({axis: Aim(0.0, aim.frame) for axis, aim in rates.items()})
         self._command = self._halt = self._repeat = self._waiting = self._seen = None
         self._zeros, self._still_zeros, self._still = 0, 0, frozenset()
-        self.is_neutral = False
+        self.is_neutral = self._is_stopping = False
 
     def add_stall(self, seconds: float) -> None:
         """Leave out a time in which the host could not receive heartbeats."""

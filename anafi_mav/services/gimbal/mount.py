@@ -23,6 +23,13 @@ MODES = (
 )
 """MAV_MOUNT_MODE that an ANAFI has; it neither retracts its gimbal nor turns it by a radio's channels."""
 
+MESSAGE_MODES = (
+    dialect.MAV_MOUNT_MODE_NEUTRAL,
+    dialect.MAV_MOUNT_MODE_MAVLINK_TARGETING,
+    dialect.MAV_MOUNT_MODE_GPS_POINT,
+)
+"""Those of them that MOUNT_CONFIGURE and MOUNT_CONTROL have; dronekit sends the last two."""
+
 HORIZON = Frames(0, locks_horizon=True, heading=None)
 """A mount keeps pitch and roll to the horizon, and yaw to the nose."""
 

@@ -29,6 +29,9 @@ POSITION_OLD = 5.0
 MOVED = 1.0
 """m that a system moves before the drone is commanded to look at its new place."""
 
+SAME_PLACE = 0.05
+"""m. Places closer together are one."""
+
 UPDATE_EVERY = 1.0
 """s between two such commands: each is a new POI for the drone."""
 
@@ -65,6 +68,14 @@ class RegionOfInterest:
         """True while the drone aims the gimbal at the region by itself."""
         state = self._host.drone.poi.state
         return state.status in _LOOKING and state.mode != PoiMode.FREE_GIMBAL
+
+    def is_locked_on(self, where: GeoPoint, ato: float) -> bool:
+        """Return True while the drone aims the gimbal at this place (height: m above take-off)."""
+        target = self._host.drone.poi.state.target
+        if not self.holds_gimbal or target is None:
+            return False
+        apart = geo.distance(target.latitude, target.longitude, *where.point)
+        return math.hypot(apart, target.altitude - ato) < SAME_PLACE
 
     async def look_at(self, where: GeoPoint, ato: float) -> None:
         """Look at a place (height: m above take-off), with the gimbal locked on it."""

@@ -25,8 +25,8 @@ LinkState LocalProtocolError Location MODELS Media MediaItem MediaState Metering
 Notification Palette PhotoFile PhotoFormat PhotoMode PhotoOption PhotoSettings Picture Piloting PilotingCommand
 PilotingState Place PlanOnDrone PlayingState Poi PoiState Position Product ProductState Quaternion Range RecordingMode
 RecordingOption RecordingSettings Recovery RemoteProtocolError Resolution Resource Shown Sound SoundState Storage
-StorageState Streaming Style StyleSettings Support Thermal ThermalState Trajectory Velocity Video VideoFrame VideoState
-WhiteBalance WifiLink connect events
+StoragePolicy StorageState Streaming Style StyleSettings Support Thermal ThermalState Trajectory Velocity Video
+VideoCodec VideoFrame VideoState WhiteBalance WifiLink connect events
 """
 """Names that programs of others import. Removing or renaming one breaks them: it needs a line in the changelog."""
 

@@ -26,8 +26,10 @@ from anafi_mav.drone.payload.camera_enums import (
     PhotoMode,
     RecordingMode,
     Resolution,
+    StoragePolicy,
     Streaming,
     Style,
+    VideoCodec,
     WhiteBalance,
     bare,
     nearest,
@@ -210,6 +212,10 @@ async def test_a_wish_changes_only_what_it_names(device: ScriptedDevice, drone: 
     assert photo.interval == 4.0
     with pytest.raises(NotSupported):
         await drone.camera.set_photo(PhotoSettings(megapixels=12.0))
+    with pytest.raises(NotSupported):
+        await drone.camera.set_photo(PhotoSettings(signed=True))
+    with pytest.raises(NotSupported):
+        await drone.camera.set_recording(RecordingSettings(codec=VideoCodec.H265))
     with pytest.raises(LocalProtocolError):
         await drone.camera.set_photo(PhotoSettings(interval=NAN))
 
@@ -228,6 +234,7 @@ async def test_verbs_that_an_older_camera_lacks_are_not_supported(drone: Drone) 
         drone.camera.set_hdr(True),
         drone.camera.set_autorecord(True),
         drone.camera.set_streaming(Streaming.LOW_LATENCY),
+        drone.camera.set_storage_policy(StoragePolicy.REMOVABLE),
         drone.camera.lock_exposure(),
         drone.camera.set_antiflicker(Antiflicker.AUTO),
         drone.camera.set_mode(CameraMode.PHOTO, id=2),
@@ -407,6 +414,16 @@ async def test_a_setting_of_an_ai_is_one_selected_field(ai: ScriptedDevice, ai_d
     assert (photo.mode, photo.interval, photo.megapixels) == (PhotoMode.GPS_LAPSE, 5.0, 12.0)
     exposure = await camera.set_exposure(ExposureSettings(mode=ExposureMode.MANUAL, shutter_s=0.01, iso=51.0), id=3)
     assert exposure == ExposureSettings(ExposureMode.MANUAL, 0.01, 50.0)
+    signed = await camera.set_photo(PhotoSettings(signed=True, keeps_live_video=False), id=3)
+    assert ai.got(new.Configure)[-1].config == new.Config(
+        photo_signature=new.DigitalSignature.DRONE, photo_streaming_mode=new.PhotoStreamingMode.INTERRUPT
+    )
+    assert signed is not None
+    assert (signed.signed, signed.keeps_live_video) == (True, False)
+    recording = await camera.set_recording(RecordingSettings(codec=VideoCodec.H265), id=3)
+    assert ai.got(new.Configure)[-1].config == new.Config(video_recording_codec=new.VideoCodec.H265)
+    assert recording is not None
+    assert recording.codec is VideoCodec.H265
     assert await camera.set_white_balance(WhiteBalance.CUSTOM, 5100.0, id=3) == (WhiteBalance.CUSTOM, 5000.0)
     assert await camera.set_style(Style.PASTEL, id=3) is Style.PASTEL
     assert await camera.set_zoom_speed(0.2, id=3) == 0.2
