@@ -248,8 +248,12 @@ class GimbalService(Service):
         await self._move(command, target)
 
     def _frames(self, flags: float, flavour: Flavour) -> Frames:
-        attitude = self.host.drone.piloting.state.attitude
-        heading = None if attitude is None else attitude.yaw * units.DEG_PER_RAD
+        """Return the reading of GIMBAL_MANAGER_FLAGS.
+
+        The heading is the gimbal's own: of the same moment and north as the yaw that it reports and takes.
+        """
+        attitude = self.host.drone.gimbal.main.attitude
+        heading = None if attitude is None else targets.wrap_180(attitude.absolute.yaw - attitude.relative.yaw)
         known = int(flags) if math.isfinite(flags) and flags >= 0.0 else 0
         return Frames(known, flavour.gimbal_keeps_horizon, heading)
 
