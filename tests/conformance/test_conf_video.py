@@ -259,3 +259,12 @@ async def test_conf_091_client_without_a_usable_uri_gets_one_text(
         for _ in range(2):
             assert [stream.uri for stream in await informed(w.client)] == [""]
         assert [m.text for _, m in w.client.since(mark, "STATUSTEXT")] == [text]
+
+
+async def test_conf_091_camera_has_no_streams_without_the_server() -> None:
+    async with world(video=False) as w:
+        mark = w.client.mark()
+        (about,) = await _asked(w.client, stock.MAVLINK_MSG_ID_CAMERA_INFORMATION, "CAMERA_INFORMATION", 0)
+        assert not about.flags & stock.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
+        assert [stream.uri for stream in await informed(w.client)] == [""]
+        assert w.client.since(mark, "STATUSTEXT") == []

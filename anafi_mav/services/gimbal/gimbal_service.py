@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 from anafi_mav import texts, units
 from anafi_mav.drone import GimbalState
@@ -248,8 +249,12 @@ class GimbalService(Service):
         await self._move(command, target)
 
     def _frames(self, flags: float, flavour: Flavour) -> Frames:
-        attitude = self.host.drone.piloting.state.attitude
-        heading = None if attitude is None else attitude.yaw * units.DEG_PER_RAD
+        """Return the reading of GIMBAL_MANAGER_FLAGS.
+
+        The heading is the gimbal's own: of the same moment and north as the yaw that it reports and takes.
+        """
+        attitude = self.host.drone.gimbal.main.attitude
+        heading = None if attitude is None else targets.wrap_180(attitude.absolute.yaw - attitude.relative.yaw)
         known = int(flags) if math.isfinite(flags) and flags >= 0.0 else 0
         return Frames(known, flavour.gimbal_keeps_horizon, heading)
 
@@ -312,7 +317,9 @@ class GimbalService(Service):
         where = place(command)
         if where is None:
             raise Refused(texts.ROI, texts.NO_PLACE, lasting=True)
-        await self._look(command, where, height(self.host.vehicle, command) or 0.0)
+        if command.frame is None and command.flavour.relative_long_regions:
+            command = replace(command, frame=dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT)
+        await self._look(command, where, height(self.host.vehicle, command, flown=False) or 0.0)
 
     async def _look(self, command: Command, where: GeoPoint, ato: float) -> None:
         self._require_control(command.client)

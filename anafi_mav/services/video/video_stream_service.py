@@ -47,7 +47,7 @@ class VideoStreamService(Service):
         """Channels that received the text which explains a missing URI."""
 
     def camera_flags(self) -> int:
-        return dialect.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
+        return dialect.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM if self.host.uris.has_video else 0
 
     def requests(self) -> Mapping[int, Request]:
         return {
