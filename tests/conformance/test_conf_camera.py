@@ -198,9 +198,11 @@ async def test_conf_089_recording_that_ends_by_itself_is_a_text() -> None:
         await enter(w.client, VIDEO)
         assert await command(w.client, START_VIDEO, 0, 0) == ACCEPTED
         mark = w.client.mark()
-        w.drone.inject(
-            camera_messages.RecordingProgress(0, camera_messages.RecordingResult.STOPPED_NO_STORAGE_SPACE, "")
-        )
+        results = camera_messages.RecordingResult
+        w.drone.inject(camera_messages.RecordingProgress(0, results.ERROR_BAD_STATE, ""))  # it goes on
+        await w.client.wait("HEARTBEAT")
+        assert not texts(w.client, mark)
+        w.drone.inject(camera_messages.RecordingProgress(0, results.STOPPED_NO_STORAGE_SPACE, ""))
         text = await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Recording ended"), since=mark)
         assert text.severity == dialect.MAV_SEVERITY_WARNING
 

@@ -134,6 +134,9 @@ async def test_camera_source_chooses_the_shown_picture(model: str) -> None:
         await enter(w.client, VIDEO)
         assert await command(w.client, dialect.MAV_CMD_VIDEO_START_CAPTURE, 0, 0) == ACCEPTED
         assert await command(w.client, SOURCE, 0, dialect.CAMERA_SOURCE_IR, 0) == REJECTED
+        assert await command(w.client, dialect.MAV_CMD_VIDEO_STOP_CAPTURE, 0) == ACCEPTED
+        assert await command(w.client, SOURCE, 0, dialect.CAMERA_SOURCE_IR, 1) == ACCEPTED
+        assert await command(w.client, dialect.MAV_CMD_SET_CAMERA_MODE, 0, PHOTO) == REJECTED
 
 
 async def test_camera_source_of_a_model_without_thermal_camera_is_unsupported() -> None:
