@@ -21,7 +21,8 @@ from anafi_mav.arsdk.video.sdp import MediaDescription, SessionDescription, form
 from anafi_mav.relay.admission import Admission, PictureGate
 
 MAX_KEPT_BYTES = 4 << 20
-"""Bytes kept for new viewers: six seconds of an ANAFI's 5 Mbit/s, and no less than one picture may have."""
+"""Bytes of packets kept for new viewers: six seconds of an ANAFI's 5 Mbit/s, and no less than one picture may have. The
+NAL units are kept beside them, twice as much in all."""
 MAX_KEPT_PICTURES = 300
 """Pictures kept for new viewers: ten seconds. What has no entry for longer is not kept."""
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Hashable, Iterator
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import FRAME_BYTES, Channel
@@ -32,6 +33,10 @@ FIRST = 8.0
 
 BUSY = 0.02
 """s until a peer that accepts nothing at present is checked again."""
+
+
+_turns: WeakKeyDictionary[Channel, asyncio.Lock] = WeakKeyDictionary()
+"""The turn on each slow line: its share is one for the senders of all services, components and systems."""
 
 
 @dataclass
@@ -109,18 +114,20 @@ class PacedSender:
             before = now
 
     async def _run_slow(self, channel: Channel, sources: dict[Hashable, _Source], rate: float) -> None:
-        """Send one message at a time, so that the line stays free for others."""
+        """Send one message at a time, in turn with the other senders of the line."""
+        turn = _turns.setdefault(channel, asyncio.Lock())
         while sources and channel.is_open:
-            message = None
-            if channel.ready:
-                for source in sources.values():
-                    source.credit = 1.0
-                message = _take(sources)
-            if message is None:
-                await asyncio.sleep(BUSY)
-            else:
-                self._host.send(message, channel)
-                await asyncio.sleep((len(pack(message).payload) + FRAME_BYTES) / (SHARE * rate))
+            async with turn:
+                message = None
+                if channel.ready:
+                    for source in sources.values():
+                        source.credit = 1.0
+                    message = _take(sources)
+                if message is None:
+                    await asyncio.sleep(BUSY)
+                else:
+                    self._host.send(message, channel)
+                    await asyncio.sleep((len(pack(message).payload) + FRAME_BYTES) / (SHARE * rate))
 
 
 def _take(sources: dict[Hashable, _Source]) -> dialect.MAVLink_message | None:

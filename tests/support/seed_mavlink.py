@@ -184,7 +184,7 @@ REACHED: dict[str, Reach] = {
     "home/precise": Reach("`ANF_RTH_PRECISE`", _PARAMETER),
     "home/type": Reach("`ANF_HOME_TYPE`", _PARAMETER),
     "storage/download_folder": Reach(
-        "waits for nothing: the configuration key `media: {download_folder}` of the gateway",
+        "configuration key `media: {download_folder}` of the gateway",
         "conformance/test_media_download.py::test_photo_of_a_flight_is_copied_after_landing",
     ),
 }

@@ -31,7 +31,7 @@ OLDER = ("4k", "thermal", "usa")
 THERMAL = ("thermal", "usa")
 
 CONTROLLER = "through a Skycontroller only: tests/unit/drone/controller/test_controller.py"
-LOCAL = "a setting of the computer, not of the drone: the directory is an argument of `media.download`"
+LOCAL = "a setting of the computer: an argument of `media.download`; in the gateway `media: {download_folder}`"
 
 Drive = Callable[[Pair], Awaitable[object]]
 """Reads or drives the row; raises when it does not work. The result must be neither None nor False."""
