@@ -21,7 +21,8 @@ from anafi_mav.arsdk.video.sdp import MediaDescription, SessionDescription, form
 from anafi_mav.relay.admission import Admission, PictureGate
 
 MAX_KEPT_BYTES = 4 << 20
-"""Bytes kept for new viewers: six seconds of an ANAFI's 5 Mbit/s, and no less than one picture may have."""
+"""Bytes of packets kept for new viewers: six seconds of an ANAFI's 5 Mbit/s, and no less than one picture may have. The
+NAL units are kept beside them, twice as much in all."""
 MAX_KEPT_PICTURES = 300
 """Pictures kept for new viewers: ten seconds. What has no entry for longer is not kept."""
 
@@ -93,6 +94,8 @@ class Feed:
         """Of the newest picture."""
         self._at = 0.0
         """Arrival of the newest picture."""
+        self._shot = 0.0
+        """When it was taken (s, monotonic)."""
         self._offset: int | None = None
         """From the drone's timestamps to ours; None: set at the next picture."""
         self._kept: deque[PackedPicture] = deque()
@@ -127,8 +130,11 @@ class Feed:
         self._offset = None
         self._drop_kept()
 
-    def add(self, picture: Picture, now: float) -> PackedPicture | None:
-        """Pack a picture that arrived `now` (s, monotonic); None when nothing of it can be used."""
+    def add(self, picture: Picture, now: float, shot: float | None = None) -> PackedPicture | None:
+        """Pack a picture that arrived `now` (s, monotonic); None when nothing of it can be used.
+
+        `shot`: when it was taken; None: unknown.
+        """
         units = [unit for unit in picture.units if unit]
         if not units:
             self.counts["empty"] += 1
@@ -142,6 +148,7 @@ class Feed:
         if entry and _SPS not in present and self.sps:
             units = [self.sps, self.pps, *units]
         packed = self._pack(units, self._time(picture.timestamp, now), entry)
+        self._shot = now if shot is None else shot
         self._keep(packed)
         return packed
 
@@ -152,8 +159,11 @@ class Feed:
         return self._encode(split_units([self.sps, self.pps]), sequence, timestamp, ends=False)
 
     def report(self, now: float, time: float, packets: int, octets: int) -> SenderReport:
-        """Return the sender report of a viewer's packets; `time` is `now` in s since 1970."""
-        timestamp = self._timestamp + round((now - self._at) * CLOCK_RATE)
+        """Return the sender report of a viewer's packets; `time` is `now` in s since 1970.
+
+        A timestamp is the moment when its picture was taken: with SYSTEM_TIME a viewer finds the pose of that moment.
+        """
+        timestamp = self._timestamp + round((now - self._shot) * CLOCK_RATE)
         return SenderReport(self.ssrc, round(time * 1e6), timestamp & _WRAP32, packets & _WRAP32, octets & _WRAP32)
 
     def description(self, name: str, info: str, tool: str, control: str) -> bytes:

@@ -222,7 +222,9 @@ class DroneSource:
             self._kind = self._drone.streams.shown.kind
         if not feed.sps and (shown := self._drone.video.state.shown) is not None:
             feed.set_parameters(shown.sps, shown.pps)
-        packed = feed.add(picture, now)
+        frame = self._drone.video.state.frame
+        is_timed = frame is not None and frame.timestamp == picture.timestamp
+        packed = feed.add(picture, now, frame.shot if frame is not None and is_timed else None)
         if packed is None:
             return
         if self._first_picture is None:

@@ -23,3 +23,8 @@ class GatewayUris:
     rtsp: Uri = no_uri
     rtsp_hint: OperatorText | None = None
     """Text for a client that gets no URI; None: the server is off."""
+
+    @property
+    def has_video(self) -> bool:
+        """True when the video server runs."""
+        return self.rtsp_hint is not None

@@ -24,6 +24,7 @@ from anafi_mav.relay.source import DroneSource, NotShown
 from anafi_mav.web.h264_offer import OfferError, finish_answer, reduce_offer
 
 log = logging.getLogger(__name__)
+logging.getLogger("aioice").setLevel(logging.WARNING)  # at INFO it has ten lines for each browser
 
 CONNECT_LIMIT = 10.0
 """s from the answer until the browser's packets have arrived. Chromium takes 0.1 s on the same computer."""

@@ -1,10 +1,14 @@
 """Processor time of the live picture for browsers: 5 Mbit/s, 30 pictures/s, a key picture a second.
 
     .venv/bin/python tests/bench/page.py [SECONDS]
+    .venv/bin/python tests/bench/page.py chromium
 
 One process has the gateway's part for 0, 1 and 4 browsers; another one plays the browsers with aiortc. Each row is the
 share of a core, and the longest iteration of the event loop while the browsers connect and later: the machine has to be
 idle for these.
+
+With `chromium`: the time from opening the page of a simulated drone to its first picture, and the age of the pictures
+that it shows, read from their strip, against the simulator's clock.
 """
 
 from __future__ import annotations
@@ -24,6 +28,8 @@ from common import machine
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from support import whep
+from support.chromium import STRIP, chromium
+from support.world import world
 
 from anafi_mav.arsdk.video.rtp_h264 import Picture
 from anafi_mav.drone.video.stream_choice import StreamKind
@@ -132,7 +138,28 @@ async def measure(count: int, seconds: float) -> str:
     return f"{count} browsers: {share:.1f} % of a core, {stalls}"
 
 
+async def look() -> str:
+    async with world(speed=1.0) as w, chromium() as browser:
+        page = await browser.page()
+        assert w.gateway.web is not None
+        began = time.perf_counter()
+        await page.open(f"http://127.0.0.1:{w.gateway.web.port}/drone/1")
+        await page.until("document.getElementById('picture')?.videoWidth ?? 0")
+        first = time.perf_counter() - began
+        await asyncio.sleep(3.0)
+        ages = []
+        for _ in range(100):
+            ages.append(w.drone.firmware.time * 1000.0 - (int(await page.js(STRIP), 2) & 0xFFFFF))
+            await asyncio.sleep(0.05)
+        ages.sort()
+        return f"Chromium: first picture after {first:.1f} s; age {ages[50]:.0f} ms (median), {ages[-1]:.0f} ms (worst)"
+
+
 def main() -> None:
+    if "chromium" in sys.argv:
+        print(machine(), f"load {os.getloadavg()[0]:.1f}")
+        print(asyncio.run(look()))
+        return
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 10.0
     print(machine(), f"load {os.getloadavg()[0]:.1f}")
     for count in (0, 1, 4):

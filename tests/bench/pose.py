@@ -28,7 +28,7 @@ from anafi_mav.mavlink import dialect
 
 IN_MS = ("ATTITUDE", "ATTITUDE_QUATERNION", "GLOBAL_POSITION_INT", "LOCAL_POSITION_NED")
 IN_US = ("ALTITUDE", "ODOMETRY")
-OTHERS = ("VFR_HUD", "ANAFI_PICTURE")
+OTHERS = ("VFR_HUD", "GIMBAL_DEVICE_ATTITUDE_STATUS", "ANAFI_PICTURE")
 IDS = {kind.msgname: id for id, kind in dialect.mavlink_map.items()}
 SETTLE = 3.0
 """s for the video to begin, and for what came before to leave."""

@@ -7,7 +7,8 @@ picture each second, filled with NAL units of type 12, which players skip. The a
 the simulator's send of its last datagram until the system has received the last datagram for a viewer (SO_TIMESTAMPNS);
 over TCP until the viewer has read it, with the wake-up of its process. A first picture is timed from the connection,
 so it holds DESCRIBE, SETUP and PLAY. Of a closed session the simulator's first picture is a key picture; a real drone's
-encoder may take up to a second more.
+encoder may take up to a second more. On a machine with other work, `chrt -r 5` before the command keeps that out of the
+figures.
 """
 
 from __future__ import annotations

@@ -170,6 +170,12 @@ async def test_video_runs_while_a_stream_needs_its_metadata(model: str) -> None:
         assert 0.5 < told.awb_b_gain < 4.0
         assert told.hfov == pytest.approx({"4k": 69.0, "ai": 68.0}[model], abs=0.5)
         assert 30.0 < told.vfov < told.hfov
+        lens = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_INTRINSICS)
+        assert (lens.source, lens.camera) == (dialect.ANAFI_INTRINSICS_SOURCE_STREAM, 0)
+        assert (lens.width, lens.cx) == {"4k": (1280, pytest.approx(642.81)), "ai": (1920, pytest.approx(997.28))}[
+            model
+        ]
+        assert 2 * math.degrees(math.atan(lens.width / 2 / lens.fx)) == pytest.approx(told.hfov, abs=0.1)
         if model == "4k":
             radio = await w.client.wait("ANAFI_LINK", lambda m: m.goodput != 0xFFFFFFFF)
             assert radio.goodput == video.state.frame.metadata.wifi.goodput * 1000

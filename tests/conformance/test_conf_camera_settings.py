@@ -175,6 +175,7 @@ async def test_conf_095_list_and_reads_agree() -> None:
         ("CAM_EV", 0.5, 9, UNSUPPORTED),
         ("CAM_EV", float("nan"), 9, UNSUPPORTED),
         ("CAM_ZOOMSPEED", 11.0, 9, UNSUPPORTED),
+        ("CAM_SATURATION", 1.5, 9, UNSUPPORTED),
         ("CAM_WBMODE", 200.0, 1, UNSUPPORTED),
         ("CAM_WBMODE", 2.0, 6, UNSUPPORTED),
         ("CAM_VIDFPS", 120.0, 9, UNSUPPORTED),

@@ -29,6 +29,7 @@ from support.world import World, world
 
 from anafi_mav import units
 from anafi_mav.arsdk.messages.gimbal import Axis, AxisLockState
+from anafi_mav.mavlink import dialect as newer
 from anafi_mav.sim.world.faults import Impairment
 
 ACCEPTED, DENIED, REJECTED, UNSUPPORTED = (
@@ -212,6 +213,19 @@ async def test_control_ends_without_heartbeats_of_the_owner() -> None:
         assert 4.0 < (free.time_boot_ms - taken[0].time_boot_ms) / 1e3 + 1.0 < 6.5
         await other.wait("STATUSTEXT", lambda m: m.text == "Gimbal free: system 255 is silent", since=mark)
         assert (await other.command(PITCHYAW, -5.0, x=LEVEL)).result == ACCEPTED
+
+
+async def test_takeover_cancels_the_command_of_another_client() -> None:
+    async with world() as w:
+        other = await w.connect(245, 190)
+        assert await angles(w, 0.0) == ACCEPTED
+        w.drone.faults.untold = frozenset({"gimbal.attitude"})  # so that it is not confirmed
+        mark = w.client.mark()
+        w.client.send_command(PITCHYAW, -40.0, NAN, NAN, NAN, x=LEVEL)
+        await w.drone.wait_log(lambda e: e.name == "gimbal.set_target" and e.args["pitch"] == -40.0, 3.0)
+        assert await configure(other, -2, -2, -1, -1) == ACCEPTED
+        ack = await w.client.wait("COMMAND_ACK", since=mark)
+        assert (ack.command, ack.result) == (PITCHYAW, newer.MAV_RESULT_CANCELLED)
 
 
 # -- rates

@@ -215,6 +215,17 @@ async def test_conf_091_viewer_stays_while_the_link_fades() -> None:
             await eye.look(30)
 
 
+async def test_conf_091_switch_without_a_link_is_reported_after_it() -> None:
+    async with world(model="ai", speed=8.0) as w:
+        assert await show(w.client, 2) == ACCEPTED
+        mark = w.client.mark()
+        assert (await w.client.command(stock.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1)).result == ACCEPTED
+        # It shows its main camera when it is back: the stereo camera is the choice of a connection.
+        await w.client.wait(
+            "VIDEO_STREAM_STATUS", lambda m: m.stream_id == 1 and m.flags & RUNNING, since=mark, timeout=30.0
+        )
+
+
 @pytest.mark.parametrize(
     ("video", "host"),
     [
@@ -231,12 +242,29 @@ async def test_conf_091_uri_has_the_host_of_the_clients_link(video: VideoConfig,
         assert split_url(stream.uri) == (host or w.address, w.gateway.relay.port, "1/visible")
 
 
-async def test_conf_091_client_without_a_usable_uri_gets_one_text() -> None:
-    async with world() as w:
+@pytest.mark.parametrize(
+    ("video", "local_host", "text"),
+    [
+        (VideoConfig(), "192.0.2.7", "Video open to this computer only: set video.host"),
+        (VideoConfig(host="0.0.0.0"), None, "Video without URI: set video.public_host"),
+    ],
+)
+async def test_conf_091_client_without_a_usable_uri_gets_one_text(
+    video: VideoConfig, local_host: str | None, text: str
+) -> None:
+    async with world(video=video) as w:
         (channel,) = w.gateway.systems[0].channels
-        channel.local_host = "192.0.2.7"  # as the link of a client on another computer
+        channel.local_host = local_host  # as of a client on another computer, or on a serial line
         mark = w.client.mark()
         for _ in range(2):
             assert [stream.uri for stream in await informed(w.client)] == [""]
-        text = "Video open to this computer only: set video.host"
         assert [m.text for _, m in w.client.since(mark, "STATUSTEXT")] == [text]
+
+
+async def test_conf_091_camera_has_no_streams_without_the_server() -> None:
+    async with world(video=False) as w:
+        mark = w.client.mark()
+        (about,) = await _asked(w.client, stock.MAVLINK_MSG_ID_CAMERA_INFORMATION, "CAMERA_INFORMATION", 0)
+        assert not about.flags & stock.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
+        assert [stream.uri for stream in await informed(w.client)] == [""]
+        assert w.client.since(mark, "STATUSTEXT") == []

@@ -5,16 +5,20 @@ from __future__ import annotations
 import asyncio
 import itertools
 import math
+import time
 from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as stock
 from support.fault_scenarios import goto
-from support.mav import NAN, Client
+from support.mav import CAMERA, NAN, Client
 from support.poses import pose_at
+from support.rtsp_client import viewer
 from support.world import HOME, World, world
 
 from anafi_mav import geo
+from anafi_mav.arsdk.video.rtcp import SenderReport
+from anafi_mav.arsdk.video.rtsp import split_url
 from anafi_mav.mavlink import dialect
 from anafi_mav.sim.skycontroller import PITCH
 from anafi_mav.sim.world.quirks import Quirk
@@ -29,6 +33,7 @@ IDS = {kind.msgname: id for id, kind in dialect.mavlink_map.items()}
 REPOSITION, RELATIVE = stock.MAV_CMD_DO_REPOSITION, stock.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
 POSE = ["ATTITUDE", "ATTITUDE_QUATERNION", "GLOBAL_POSITION_INT", "LOCAL_POSITION_NED", "VFR_HUD"]
 BY_MICROSECONDS = ["ALTITUDE", "ODOMETRY"]
+EPOCH = 1_767_268_800.25
 LATENCY = 0.1
 """s of a picture's age: what an ANAFI's exposure, encoder and radio take, roughly."""
 
@@ -72,7 +77,9 @@ def times(client: Client, name: str, since: int) -> list[int]:
     return [m.time_boot_ms for _, m in client.since(since, name)]
 
 
-@pytest.mark.parametrize(("model", "quirk"), [("4k", None), ("4k", Quirk.ROLL_INVERTED), ("usa", None), ("ai", None)])
+@pytest.mark.parametrize(
+    ("model", "quirk"), [("4k", None), ("4k", Quirk.ROLL_INVERTED), ("thermal", None), ("usa", None), ("ai", None)]
+)
 async def test_pose_at_30_hz_is_the_truth_of_its_time(model: str, quirk: Quirk | None) -> None:
     async with world(model=model, speed=1.0, video_latency=LATENCY) as w:
         video = require_video(w)
@@ -221,3 +228,32 @@ async def test_skycontroller_sticks_arrive_at_100_hz() -> None:
             controller.stick(PITCH, percent % 9)
             await asyncio.sleep(0.01)
         assert len(w.client.since(mark, "ANAFI_CONTROLLER_INPUT")) == pytest.approx(100, abs=12)
+
+
+async def test_picture_of_the_relay_is_joined_with_its_pose(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the relay's sender reports and SYSTEM_TIME alone, as docs/pose.md says."""
+    monkeypatch.setattr(time, "time", lambda: EPOCH + time.monotonic())  # the clock of tests has no time of day
+    async with world(speed=1.0, video_latency=0.117) as w:  # three and a half pictures
+        require_video(w)
+        await want(w.client, "ANAFI_PICTURE", 30.0)
+        information = stock.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION
+        assert (await w.client.command(REQUEST, information, 1, target=(1, CAMERA))).result == ACCEPTED
+        url = split_url((await w.client.wait("VIDEO_STREAM_INFORMATION", since=0)).uri)
+        assert url is not None
+        async with viewer(url[1]) as watching:
+            await watching.describe(url[2])
+            eye = await watching.setup(f"{url[2]}/video")
+            await watching.play(url[2])
+            await eye.look(90)
+        system = await w.client.wait("SYSTEM_TIME")
+        boot = system.time_unix_usec / 1e6 - system.time_boot_ms / 1e3
+        report = [r for r in eye.reports if isinstance(r, SenderReport)][-1]
+        shots = [m for _, m in w.client.since(0, "ANAFI_PICTURE")]
+        offsets = set()
+        for picture in eye.pictures[-30:]:
+            ticks = (picture.timestamp - report.timestamp + (1 << 31)) % (1 << 32) - (1 << 31)
+            taken = report.time / 1e6 + ticks / 90_000 - boot
+            shot = min(shots, key=lambda m, t=taken: abs(m.time_boot_ms / 1e3 - t))
+            assert shot.time_boot_ms / 1e3 == pytest.approx(taken, abs=0.005)
+            offsets.add((picture.timestamp - shot.rtp_timestamp) % (1 << 32))
+        assert len(offsets) == 1  # each picture has found its own

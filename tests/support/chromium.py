@@ -27,6 +27,19 @@ LIMIT = 40.0
 LOOK = 0.1
 """s between two looks at a page."""
 
+STRIP = """(() => {
+  const video = document.getElementById("picture"), canvas = document.createElement("canvas");
+  canvas.width = video.videoWidth; canvas.height = video.videoHeight;
+  const context = canvas.getContext("2d");
+  context.drawImage(video, 0, 0);
+  const row = context.getImageData(0, canvas.height - 12, canvas.width, 1).data;
+  let bits = "";
+  for (let block = 0; block < 32; block++)
+    bits += row[4 * Math.floor((block + 0.5) * canvas.width / 32)] > 128 ? "1" : "0";
+  return bits;
+})()"""
+"""Script: the 32 blocks of the simulated picture that a page shows, as 0 and 1."""
+
 FLAGS = (
     *("--headless=new", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run", "--remote-debugging-port=0"),
     *("--disable-background-networking", "--disable-component-update", "--disable-default-apps", "--disable-sync"),
@@ -74,6 +87,8 @@ class Page:
         return base64.b64decode((await self.command("Page.captureScreenshot", format="png"))["data"])
 
     async def close(self) -> None:
+        """Close the tab."""
+        await self.command("Page.close")
         await self._socket.close()
 
 

@@ -145,7 +145,7 @@ async def world(
     drone_address: str | None = None,
     web: bool = False,
     udp: bool = False,
-    video: VideoConfig | None = None,
+    video: VideoConfig | bool = True,
     video_latency: float = 0.0,
     media: MediaConfig | None = None,
     pose: Literal["video", "events"] = "video",
@@ -177,7 +177,7 @@ async def world(
         drones=(
             DroneConfig(name="alpha", sysid=sysid, address=drone_address, http_port=WEB_PORT, rtsp_port=VIDEO_PORT),
         ),
-        video=video or VideoConfig(),
+        video=video,
         media=media or MediaConfig(),
         http=HttpConfig(port=0),
         allow_kill=allow_kill,

@@ -15,7 +15,16 @@ from typing import Any, NamedTuple
 
 from msgspec.structs import replace
 
-from anafi_mav.drone import CameraKind, CamerasState, CameraState, Range, StyleSettings, ThermalState
+from anafi_mav.drone import (
+    CameraKind,
+    CamerasState,
+    CameraState,
+    PhotoOption,
+    Range,
+    RecordingOption,
+    StyleSettings,
+    ThermalState,
+)
 from anafi_mav.drone.events import ThermalMode
 from anafi_mav.services.camera_definition import setting_table, thermal_table
 from anafi_mav.services.camera_definition.camera_setting import CameraSetting, Option, ValueLimits, View
@@ -85,6 +94,16 @@ class CatalogueEntry(NamedTuple):
         return min((option.value for option in self.options), key=lambda value: abs(value - wanted))
 
 
+class CameraOffers(NamedTuple):
+    """Everything of one camera that the definition depends on."""
+
+    kind: CameraKind | None
+    photos: tuple[PhotoOption, ...]
+    recordings: tuple[RecordingOption, ...]
+    settings: tuple[tuple[tuple[Option, ...], ValueLimits | None], ...]
+    """Options and limits of each of `SETTINGS`."""
+
+
 class Catalogue:
     """The settings of one connected drone."""
 
@@ -95,15 +114,21 @@ class Catalogue:
         self.entries: tuple[CatalogueEntry, ...] = ()
         self.index: dict[str, int] = {}
         """Place of each setting in the list."""
+        self._offers: dict[int, CameraOffers] = {}
 
-    def learn(self, cameras: CamerasState, thermal: ThermalState) -> None:
-        """Take in what the drone reports that it can do."""
+    def learn(self, cameras: CamerasState, thermal: ThermalState) -> bool:
+        """Take in what the drone reports that it can do; return True when that has changed."""
         for id, camera in cameras.cameras.items():
             self._cameras[id] = grown(self._cameras.get(id), camera)
         self._shared, self._thermal = cameras, thermal
-        found = (self._entry(setting) for setting in SETTINGS)
+        offers = {id: self._offers_of(camera) for id, camera in self._cameras.items()}
+        if offers == self._offers:
+            return False
+        self._offers = offers
+        found = (self._entry(place, setting) for place, setting in enumerate(SETTINGS))
         self.entries = tuple(entry for entry in found if entry is not None)
         self.index = {entry.setting.name: place for place, entry in enumerate(self.entries)}
+        return True
 
     def __getitem__(self, name: str) -> CatalogueEntry:
         return self.entries[self.index[name]]
@@ -156,15 +181,20 @@ class Catalogue:
             *self._of_thermal_modes(),
         ]
 
-    def _entry(self, setting: CameraSetting) -> CatalogueEntry | None:
+    def _offers_of(self, camera: CameraState) -> CameraOffers:
+        view = self._view(camera)
+        settings = tuple((setting.options_of(view), setting.limits_of(view)) for setting in SETTINGS)
+        return CameraOffers(camera.kind, camera.photos, camera.recordings, settings)
+
+    def _entry(self, place: int, setting: CameraSetting) -> CatalogueEntry | None:
         """Return a setting with the options of all cameras; None when no camera has it."""
-        views = [self._view(camera) for camera in self._cameras.values()]
+        offered = [offers.settings[place] for offers in self._offers.values()]
         options: dict[float, Option] = {}
-        for view in views:
-            options.update((option.value, option) for option in setting.options_of(view))
+        for some, _ in offered:
+            options.update((option.value, option) for option in some)
         # Choices are in the sequence of the table, numbers in their own.
         ordered = list(options.values()) if setting.kind is ExtType.UINT8 else sorted(options.values())
-        limits = [found for view in views if (found := setting.limits_of(view)) is not None]
+        limits = [found for _, found in offered if found is not None]
         if not options and not limits:
             return None
         widest = None

@@ -44,7 +44,7 @@ URI = f"mftp://{PATH.lstrip('/')}{COMPRESSED}"
 component that announces it. Compressed it is a tenth, and all three unpack it."""
 
 SETTLE = 0.5
-"""s after the last change before the definition is made again: a list of capabilities is several events."""
+"""s after a report until the definition is made again: a list of capabilities is several events."""
 
 PROGRESS_AFTER = 0.25
 """s after which a write that the drone has not answered is reported as IN_PROGRESS: MAVSDK repeats after 0.5 s."""
@@ -128,7 +128,7 @@ class ParamExtService(Service):
         return dict.fromkeys(EVENTS, self._on_report)
 
     def _on_report(self, message: Message, now: float) -> None:
-        self._learn_at = now + SETTLE
+        self._learn_at = min(self._learn_at, now + SETTLE)
         self._report_changes()
 
     def tick(self, now: float) -> None:
@@ -150,8 +150,7 @@ class ParamExtService(Service):
         """Make the list of settings and the definition from what the drone reports now."""
         self._learn_at = math.inf
         drone = self.host.drone
-        self._catalogue.learn(drone.camera.state, drone.thermal.state)
-        if not self._catalogue.entries:
+        if not self._catalogue.learn(drone.camera.state, drone.thermal.state) or not self._catalogue.entries:
             return
         made = definition_file(self._catalogue, drone.identity.model.title)
         if made.content != self.host.definition.content.plain:
@@ -335,4 +334,5 @@ def _accepts(entry: CatalogueEntry, value: float) -> bool:
     if entry.options:
         return any(option.value == value for option in entry.options)
     assert entry.limits is not None
-    return entry.limits.low <= value <= entry.limits.high
+    low, high, step = entry.limits
+    return low <= value <= high and (step is None or math.isclose(math.remainder(value - low, step), 0.0, abs_tol=1e-6))

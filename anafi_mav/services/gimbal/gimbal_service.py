@@ -214,17 +214,14 @@ class GimbalService(Service):
             raise Refused(texts.GIMBAL, texts.GIMBAL_OF_MISSION)
         if answer is Answer.INVALID:
             raise Refused(texts.GIMBAL, texts.GIMBAL_IDS, lasting=True)
-        self._end_rates_of_others(client_id(command.client))
+        self._end_of_others(client_id(command.client))
         self._announce()
 
-    def _end_rates_of_others(self, sender: ClientId) -> None:
-        """Stop a rate whose client has control no longer, or has just released it."""
-        turner = self._motion.turner
-        if turner is None:
-            return
-        has_released = turner == sender and turner not in (self._control.primary, self._control.secondary)
-        if has_released or not self._control.allows(turner):
+    def _end_of_others(self, sender: ClientId) -> None:
+        """End a rate that its sender releases, and the targets of clients without control."""
+        if self._motion.turner == sender and sender not in (self._control.primary, self._control.secondary):
             self._motion.end_rates()
+        self._motion.end_unless(self._control.allows)
 
     def _require_control(self, client: object) -> ClientId:
         """Return the id of a client that may move the gimbal. Raises `Refused` for another one."""
@@ -251,8 +248,12 @@ class GimbalService(Service):
         await self._move(command, target)
 
     def _frames(self, flags: float, flavour: Flavour) -> Frames:
-        attitude = self.host.drone.piloting.state.attitude
-        heading = None if attitude is None else attitude.yaw * units.DEG_PER_RAD
+        """Return the reading of GIMBAL_MANAGER_FLAGS.
+
+        The heading is the gimbal's own: of the same moment and north as the yaw that it reports and takes.
+        """
+        attitude = self.host.drone.gimbal.main.attitude
+        heading = None if attitude is None else targets.wrap_180(attitude.absolute.yaw - attitude.relative.yaw)
         known = int(flags) if math.isfinite(flags) and flags >= 0.0 else 0
         return Frames(known, flavour.gimbal_keeps_horizon, heading)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TypedDict
 
 from anafi_mav import texts
@@ -60,6 +60,8 @@ class GimbalMotion:
         self._host = host
         self._rates = GimbalRates(heartbeats)
         self._roi = roi
+        self._client: ClientId | None = None
+        """Sender of the newest target; None: the drone aims the gimbal."""
         self._command: asyncio.Task[None] | None = None
         """The command that has not been answered yet, or what frees the gimbal from a region for a message."""
         self._waiting: tuple[ClientId, GimbalTarget] | None = None
@@ -111,6 +113,7 @@ class GimbalMotion:
         if target.is_empty:
             return  # yaw alone, of a gimbal without this axis
         self._begin(target)
+        self._client = client
         task = self._command = asyncio.current_task()
         try:
             await self._roi.free_gimbal()
@@ -146,6 +149,7 @@ class GimbalMotion:
         target = target.on(self._gimbal.axes or frozenset())
         if target.is_empty:
             return
+        self._client = client
         if self._roi.holds_gimbal:
             self._waiting = client, target
             if self._command is None:
@@ -249,6 +253,19 @@ class GimbalMotion:
         if self._rates.end():
             self._stop_turning()
 
+    def end_unless(self, allows: Callable[[ClientId], bool]) -> None:
+        """End what a client has begun that may not move the gimbal any longer."""
+        if self._client is None or allows(self._client):
+            return
+        self._client = None
+        if self._rates.end() or self._is_stopping:
+            self._stop_turning()
+            return
+        if self._command is not None:
+            self._command.cancel()
+            self._command = None
+        self._repeat = self._waiting = None
+
     async def rest(self) -> None:
         """End what moves the gimbal, before the drone aims it: a stop sent later could end that."""
         may_turn = self._end()
@@ -263,7 +280,7 @@ class GimbalMotion:
         """End what moves the gimbal; return True when it may turn by a rate."""
         may_turn = self._rates.end() or self._is_stopping or bool(self._still)
         self._begin()
-        self.is_neutral = False
+        self._client, self.is_neutral = None, False
         return may_turn
 
     def _stop_turning(self) -> None:
@@ -300,7 +317,7 @@ class GimbalMotion:
         with contextlib.suppress(AnafiMavError):
             for _ in range(STOPS if rates else 0):  # the gateway ends, and the drone is still connected
                 self._turn({axis: Aim(0.0, aim.frame) for axis, aim in rates.items()})
-        self._command = self._halt = self._repeat = self._waiting = self._seen = None
+        self._command = self._halt = self._repeat = self._waiting = self._seen = self._client = None
         self._zeros, self._still_zeros, self._still = 0, 0, frozenset()
         self.is_neutral = self._is_stopping = False
 

@@ -18,6 +18,7 @@ from anafi_mav.drone.element import Range
 from anafi_mav.drone.piloting.state import REDUCERS as PILOTING
 from anafi_mav.drone.status.alerts import Alerts
 from anafi_mav.drone.status.home import Home
+from anafi_mav.drone.video.stream_intrinsics import IntrinsicsSource, shown_intrinsics
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.stream import INPUT_FASTEST, MessageStream, Times
 from anafi_mav.services.telemetry.telemetry_link import INPUT_EVENTS
@@ -154,11 +155,21 @@ def controller_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message
     )
 
 
+_SOURCES = {
+    IntrinsicsSource.MODEL: dialect.ANAFI_INTRINSICS_SOURCE_MODEL,
+    IntrinsicsSource.STREAM: dialect.ANAFI_INTRINSICS_SOURCE_STREAM,
+    IntrinsicsSource.FOV: dialect.ANAFI_INTRINSICS_SOURCE_FOV,
+}
+
+
 def camera_intrinsics(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """Return ANAFI_CAMERA_INTRINSICS; None for a model without measured values."""
-    lens = vehicle.drone.identity.model.lens
-    if lens is None:
+    """Return ANAFI_CAMERA_INTRINSICS of the shown stream; None where nothing is known of it."""
+    drone = vehicle.drone
+    shown = drone.video.state.shown if drone.video.state.playing else None
+    found = shown_intrinsics(shown, drone.streams.shown, drone.identity.model.lens)
+    if found is None:
         return None
+    lens = found.lens
     return dialect.MAVLink_anafi_camera_intrinsics_message(
         lens.fx,
         lens.fy,
@@ -171,8 +182,8 @@ def camera_intrinsics(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message
         lens.p2,
         lens.width,
         lens.height,
-        0,
-        dialect.ANAFI_INTRINSICS_SOURCE_MODEL,
+        _u8(found.camera),
+        _SOURCES[found.source],
     )
 
 

@@ -41,11 +41,13 @@ class VideoStreamService(Service):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._undo: Callable[[], None] | None = None
+        self._reported: StreamKind | None = None
+        """The shown stream as the clients know it; None before the first connection."""
         self._informed: set[Channel] = set()
         """Channels that received the text which explains a missing URI."""
 
     def camera_flags(self) -> int:
-        return dialect.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
+        return dialect.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM if self.host.uris.has_video else 0
 
     def requests(self) -> Mapping[int, Request]:
         return {
@@ -72,7 +74,11 @@ class VideoStreamService(Service):
         }
 
     def link_up(self) -> None:
-        self._undo = self.host.drone.streams.subscribe(self._switched)
+        streams = self.host.drone.streams
+        self._undo = streams.subscribe(self._switched)
+        if self._reported not in (None, streams.shown.kind):
+            self._switched()  # while there was no link
+        self._reported = streams.shown.kind
 
     def link_down(self) -> None:
         if self._undo is not None:
@@ -137,6 +143,7 @@ class VideoStreamService(Service):
 
     def _switched(self) -> None:
         """Report every stream: one has begun to be shown, another has ended."""
+        self._reported = self.host.drone.streams.shown.kind
         for stream in self.host.drone.streams.offered:
             self.host.send(self._report(stream))
 

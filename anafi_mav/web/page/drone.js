@@ -5,7 +5,6 @@
 const PERIOD = 1000; // ms between two looks at drone and picture
 const RETRY = 2000; // ms after a failure
 const SILENCE = 5000; // ms without a decoded picture after which the session is made again
-const GATHERING = 1000; // ms for the browser's own addresses, which the gateway does not use
 
 const sysid = Number(location.pathname.split("/").pop());
 const video = document.getElementById("picture");
@@ -14,15 +13,6 @@ let session = null; // {connection, place, stream, pictures, rate, moved}
 let opening = false;
 let retryAt = 0;
 let failure = ""; // why the picture could not be opened
-
-function gathered(connection) {
-  return new Promise((resolve) => {
-    const look = () => connection.iceGatheringState === "complete" && resolve();
-    connection.addEventListener("icegatheringstatechange", look);
-    setTimeout(resolve, GATHERING);
-    look();
-  });
-}
 
 async function open(stream) {
   const connection = new RTCPeerConnection();
@@ -33,7 +23,7 @@ async function open(stream) {
     receiver.jitterBufferTarget = 0; // a pilot needs the newest picture
     video.srcObject = new MediaStream([receiver.track]);
     await connection.setLocalDescription(await connection.createOffer());
-    await gathered(connection);
+    // Without the browser's own addresses: the gateway does not use them, the browser connects.
     const answer = await fetch(`/whep/${sysid}`, {
       method: "POST",
       headers: { "Content-Type": "application/sdp" },
@@ -42,8 +32,12 @@ async function open(stream) {
     const text = await answer.text();
     if (answer.status !== 201) throw new Error(text.trim() || `status ${answer.status}`);
     mine.place = answer.headers.get("Location");
-    if (session !== mine) return release(mine);
+    if (session !== mine) {
+      release(mine); // closed meanwhile
+      return;
+    }
     await connection.setRemoteDescription({ type: "answer", sdp: text });
+    mine.moved = performance.now();
     failure = "";
   } catch (error) {
     failure = error.message;
@@ -77,7 +71,7 @@ async function watch(drone) {
   if (session !== null) {
     const mine = session;
     await count(mine);
-    const silent = performance.now() - mine.moved > SILENCE;
+    const silent = !opening && performance.now() - mine.moved > SILENCE;
     const ended = ["failed", "closed"].includes(mine.connection.connectionState);
     if (session === mine && (silent || ended || mine.stream !== drone.stream)) close();
   }

@@ -175,6 +175,9 @@ def test_sender_report_names_the_time_of_the_stream() -> None:
     report = feed.report(11.0 + 0.5, 1_700_000_000.25, packets=(1 << 32) + 7, octets=9)
     # The newest picture came at 11.0 with timestamp 90000; half a second is 45000.
     assert (report.timestamp, report.time, report.packets, report.octets) == (135000, 1_700_000_000_250_000, 7, 9)
+    feed.add(picture(31 * STEP, SLICE), 11.0 + 1 / 30, 11.0 + 1 / 30 - 0.1)
+    # One of 93000 that was taken a tenth of a second before it arrived, 0.5667 s before the report.
+    assert feed.report(11.5, 0.0, packets=0, octets=0).timestamp == 93000 + 51000
 
 
 def test_description_names_parameter_sets() -> None:

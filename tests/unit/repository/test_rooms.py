@@ -33,6 +33,7 @@ CORES = [
     *("arsdk/link/frame.py", "arsdk/link/handshake.py", "arsdk/link/packing.py", "arsdk/link/transport.py"),
     *("mavlink/channel.py", "mavlink/frames.py", "mavlink/plan_client.py", "mavlink/router.py", "mavlink/streams.py"),
     *("drone/contention.py", "drone/piloting/sticks.py", "drone/video/picture_clock.py"),
+    "drone/video/stream_intrinsics.py",
     *("relay/admission.py", "relay/dialogue.py", "relay/feed.py", "relay/uri_host.py"),
     *("sim/autopilot/firmware.py", "sim/autopilot/flight.py"),
     *("vehicle/base/clients.py", "vehicle/base/height.py", "vehicle/base/link_loss.py", "vehicle/base/modes.py"),

@@ -15,11 +15,15 @@ from support.pictures import strip
 from support.world import World, world
 
 from anafi_mav.arsdk.video.rtp_h264 import Picture
+from anafi_mav.drone import Drone
 from anafi_mav.mavlink.dialect import MAV_CMD_VIDEO_START_STREAMING, MAV_RESULT_ACCEPTED
 from anafi_mav.relay.admission import MAX_WAITING
 from anafi_mav.relay.feed import Feed
+from anafi_mav.relay.source import DroneSource
 from anafi_mav.sim.video.h264 import encoder
 from anafi_mav.web import live_video, webrtc
+from anafi_mav.web.live_video import LiveVideo
+from anafi_mav.web.server import HttpServer
 from anafi_mav.web.webrtc import PictureTrack
 
 UNTIL = 20.0
@@ -91,6 +95,21 @@ async def test_requests_that_cannot_be_answered_are_refused(monkeypatch: pytest.
         monkeypatch.setitem(sys.modules, "anafi_mav.web.webrtc", None)
         assert (await whep.post(url, sdp))[:2] == (501, f"{live_video.MISSING}\n")
         await connection.close()
+
+
+async def test_drone_that_is_not_connected_has_no_picture() -> None:
+    server = HttpServer(port=0)
+    source = DroneSource(1, "alpha", Drone("127.0.0.1"))
+    LiveVideo(server, lambda name: source)
+    await server.start()
+    connection, sdp = await whep.offer()
+    try:
+        answer = await whep.post(f"http://127.0.0.1:{server.port}/whep/1", sdp)
+        assert answer[:2] == (503, "alpha is not connected\n")
+    finally:
+        await connection.close()
+        await source.close()
+        await server.close()
 
 
 async def test_browser_that_never_connects_is_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -447,6 +447,28 @@ async def test_move_to_with_a_heading_turns_on_the_way(
     assert (command.orientation_mode, command.heading) == (OrientationMode.HEADING_DURING, sent)
 
 
+@pytest.mark.parametrize(
+    ("orientation", "heading", "sent"),
+    [
+        (OrientationMode.NONE, None, 0.0),
+        (OrientationMode.TO_TARGET, None, 0.0),
+        (OrientationMode.HEADING_START, -90.0, 270.0),
+        (OrientationMode.HEADING_DURING, 90.0, 90.0),
+    ],
+)
+async def test_move_to_turns_by_its_orientation(
+    drone: Drone, device: ScriptedDevice, orientation: OrientationMode, heading: float | None, sent: float
+) -> None:
+    device.script[ardrone3.MoveTo] = lambda command: [running(command)]
+    await drone.piloting.move_to(48.0, 2.0, 15.0, heading_deg=heading, orientation=orientation)
+    assert device.got(ardrone3.MoveTo) == [ardrone3.MoveTo(48.0, 2.0, 15.0, orientation, sent)]
+    with pytest.raises(LocalProtocolError):  # a heading too many, or none
+        await drone.piloting.move_to(
+            48.0, 2.0, 15.0, heading_deg=30.0 if heading is None else None, orientation=orientation
+        )
+    assert len(device.got(ardrone3.MoveTo)) == 1
+
+
 async def test_move_to_with_one_speed_uses_drone_limits(drone: Drone, device: ScriptedDevice) -> None:
     device.script[move.ExtendedMoveTo] = lambda c: [
         ardrone3.MoveToChanged(

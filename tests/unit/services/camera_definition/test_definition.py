@@ -62,9 +62,10 @@ def test_definition_is_read_by_mavproxy(model: str) -> None:
 def test_definition_changes_with_capabilities_alone() -> None:
     cameras, thermal = states("4k")
     first, second = Catalogue(), Catalogue()
-    first.learn(cameras, thermal)
+    assert first.learn(cameras, thermal)
     main = cameras.cameras[0]
     other = replace(main, ev=1.0, hdr=True, shutter_s=0.5)
+    assert not first.learn(replace(cameras, cameras={0: other}), thermal)
     second.learn(replace(cameras, cameras={0: other}), thermal)
     before = definition_file(first, "ANAFI 4K")
     assert definition_file(second, "ANAFI 4K") == before
