@@ -62,6 +62,10 @@ TRIES = 3
 """Downloads whose median is printed."""
 
 
+Span = tuple[float, float]
+"""From when to when, s of the monotonic clock."""
+
+
 # -- processes
 
 
@@ -184,10 +188,11 @@ class Observer:
     """Reads all heartbeats, and sends commands to all drones but the first."""
 
     address: str
-    gaps: list[float] = field(default_factory=list)
-    delays: list[float] = field(default_factory=list)
+    gaps: list[Span] = field(default_factory=list)
+    delays: list[Span] = field(default_factory=list)
+    late: list[Span] = field(default_factory=list)
+    """When this script itself had to wait for a processor."""
     sent: int = 0
-    late: int = 0
 
     def watch(self, done: threading.Event) -> None:
         """Go on until it is done."""
@@ -214,25 +219,38 @@ class Observer:
                 now, kind, system = time.monotonic(), int.from_bytes(frame[7:10], "little"), frame[5]
                 if kind == dialect.MAVLINK_MSG_ID_HEARTBEAT and frame[6] == 1:
                     if system in beats:
-                        self.gaps.append(now - beats[system])
+                        self.gaps.append((beats[system], now))
                     beats[system] = now
                 elif kind == dialect.MAVLINK_MSG_ID_COMMAND_ACK:
                     key = (system, int.from_bytes(frame[10:12], "little"))
                     if key in waiting:
-                        self.delays.append(now - waiting.pop(key))
-            if time.monotonic() > due + LATE:
-                self.late += 1
-                due = time.monotonic()
+                        self.delays.append((waiting.pop(key), now))
+            if (now := time.monotonic()) > due + LATE:
+                self.late.append((due, now))
+                due = now
         sock.close()
 
     def describe(self) -> str:
-        """Figures for a line."""
-        delays = [1000.0 * delay for delay in self.delays]
-        return (
-            f"heartbeat gaps up to {max(self.gaps, default=math.nan):.3f} s ({len(self.gaps)}); acknowledgements p50 "
-            f"{quantile(delays, 0.5):.1f} ms, p99 {quantile(delays, 0.99):.1f} ms, {len(delays)} of {self.sent}; "
-            f"this script late {self.late} times"
-        )
+        """Figures, and again without those into which a wait of this script fell."""
+        figures = f"  {_figures(self.gaps, self.delays)}; {len(self.delays)} of {self.sent} acknowledged"
+        if self.late:
+            gaps, delays = ([span for span in spans if self._is_fair(span)] for spans in (self.gaps, self.delays))
+            figures += f"\n  without {len(self.late)} waits of this script: {_figures(gaps, delays)}"
+        return figures
+
+    def _is_fair(self, span: Span) -> bool:
+        return not any(begin < span[1] and end > span[0] for begin, end in self.late)
+
+
+def _figures(gaps: Sequence[Span], delays: Sequence[Span]) -> str:
+    if not gaps or not delays:
+        return "none"
+    largest = max(end - begin for begin, end in gaps)
+    times = [1000.0 * (end - begin) for begin, end in delays]
+    return (
+        f"heartbeat gaps up to {largest:.3f} s ({len(gaps)}); acknowledgements p50 {quantile(times, 0.5):.1f} ms, "
+        f"p99 {quantile(times, 0.99):.1f} ms"
+    )
 
 
 @contextmanager
@@ -274,13 +292,13 @@ def measure_ftp(folder: Path) -> None:
     with fleet(FTP_SIZE, folder) as running:
         with observed(running.observer) as idle:
             time.sleep(10.0)
-        print(f"without a download: {idle.describe()}", flush=True)
+        print(f"without a download\n{idle.describe()}", flush=True)
         url = f"udpin://{running.client}:14540"
         with observed(running.observer) as observer:
             times = [mavsdk(url, running.path, folder, "burst") for _ in range(TRIES)]
         check(folder / Path(running.path).name, running.md5)
         print(f"FTP, MAVSDK's client by bursts, {DRONES} drones: {rate(running.size, times)}")
-        print(f"  {observer.describe()}", flush=True)
+        print(observer.describe(), flush=True)
     address = loopback()
     (folder / "served").mkdir()
     (folder / "served" / "a.bin").write_bytes(os.urandom(SERVED_SIZE))
@@ -335,7 +353,7 @@ def measure_http(folder: Path) -> None:
             f"gateway {before:.0f} MiB, at most {most - before:.1f} more; "
             f"command {first:.0f} MiB at its first bytes, at most {own_most - first:.1f} more"
         )
-    print(f"  {observer.describe()}", flush=True)
+    print(observer.describe(), flush=True)
 
 
 def check(path: Path, md5: str) -> None:

@@ -97,6 +97,14 @@ async def test_media_over_http_has_the_drones_paths_and_ranges(quirks: tuple[Qui
         assert (await ask(w, "GET", "/api/v1/media/medias"))[0] == 541
 
 
+async def test_file_over_4_gib_is_read_over_http() -> None:
+    async with world(web=True) as w:
+        video = add_video(w.drone, 5_000_000_000)
+        for first in (2**32 - 3, video.size - 9):
+            status, body, _ = await ask(w, "GET", f"/data/media/{video.id}", Range=f"bytes={first}-{first + 8}")
+            assert (status, body) == (206, b"".join(video.parts(first, first + 9)))
+
+
 async def test_delete_over_http_is_for_programs_of_this_computer() -> None:
     async with world(web=True) as w:
         photo, drone = add_photo(w.drone), w.gateway.systems[0].drone

@@ -313,7 +313,20 @@ def _moov(frames: int, size: int, duration_ms: int, offset: int) -> bytes:
     )
 
 
-_MP4_HEAD = len(_FTYP) + len(_moov(1, 0, 0, 0)) + 8
+def _mdat(size: int) -> bytes:
+    """Return the header of `size` bytes of pictures.
+
+    Over 4 GiB their number has 64 bits (ISO 14496-12 §4.2).
+    """
+    if size + 8 < 1 << 32:
+        return struct.pack(">I4s", size + 8, b"mdat")
+    return struct.pack(">I4sQ", 1, b"mdat", size + 16)
+
+
+_BEFORE_MDAT = len(_FTYP) + len(_moov(1, 0, 0, 0))
+
+_UNKNOWN_DURATION = (1 << 32) - 1
+"""ms of a video that is too long for 32 bits (ISO 14496-12 §8.2.2)."""
 
 
 def frames_in(seconds: float) -> int:
@@ -323,7 +336,8 @@ def frames_in(seconds: float) -> int:
 
 def mp4_size(scene: Scene, seconds: float) -> int:
     """Bytes of `mp4` without making it."""
-    return _MP4_HEAD + frames_in(seconds) * len(_frame(scene))
+    size = frames_in(seconds) * len(_frame(scene))
+    return _BEFORE_MDAT + len(_mdat(size)) + size
 
 
 def mp4(scene: Scene, seconds: float, offset: int = 0, size: int | None = None) -> bytes:
@@ -332,8 +346,9 @@ def mp4(scene: Scene, seconds: float, offset: int = 0, size: int | None = None) 
     Only these are made: a video may be larger than the memory.
     """
     frame, count = _frame(scene), frames_in(seconds)
-    moov = _moov(count, len(frame), round(seconds * 1000.0), _MP4_HEAD)
-    head = _FTYP + moov + struct.pack(">I4s", count * len(frame) + 8, b"mdat")
+    mdat = _mdat(count * len(frame))
+    duration = min(round(seconds * 1000.0), _UNKNOWN_DURATION)
+    head = _FTYP + _moov(count, len(frame), duration, _BEFORE_MDAT + len(mdat)) + mdat
     end = len(head) + count * len(frame)
     end = end if size is None else min(end, offset + size)
     made = head[offset:end]
