@@ -18,7 +18,7 @@ COUNT = 256
 """The drone's count of pictures is modulo this (u8)."""
 
 MOST = 1000
-"""Pictures that one report can add: a lost count must not make thousands."""
+"""Pictures that wait for a report: a burst has 14, and those of a series leave while it lasts."""
 
 UNSAVED = 0.8
 """s after the shutter at which a picture of a series is reported without its media.
@@ -119,8 +119,9 @@ class ShotTracker:
 
     def _take(self, pictures: int, now: float) -> None:
         step = (now - self._since) / max(pictures, 1)
-        self._shots += [self._since + step * number for number in range(1, min(pictures, MOST) + 1)]
-        self._taken += min(pictures, MOST)
+        room = max(MOST - len(self._shots), 0)
+        self._shots += [self._since + step * number for number in range(1, min(pictures, room) + 1)]
+        self._taken += pictures
         if pictures:
             self._since = now
 

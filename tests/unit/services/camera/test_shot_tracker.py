@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from anafi_mav.drone.payload.camera_state import CaptureProgress, CaptureUpdate
-from anafi_mav.services.camera.shot_tracker import LOST, UNSAVED, CapturedShot, ShotTracker, named
+from anafi_mav.services.camera.shot_tracker import LOST, MOST, UNSAVED, CapturedShot, ShotTracker, named
 
 STARTED, TAKEN, SAVED, ENDED, FAILED = (
     CaptureProgress.STARTED,
@@ -90,6 +90,13 @@ def test_series_of_newer_feature_is_reported_before_its_media() -> None:
     assert feed(tracker, (5.0, STARTED, None), (5.1, TAKEN, None), (5.4, SAVED, None)) == [
         CapturedShot(2, 1, 5.1, True)
     ]
+
+
+def test_pictures_that_are_never_saved_are_bounded() -> None:
+    tracker = ShotTracker()
+    feed(tracker, (0.0, STARTED, None), *((float(at), TAKEN, None) for at in range(1, MOST + 50)))
+    assert len(tracker.pending) == MOST
+    assert len(feed(tracker, (5000.0, FAILED, None))) == MOST
 
 
 def test_file_of_a_picture_is_its_jpeg() -> None:
