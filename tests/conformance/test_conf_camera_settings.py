@@ -229,7 +229,7 @@ async def test_conf_095_recording_keeps_its_settings(model: str) -> None:
     async with world(model=model) as w:
         ours = await station(w)
         await w.gateway.systems[0].drone.camera.start_recording()
-        for name, value in (("CAM_VIDRES", 3.0), ("CAM_MODE", 0.0)):
+        for name, value in (("CAM_VIDRES", 3.0), ("CAM_MODE", 0.0), ("CAM_HDR", 1.0 - ours.values["CAM_HDR"])):
             before = ours.values[name]
             mark = w.client.mark()
             ack = await write(w.client, name, value, 1)
@@ -313,6 +313,20 @@ async def test_conf_096_settings_that_follow_a_change_are_sent_too() -> None:
         for name in ("CAM_VIDMODE", "CAM_VIDRES", "CAM_VIDFPS"):
             message = await other.wait("PARAM_EXT_VALUE", lambda m, name=name: m.param_id == name, since=mark)
             assert value_of(message) == pytest.approx(sim_value(w.drone, name), abs=1e-6)
+
+
+async def test_conf_096_mode_as_parameter_and_as_setting_is_one() -> None:
+    async with world(clients=2) as w:
+        other = w.clients[1]
+        for mode in (0.0, 1.0):
+            mark = other.mark()
+            assert (await write(w.client, "CAM_MODE", mode, 1)).param_result == ACCEPTED
+            assert (await other.wait("CAMERA_SETTINGS", since=mark)).mode_id == mode
+        mark = w.client.mark()
+        ack = await other.command(dialect.MAV_CMD_SET_CAMERA_MODE, 0, 0, target=(1, CAMERA))
+        assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        value = await w.client.wait("PARAM_EXT_VALUE", lambda m: m.param_id == "CAM_MODE", since=mark)
+        assert value_of(value) == 0.0
 
 
 @both

@@ -143,13 +143,20 @@ async def test_region_beside_the_path_turns_nose_and_gimbal() -> None:
         assert truth(w).pitch_absolute == pytest.approx(35.0, abs=3.0)
 
 
-@both
-async def test_older_region_command_reads_the_place_first(flavour: str) -> None:
+@pytest.mark.parametrize(
+    ("flavour", "frame", "z"),
+    [
+        ("px4", dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, 0.0),
+        ("px4", None, HOME[2]),
+        ("ardupilot", dialect.MAV_FRAME_GLOBAL, HOME[2]),
+        ("ardupilot", None, 0.0),  # dronekit, Tower
+    ],
+)
+async def test_older_region_command_reads_the_place_first(flavour: str, frame: int | None, z: float) -> None:
     """Mission Planner and dronekit send param1 = 0 with a place; that is no "none"."""
     async with world(flavour=flavour) as w:
         await w.take_off(20.0)
-        frame = dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
-        ack = await w.client.command(OLD_ROI, 0.0, 0.0, 0.0, 0.0, frame=frame, x=EAST[0], y=EAST[1], z=0.0)
+        ack = await w.client.command(OLD_ROI, 0.0, 0.0, 0.0, 0.0, frame=frame, x=EAST[0], y=EAST[1], z=z)
         assert ack.result == ACCEPTED
         await heads(w, 90.0)
         await looks(w, pitch_absolute=-45.0)

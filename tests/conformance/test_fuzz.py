@@ -198,6 +198,35 @@ async def test_random_frames_on_the_ground(flavour: str, times: int, fuzz_seed: 
         assert mistakes == []
 
 
+TO_CAMERA = (
+    newer.MAVLINK_MSG_ID_COMMAND_LONG,
+    newer.MAVLINK_MSG_ID_COMMAND_INT,
+    newer.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL,
+    newer.MAVLINK_MSG_ID_PARAM_EXT_REQUEST_LIST,
+    newer.MAVLINK_MSG_ID_PARAM_EXT_REQUEST_READ,
+    newer.MAVLINK_MSG_ID_PARAM_EXT_SET,
+)
+
+
+async def test_random_frames_to_the_camera_are_survived(fuzz_seed: int, mistakes: list[str]) -> None:
+    source = random.Random(f"{fuzz_seed} camera")
+    known = [newer.MAVLink_param_ext_set_message(1, 100, name, bytes(128), 1) for name in (b"CAM_MODE", b"CAM_VIDMODE")]
+    async with world(model="thermal") as w:
+        frames = random_frames(source, TO_CAMERA)
+        began = w.drone.log[-1].t
+        with steady(w):
+            for _ in range(12):
+                batch = list(itertools.islice(frames, BATCH // 2))
+                for message in (source.choice(known) for _ in range(20)):
+                    payload = bytearray(message.pack(newer.MAVLink(None))[10:-2].ljust(message.unpacker.size, b"\0"))
+                    payload[18:22] = source.randbytes(4)
+                    payload[146] = source.choice((1, 1, 6, 9, source.randrange(256)))
+                    batch.append(framed(message.get_msgId(), bytes(payload), source.randrange(256)))
+                await throw(w, batch)
+        assert motions(w, began) == []
+        assert mistakes == []
+
+
 async def test_fields_named_id_are_not_taken_for_message_ids(mistakes: list[str]) -> None:
     """A field `id` hides pymavlink's attribute of that name: STATUSTEXT with id 76 is no COMMAND_LONG."""
     named = [kind for kind in newer.mavlink_map.values() if "id" in kind.fieldnames]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import random
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from pymavlink.generator.mavcrc import x25crc
@@ -39,15 +39,17 @@ def offset(kind: Any, name: str) -> int:
     raise KeyError(name)
 
 
-def random_frames(source: random.Random) -> Iterator[bytes]:
-    """Well-formed frames of any message, two thirds of them to our system, and damaged ones."""
-    ids = sorted(dialect.mavlink_map)
+EVERY = tuple(sorted(dialect.mavlink_map))
+
+
+def random_frames(source: random.Random, ids: Sequence[int] = EVERY) -> Iterator[bytes]:
+    """Well-formed frames of these messages, two thirds of them to our system, and damaged ones."""
     for count in itertools.count():
         id = source.choice(ids)
         kind = dialect.mavlink_map[id]
         size = struct.calcsize(kind.unpacker.format)
         payload = bytearray(source.randbytes(size))
-        for name, target in (("target_system", 1), ("target_component", 1)):
+        for name, target in (("target_system", 1), ("target_component", source.choice((1, 1, 100)))):
             if name in kind.ordered_fieldnames and source.random() < 0.67:
                 payload[offset(kind, name)] = target
         frame = framed(id, bytes(payload).rstrip(b"\0") or b"\0", count % 256)

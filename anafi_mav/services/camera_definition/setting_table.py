@@ -572,6 +572,8 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
         read=lambda view: flag(view.camera.hdr),
         write=lambda drone, id, value: drone.camera.set_hdr(value != 0.0, id),
         options=lambda view: switch(view.camera.hdr),
+        # Parrot names no setting that ends a recording (STOPPED_RECONFIGURED); this one changes how the sensor is read.
+        guard=Guard.CAPTURE,
     ),
     # -- light
     CameraSetting(

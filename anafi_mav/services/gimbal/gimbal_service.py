@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 from anafi_mav import texts, units
 from anafi_mav.drone import GimbalState
@@ -316,7 +317,9 @@ class GimbalService(Service):
         where = place(command)
         if where is None:
             raise Refused(texts.ROI, texts.NO_PLACE, lasting=True)
-        await self._look(command, where, height(self.host.vehicle, command) or 0.0)
+        if command.frame is None and command.flavour.relative_long_regions:
+            command = replace(command, frame=dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT)
+        await self._look(command, where, height(self.host.vehicle, command, flown=False) or 0.0)
 
     async def _look(self, command: Command, where: GeoPoint, ato: float) -> None:
         self._require_control(command.client)

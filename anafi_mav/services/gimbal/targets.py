@@ -1,7 +1,8 @@
 """Reads angles and rates of the gimbal from messages: units, frames, signs. No I/O.
 
-MAVLink and Parrot have the same signs: pitch + up, yaw + to the right, roll + to the right. Rates and angles of
-messages are rad and rad/s, those of commands deg and deg/s.
+MAVLink and Parrot have the same signs: pitch + up, yaw + to the right, roll + to the right. Parrot's axes point
+forward, right and down, those of the absolute frame north, east and down (gimbal.xml, frame_of_reference). Rates and
+angles of messages are rad and rad/s, those of commands deg and deg/s.
 
 | flag of GIMBAL_MANAGER_FLAGS | frame that the drone holds the axis in |
 |---|---|
