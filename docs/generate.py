@@ -450,6 +450,140 @@ def camera_settings() -> str:
     return "".join(parts)
 
 
+CAMERA = """\
+# Camera
+
+<!-- Made by docs/generate.py from the tables of the services and tests/support/camera_commands.py. -->
+
+For operators who take photos and videos from a ground station, and for programmers of MAVLink clients. After reading
+you know what the camera component does, what each acknowledgement means, and which commands an ANAFI does not have.
+
+The camera is component 100 of each drone's system, in every flavour. Its settings are on a page of
+[their own](camera-settings.md), and so is the [gimbal](gimbal.md), which is component 1's.
+
+## Modes
+
+| | |
+|---|---|
+| photo in video mode, recording in photo mode | TEMPORARILY_REJECTED to component 100: change the mode first |
+| the same to component 1 (ArduPilot flavour, and the older commands) | the mode is changed first |
+| change of mode while it records or takes photos | TEMPORARILY_REJECTED |
+| no card, or one that cannot be used | DENIED with a text; TEMPORARILY_REJECTED while it is checked or formatted |
+
+## Photos
+
+| MAV_CMD_IMAGE_START_CAPTURE | effect |
+|---|---|
+| one picture | what the setting `CAM_PHOTOMODE` says: single, burst, bracketing, or a series until it is stopped |
+| an interval, with 0 or several pictures | a time-lapse; the photo settings of before are restored at its end |
+| sequence number (param4) from 1 | the same number again takes no second photo |
+| without a sequence number | each command takes a photo, unless its `confirmation` is above 0 |
+
+ACCEPTED means that the drone has begun. The drone rounds an interval to one that it has: a text names it.
+DO_SET_CAM_TRIGG_DIST is a GPS-lapse.
+
+One CAMERA_IMAGE_CAPTURED per picture is sent to every client, whether a client, a mission or the pilot took it. It
+is sent within a second of the drone's report that the picture is stored; `capture_result` is 0 for one that is
+lost. Place, height and orientation are those of the camera when the shutter opened: of the live video's picture at
+that time while it runs, else interpolated between events. An unknown place is 0. `file_url` is the file in the
+camera's MAVLink FTP; it is empty when the drone has not listed the file in time, and is then filled in for a later
+request.
+
+Photos of the history are requested by index (param2), by range (param2 to param3) or all (-1), at most 100 at a
+time; 2000 are kept until the gateway ends. Their places and orientations are not kept over a restart of the
+gateway. The index goes on, and begins again only after a format. MAVSDK requests missing photos; an index that does
+not exist is DENIED.
+
+PANORAMA_CREATE takes one of Parrot's panoramas: from 360 deg the spherical one, from 180 deg the horizontal or
+vertical one, below it the super wide one where the drone has it. It turns the drone, so the drone must hover; any
+flight command, Hold among them, ends it.
+
+## Recordings
+
+A recording that the pilot, a mission or the drone began is shown like one of a client, with its time by the drone's
+clock. One that ends by itself, for instance on a full card, is a text. MAV_CMD_VIDEO_STOP_CAPTURE without a
+recording is ACCEPTED.
+
+## Zoom
+
+CAMERA_SETTINGS has the zoom as a share (%) of the range from 1 to the largest factor. A step is a factor of 1.25. A
+rate goes on to the end of the range or until a rate of 0; ACCEPTED means that the zoom moves.
+
+## Storage
+
+Each storage has a number from 1: on the Ai 1 is the internal memory and 2 the card. STORAGE_INFORMATION is sent when
+anything of it changes. A removed card is EMPTY, a card that the drone does not accept NOT_SUPPORTED, with a text.
+
+MAV_CMD_STORAGE_FORMAT needs the number where there are two storages. It is refused in flight, while recording and
+while photos are taken, and UNSUPPORTED for a storage that the drone cannot format. It cannot be cancelled.
+IN_PROGRESS is sent meanwhile; MAVSDK's `format_storage` takes the first one for the end, so watch the storage.
+
+## Missions
+
+While items to come of the flown mission need the camera, stopping a recording or series, mode, zoom, source and
+reset are TEMPORARILY_REJECTED. A single photo is taken whenever the drone can. A paused mission frees the camera.
+
+## Commands
+
+"–" means that the component answers UNSUPPORTED. In the ArduPilot flavour some commands are also component 1's, with
+camera id 0 or 1. Commands to component 0 are answered by the component that has them.
+
+| id | MAV_CMD | component 1 | component 100 | models, or the reason |
+|---|---|---|---|---|
+"""
+
+CAMERA_MESSAGES = """
+## Messages
+
+"sent" means on request (MAV_CMD_REQUEST_MESSAGE), and most of them also at an interval (MAV_CMD_SET_MESSAGE_INTERVAL).
+
+| id | message | component 1 | component 100 | models, or the reason |
+|---|---|---|---|---|
+"""
+
+
+def camera() -> str:
+    """docs/camera.md."""
+    import asyncio
+
+    from support import camera_commands
+
+    async def rows() -> str:
+        return _camera_rows(camera_commands.make_system())
+
+    return asyncio.run(rows())
+
+
+def _camera_rows(system: Any) -> str:
+    from support import camera_commands as table
+
+    from anafi_mav import models
+
+    thermal = ", ".join(models.MODELS[key].title for key in table.THERMAL_MODELS)
+    autopilot, camera = system.components
+    parts = [CAMERA]
+
+    def last(name: str, cells: list[str]) -> str:
+        if name in table.THERMAL_ONLY:
+            return thermal
+        return "all" if any(cell != "–" for cell in cells) else table.REASONS[name]
+
+    for id, name in table.commands():
+        cells = []
+        for component, other in ((autopilot, camera), (camera, autopilot)):
+            offered = [flavour.name for flavour in table.flavours(component, other, id)]
+            cells.append("done" if len(offered) == 2 else "ArduPilot flavour" if offered else "–")
+        parts.append(f"| {id} | {name} | {' | '.join(cells)} | {last(name, cells)} |\n")
+    parts.append(CAMERA_MESSAGES)
+    for id, name in table.messages():
+        cells = []
+        for component in (autopilot, camera):
+            received = any(id in service.messages() for service in component.services)
+            cells.append("sent" if component.messages.has(id) else "received" if received else "–")
+        parts.append(f"| {id} | {name} | {' | '.join(cells)} | {last(name, cells)} |\n")
+    return "".join(parts)
+
+
 SILENCE = """\
 # Commands that the simulator does not answer
 
@@ -677,6 +811,7 @@ def operator_texts() -> str:
 
 
 PAGES: dict[str, Callable[[], str]] = {
+    "camera.md": camera,
     "camera-settings.md": camera_settings,
     "configuration.md": configuration,
     "dialect.md": dialect,

@@ -22,6 +22,7 @@ from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.mavlink.router import EVERY_COMPONENT
 from anafi_mav.services.camera.camera_service import CameraService
 from anafi_mav.services.camera.capture_service import CaptureService
+from anafi_mav.services.camera.panorama_service import PanoramaService
 from anafi_mav.services.camera.storage_service import StorageService
 from anafi_mav.services.camera_definition.param_ext_service import ParamExtService
 from anafi_mav.services.command.calibration_service import CalibrationService
@@ -120,6 +121,7 @@ AUTOPILOT_SERVICES: tuple[type[Service], ...] = (
 CAMERA_SERVICES: tuple[type[Service], ...] = (
     CameraService,
     CaptureService,
+    PanoramaService,
     StorageService,
     VideoStreamService,
     ParamExtService,

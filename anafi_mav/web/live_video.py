@@ -86,7 +86,7 @@ class LiveVideo:
         if len(self._sessions) >= MAX_BROWSERS:
             return _refused(503, f"{MAX_BROWSERS} browsers watch already")
         if request.transport is None:
-            return _refused(400, "the browser is gone")
+            return _refused(400, "the browser has disconnected")
         address = request.transport.get_extra_info("sockname")[0]
         key = secrets.token_urlsafe(16)
         session: BrowserSession = webrtc.BrowserSession(source, kind, address, lambda: self._sessions.pop(key, None))

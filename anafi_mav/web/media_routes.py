@@ -75,8 +75,8 @@ class MediaRoutes:
 
     async def _md5(self, request: web.Request, drone: Drone) -> web.Response:
         resource = await _resource(request, drone)
-        told = {"resource_id": resource.resource_id, "media_id": resource.media_id}
-        return web.json_response({**told, "md5": await drone.media.md5(resource)})
+        fields = {"resource_id": resource.resource_id, "media_id": resource.media_id}
+        return web.json_response({**fields, "md5": await drone.media.md5(resource)})
 
     async def _file(self, request: web.Request, drone: Drone) -> web.StreamResponse:
         """Send a file, or the one range of it that the client wants (RFC 9110 §14)."""

@@ -152,7 +152,7 @@ class BrowserSession:
                 self._limit.cancel()
             self._start(self._begin())
         elif state in ("failed", "closed"):
-            self.end("the browser is not heard any more")
+            self.end("the browser has disconnected")
 
     async def _begin(self) -> None:
         try:

@@ -6,8 +6,10 @@ python mavsdk_listen.py URL
 from __future__ import annotations
 
 import asyncio
+import itertools
 import json
 import math
+import statistics
 import sys
 from collections.abc import Awaitable, Callable
 from enum import Enum
@@ -105,16 +107,13 @@ async def first(telemetry: TelemetryAsync, name: str, accept: Callable[[Any], bo
 
 
 async def rate(telemetry: TelemetryAsync, name: str, count: int = 60) -> float:
-    """Hz of so many samples in a row, by their own times; those of events, 0.2 s apart, begin again."""
+    """Hz by the median of the gaps between so many samples' own times: the first ones are still events."""
     times: list[float] = []
     async for value in getattr(telemetry, f"subscribe_{name}")():
-        stamp = (value.time_usec if name == "odometry" else value.timestamp_us) / 1e6
-        if times and stamp - times[-1] > 0.15:
-            times.clear()
-        times.append(stamp)
+        times.append((value.time_usec if name == "odometry" else value.timestamp_us) / 1e6)
         if len(times) == count:
             break
-    return (len(times) - 1) / (times[-1] - times[0])
+    return 1.0 / statistics.median(b - a for a, b in itertools.pairwise(times))
 
 
 async def main(url: str) -> None:

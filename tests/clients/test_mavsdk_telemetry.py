@@ -79,8 +79,8 @@ async def test_telemetry_and_info(tmp_path: Path) -> None:
 
         assert (told["flying landed_state"], told["flying armed"]) == ("IN_AIR", True)
         assert told["flying distance_sensor"]["current_distance_m"] == pytest.approx(3.0, abs=0.8)
-        for name in ("attitude_quaternion", "odometry"):  # the pictures' pace
-            assert told[f"hz {name}"] == pytest.approx(30.0, rel=0.1), name
+        for name in ("attitude_quaternion", "odometry"):  # the pictures' pace; events would be at 5 Hz
+            assert told[f"hz {name}"] > 20.0, name
         flight = told["flight_information"]
         assert flight["flight_uid"] > 0
         assert 0 < flight["duration_since_takeoff_ms"] <= flight["duration_since_arming_ms"]

@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as stock
-from support.flavours import both
 from support.mav import Client
 from support.params import value_of, write
 from support.setpoints import attitude, engage, streaming
@@ -259,9 +258,9 @@ async def test_skycontroller_sticks_are_reported_while_a_program_flies() -> None
         assert inputs.source == dialect.ANAFI_PILOTING_SOURCE_SKYCONTROLLER
 
 
-@both
-async def test_wheels_and_buttons_are_the_clients_on_request(flavour: str) -> None:
-    async with world(skycontroller=3, speed=1.0, flavour=flavour) as w:
+@pytest.mark.parametrize(("flavour", "generation"), [("px4", 3), ("ardupilot", 4)])
+async def test_wheels_and_buttons_are_the_clients_on_request(flavour: str, generation: int) -> None:
+    async with world(skycontroller=generation, speed=1.0, flavour=flavour) as w:
         pilot = at_hand(w)
 
         async def grabbed(buttons: int, axes: int, since: float) -> None:

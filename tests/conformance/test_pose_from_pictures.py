@@ -78,10 +78,17 @@ def times(client: Client, name: str, since: int) -> list[int]:
 
 
 @pytest.mark.parametrize(
-    ("model", "quirk"), [("4k", None), ("4k", Quirk.ROLL_INVERTED), ("thermal", None), ("usa", None), ("ai", None)]
+    ("model", "flavour", "quirk"),
+    [
+        ("4k", "px4", None),
+        ("4k", "px4", Quirk.ROLL_INVERTED),
+        ("thermal", "px4", None),
+        ("usa", "ardupilot", None),
+        ("ai", "ardupilot", None),
+    ],
 )
-async def test_pose_at_30_hz_is_the_truth_of_its_time(model: str, quirk: Quirk | None) -> None:
-    async with world(model=model, speed=1.0, video_latency=LATENCY) as w:
+async def test_pose_at_30_hz_is_the_truth_of_its_time(model: str, flavour: str, quirk: Quirk | None) -> None:
+    async with world(model=model, flavour=flavour, speed=1.0, video_latency=LATENCY) as w:
         video = require_video(w)
         await w.take_off(10.0)
         if quirk is not None:

@@ -25,8 +25,10 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.mav import Client
 from support.product import Process
+from support.rtsp_client import Viewer
 
 from anafi_mav.config import from_text
+from anafi_mav.relay.server import DEFAULT_PORT
 
 AIRCRAFT = "192.168.42.1"
 OURS = "192.168.42.23"
@@ -170,6 +172,7 @@ async def test_two_aircraft_with_one_address_fly_at_once(spaces: tuple[str, str,
         clients = [await Visitor(256 - system, 190).visit(home, 5760) for system in (1, 2)]
         try:
             await asyncio.gather(*(fly(client, system) for system, client in enumerate(clients, 1)))
+            await asyncio.gather(watch(home, "left"), watch(home, "right"))
         finally:
             for client in clients:
                 await client.close()
@@ -179,6 +182,22 @@ async def test_two_aircraft_with_one_address_fly_at_once(spaces: tuple[str, str,
         assert len([e for e in entries(log, "command") if e["name"] == "ardrone3.Piloting.TakeOff"]) == 1
         assert max(entry["args"]["up"] for entry in entries(log, "pose")) == pytest.approx(height, abs=0.7)
         assert len([e for e in entries(log, "session") if e["name"] == "up"]) == (2 if log is logs[1] else 1)
+        assert [entry["name"] for entry in entries(log, "video")] == ["setup", "play", "end"]
+
+
+async def watch(home: str, name: str) -> None:
+    """A viewer at the gateway's video server: each aircraft has URIs of its own there."""
+    sock = await asyncio.to_thread(connected, home, ("127.0.0.1", DEFAULT_PORT))
+    sock.setblocking(False)
+    viewer = Viewer(DEFAULT_PORT, *await asyncio.open_connection(sock=sock))
+    try:
+        path = f"{name}/visible"
+        assert (await viewer.describe(path)).name == name
+        eye = await viewer.setup_inside(f"{path}/video")
+        await viewer.play(path)
+        assert (await eye.first(30))[0].is_key
+    finally:
+        viewer.close()
 
 
 async def fly(client: Client, system: int) -> None:

@@ -135,7 +135,7 @@ ITEMS: dict[int, Item] = {
     113: Item("FTP: list, open, read, burst, CRC; lost replies, traversal", NEITHER),
     114: Item("@PARAM/param.pck: a valid file or an answer at once"),
     115: Item("FTP sessions of two clients", NEITHER),
-    116: Item("MAVSDK: action, mission, telemetry, param, info, ftp, gimbal", PX4, "camera"),
+    116: Item("MAVSDK: action, mission, telemetry, param, info, ftp, gimbal, camera", PX4),
     117: Item("dronekit on ArduPilot's flavour", COPTER),
     118: Item("dronekit on PX4's flavour", PX4),
     119: Item("MAVProxy on ArduPilot's flavour", COPTER),

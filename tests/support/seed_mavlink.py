@@ -28,10 +28,12 @@ _TWIN = "conformance/test_conf_params.py::test_alias_and_native_parameter_are_on
 _PARAMETER = "conformance/test_conf_params.py::test_native_settings_reach_the_drone"
 _MISSIONS = "conformance/test_conf_missions.py::"
 _CAMERA = "conformance/test_conf_camera_settings.py::"
+_CAPTURE = "conformance/test_conf_camera.py::"
+_CAMERA_TASKS = "conformance/test_conf_camera_tasks.py::"
 _SAFETY = "conformance/test_safety.py::"
 
 REACHED: dict[str, Reach] = {
-    "camera/command": Reach("", waits=PAYLOAD),
+    "camera/command": Reach("`MAV_CMD_SET_CAMERA_ZOOM`", _CAPTURE + "test_conf_097_zoom_by_range_step_and_rate"),
     "drone/command": Reach("`SET_ATTITUDE_TARGET`", _SAFETY + "test_setpoint_ends_with_its_own_sender"),
     "drone/moveby": Reach(
         "`MAV_CMD_CONDITION_YAW`, `MAV_CMD_DO_CHANGE_ALTITUDE`; `SET_POSITION_TARGET_LOCAL_NED`",
@@ -93,13 +95,22 @@ REACHED: dict[str, Reach] = {
         _ANAFI + "test_wheels_and_buttons_are_the_clients_on_request",
     ),
     "skycontroller/rpy": Reach("`ANAFI_CONTROLLER_ATTITUDE`", _ANAFI + "test_where_the_skycontroller_points"),
-    "storage/available": Reach("", waits=PAYLOAD),
+    "storage/available": Reach(
+        "`STORAGE_INFORMATION`.available_capacity", _CAPTURE + "test_conf_092_each_storage_is_reported"
+    ),
     "time": Reach("`SYSTEM_TIME`", "conformance/test_conf_ground_station.py::test_conf_111_system_time"),
-    "camera/photo/stop": Reach("", waits=PAYLOAD),
-    "camera/photo/take": Reach("", waits=PAYLOAD),
-    "camera/recording/start": Reach("", waits=PAYLOAD),
-    "camera/recording/stop": Reach("", waits=PAYLOAD),
-    "camera/reset": Reach("", waits=PAYLOAD),
+    "camera/photo/stop": Reach("`MAV_CMD_IMAGE_STOP_CAPTURE`", _CAPTURE + "test_conf_087_series_counts_and_ends"),
+    "camera/photo/take": Reach(
+        "`MAV_CMD_IMAGE_START_CAPTURE`, `CAMERA_IMAGE_CAPTURED`", _CAPTURE + "test_conf_086_photo_is_reported_with_file"
+    ),
+    "camera/recording/start": Reach(
+        "`MAV_CMD_VIDEO_START_CAPTURE`", _CAPTURE + "test_conf_089_recording_runs_and_ends"
+    ),
+    "camera/recording/stop": Reach("`MAV_CMD_VIDEO_STOP_CAPTURE`", _CAPTURE + "test_conf_089_recording_runs_and_ends"),
+    "camera/reset": Reach(
+        "`MAV_CMD_SET_CAMERA_ZOOM` to 0 %; `MAV_CMD_RESET_CAMERA_SETTINGS` too",
+        _CAMERA_TASKS + "test_reset_restores_the_settings_of_the_factory",
+    ),
     "drone/arm": Reach("`MAV_CMD_COMPONENT_ARM_DISARM` with `ANF_HAND_LAUNCH`", _MAINTENANCE + "test_a_launch_by_hand"),
     "drone/calibrate": Reach("`MAV_CMD_PREFLIGHT_CALIBRATION`", _MAINTENANCE + "test_conf_130_the_magnetometer"),
     "drone/emergency": Reach(
@@ -143,7 +154,7 @@ REACHED: dict[str, Reach] = {
         "MAVLink FTP of component 100, `/media`; `anafi-mav media download`",
         "conformance/test_conf_media.py::test_conf_113_media_is_listed_read_and_removed",
     ),
-    "storage/format": Reach("", waits=PAYLOAD),
+    "storage/format": Reach("`MAV_CMD_STORAGE_FORMAT`", _CAPTURE + "test_conf_093_format_erases_and_resets_the_index"),
     "camera/autorecord": Reach(
         "extended parameter `CAM_AUTOREC`", _CAMERA + "test_conf_094_every_option_reaches_the_drone"
     ),

@@ -67,6 +67,11 @@ class AnimationsState(msgspec.Struct, frozen=True):
     missing: Mapping[Type, frozenset[Indicator]] = {}
     """Requirements that each animation lacks; empty: available. Ai only."""
 
+    @property
+    def is_running(self) -> bool:
+        """True while an animation is flown, from the first of the two events that report its begin."""
+        return self.running not in (None, Type.NONE) or self.phase == AnimationState.RUNNING
+
 
 def _figure(state: AnimationsState, m: Any) -> AnimationsState:
     canceled = m.state == AnimationState.CANCELING or (state.canceled and m.state != AnimationState.RUNNING)
@@ -267,10 +272,14 @@ class Animations(Commanding[AnimationsState]):
         self._require(self.state.running, "animations")
         self._commander.abort_pending("stopped", animation.Cancel)
         await self._commander.stops_delivered(animation.Cancel.NAME, timeout)
-        if self.state.running == Type.NONE:
+        if not self.state.is_running:
             return
         await self._commander.confirm(
-            animation.Cancel(), (animation.State,), lambda m: True if m.type == Type.NONE else None, timeout
+            animation.Cancel(),
+            (animation.State,),
+            lambda m: True if m.type == Type.NONE else None,
+            timeout,
+            stops=True,
         )
 
     async def _start(

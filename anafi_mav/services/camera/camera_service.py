@@ -183,6 +183,8 @@ class CameraService(Service):
         camera = drone.camera[id]
         if camera.zoom_max is None or camera.zoom_max <= 1.0:
             raise Unsupported(texts.ZOOM, texts.CAMERA_UNKNOWN)
+        if math.isnan(kind):
+            raise Refused(texts.ZOOM, texts.NUMBER_MISSING, lasting=True)
         if kind not in (dialect.ZOOM_TYPE_STEP, dialect.ZOOM_TYPE_CONTINUOUS, dialect.ZOOM_TYPE_RANGE):
             raise Unsupported(texts.ZOOM, texts.ZOOM_TYPE)
         if not math.isfinite(value):

@@ -32,7 +32,7 @@ records, saves or indexes."""
 
 
 class DownloadService(Service):
-    """Brings the media home where a folder is configured."""
+    """Downloads the media where a folder is configured."""
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)

@@ -61,6 +61,7 @@ ROWS: dict[str, tuple[bool, Altitude, object, ProgressPolicy]] = {
     "PREFLIGHT_CALIBRATION": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.FINAL_ONLY),
     "IMAGE_START_CAPTURE": (False, Altitude.UNUSED, BY_PARAMETER, ProgressPolicy.PROMPT),
     "IMAGE_STOP_CAPTURE": (False, Altitude.UNUSED, Effect.STOP, ProgressPolicy.PROMPT),
+    "PANORAMA_CREATE": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),
     "RESET_CAMERA_SETTINGS": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),
     "SET_CAMERA_MODE": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
     "SET_CAMERA_SOURCE": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),

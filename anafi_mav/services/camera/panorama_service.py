@@ -1,0 +1,109 @@
+"""MAV_CMD_PANORAMA_CREATE: Parrot's photo panoramas, which turn the drone.
+
+A panorama is a flight task: it begins only while the drone hovers, and whatever flies the drone next ends it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+from collections.abc import Container, Mapping
+
+from anafi_mav import texts
+from anafi_mav.drone.events import AnimationType, FlyingState
+from anafi_mav.drone.payload.camera_enums import CameraMode
+from anafi_mav.errors import AnafiMavError
+from anafi_mav.mavlink import dialect
+from anafi_mav.services.camera.camera_targets import require_free, require_idle, require_storage
+from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect
+from anafi_mav.services.service import Host, Service
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.refusal import Refused
+
+TURNED = 360.0
+"""deg from which a panorama is spherical: Parrot's only one around the whole horizon."""
+
+HALF = 180.0
+"""deg from which it is Parrot's horizontal or vertical one; the Ai has a smaller one, the super wide."""
+
+HOVERING = (FlightMode.HOLD, FlightMode.GUIDED, FlightMode.POSITION)
+
+
+def panorama_type(wide: float, high: float, available: Container[AnimationType]) -> AnimationType:
+    """Return the panorama for these angles (deg); `available` are those that the drone offers."""
+    if abs(wide) >= TURNED:
+        return AnimationType.SPHERICAL_PHOTO_PANORAMA
+    small = AnimationType.SUPER_WIDE_PHOTO_PANORAMA
+    if max(abs(wide), abs(high)) < HALF and small in available:
+        return small
+    is_wide = abs(wide) >= abs(high)
+    return AnimationType.HORIZONTAL_180_PHOTO_PANORAMA if is_wide else AnimationType.VERTICAL_180_PHOTO_PANORAMA
+
+
+class PanoramaService(Service):
+    """Takes panoramas; the vehicle's flight task while it does."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._is_active = False
+        host.vehicle.helms = (*host.vehicle.helms, self)
+
+    def actions(self) -> Mapping[int, Action]:
+        return {
+            dialect.MAV_CMD_PANORAMA_CREATE: Action(
+                self._create,
+                location=False,
+                altitude=Altitude.UNUSED,
+                effect=Effect.IRREVOCABLE,
+                group=ActionGroup.PHOTO,
+            )
+        }
+
+    # Helm.
+
+    def end(self) -> list[asyncio.Task[None]]:
+        """End this flight task: something else flies the drone now."""
+        if not self._is_active:
+            return []
+        self._is_active = False
+        if not self.host.drone.animations.state.is_running:
+            return []
+        return [self.host.spawn(self._cancel())]
+
+    async def _cancel(self) -> None:
+        with contextlib.suppress(AnafiMavError):
+            await self.host.drone.animations.cancel()
+
+    def link_down(self) -> None:
+        self._is_active = False
+
+    # The command.
+
+    async def _create(self, command: Command) -> None:
+        """MAV_CMD_PANORAMA_CREATE: param1 and param2 angles (deg). Returns when the drone has begun."""
+        drone, vehicle = self.host.drone, self.host.vehicle
+        wide, high = (0.0 if math.isnan(angle) else angle for angle in command.params[:2])
+        if not (math.isfinite(wide) and math.isfinite(high)):
+            raise Refused(texts.PANORAMA, texts.NUMBER_MISSING, lasting=True)
+        require_free(vehicle, texts.PANORAMA)
+        if not vehicle.in_air:
+            raise Refused(texts.PANORAMA, texts.NOT_IN_AIR)
+        if drone.controller.pilot_acquired_control:
+            raise Refused(texts.PANORAMA, texts.PILOT)
+        hovers = drone.piloting.state.flying is FlyingState.HOVERING and vehicle.mode in HOVERING
+        if not hovers or drone.piloting.moving or drone.piloting.sticks_held:
+            raise Refused(texts.PANORAMA, texts.PANORAMA_MOVING)
+        require_storage(drone, texts.PANORAMA)
+        require_idle(drone, texts.PANORAMA)
+        id = drone.camera.active_id
+        camera = drone.camera[id]
+        if camera.mode is not CameraMode.PHOTO and await drone.camera.set_mode(CameraMode.PHOTO, id) is not (
+            CameraMode.PHOTO
+        ):
+            raise Refused(texts.PANORAMA, texts.CAMERA_MODE_KEPT)
+        await vehicle.take_over()
+        kind = panorama_type(wide, high, drone.animations.state.available or ())
+        await drone.animations.photo_panorama(kind)
+        vehicle.select(FlightMode.HOLD, self)
+        self._is_active = True

@@ -1,0 +1,230 @@
+"""The camera beside missions, restarts and other controllers, and its thermal half; judged by the simulator."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+from support import camera_commands
+from support.cameras import ACCEPTED, PHOTO, VIDEO, command, enter, photos, press, request, shoot, texts, videos
+from support.ext_params import write
+from support.flavours import both
+from support.mav import CAMERA
+from support.missions import ACTIVE, PAUSED, put, start, state, takeoff, way
+from support.plans import Item
+from support.sim_settings import sim_value
+from support.world import HOME, WEB_PORT, World, loopback, world
+
+from anafi_mav.arsdk.messages import camera as camera_messages
+from anafi_mav.arsdk.messages.thermal import RenderingMode, ThermalMode
+from anafi_mav.config import Config, DroneConfig
+from anafi_mav.gateway import Gateway
+from anafi_mav.mavlink import dialect
+from anafi_mav.sim import DroneSpec, Simulator
+
+REJECTED, DENIED, UNSUPPORTED = (
+    dialect.MAV_RESULT_TEMPORARILY_REJECTED,
+    dialect.MAV_RESULT_DENIED,
+    dialect.MAV_RESULT_UNSUPPORTED,
+)
+SOURCE, RESET = dialect.MAV_CMD_SET_CAMERA_SOURCE, dialect.MAV_CMD_RESET_CAMERA_SETTINGS
+NAN = math.nan
+
+
+@both
+async def test_mission_keeps_its_camera_while_items_need_it(flavour: str) -> None:
+    """A series of the mission: only a photo is taken for a client, until the mission pauses."""
+    photo = Item(dialect.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, p1=0.0, p2=2.0, p3=0.0, p4=NAN, frame=2)
+    end = Item(dialect.MAV_CMD_IMAGE_STOP_CAPTURE, 0.0, 0.0, p1=0.0, frame=2)
+    async with world(flavour=flavour, web=True) as w:
+        await put(w, [takeoff(6.0), photo, way(60.0, 0.0, 6.0), end, way(75.0, 0.0, 6.0)])
+        mark = w.client.mark()
+        await start(w)
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", since=mark, timeout=30.0)
+        for id, params in (
+            (dialect.MAV_CMD_IMAGE_STOP_CAPTURE, (0,)),
+            (dialect.MAV_CMD_SET_CAMERA_MODE, (0, VIDEO)),
+            (dialect.MAV_CMD_SET_CAMERA_ZOOM, (dialect.ZOOM_TYPE_RANGE, 50)),
+            (RESET, (1,)),
+        ):
+            assert await command(w.client, id, *params) == REJECTED, id
+        assert any("mission" in text for text in texts(w.client, mark))
+        assert not w.commands("camera.stop_photo")
+        mark = w.client.mark()
+        assert (await w.client.command(dialect.MAV_CMD_DO_PAUSE_CONTINUE, 0.0)).result == ACCEPTED
+        await state(w, PAUSED, since=mark)
+        assert await command(w.client, dialect.MAV_CMD_SET_CAMERA_ZOOM, dialect.ZOOM_TYPE_RANGE, 60) == ACCEPTED
+
+
+async def test_photo_during_a_mission_is_taken_and_its_items_go_on() -> None:
+    photo = Item(dialect.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, p1=0.0, p2=0.0, p3=1.0, p4=NAN, frame=2)
+    async with world(web=True) as w:
+        await enter(w.client, PHOTO)
+        await put(w, [takeoff(6.0), way(20.0, 0.0, 6.0), photo, way(30.0, 0.0, 6.0)])
+        mark = w.client.mark()
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=mark)
+        image = await shoot(w.client)
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", lambda m: m.image_index == image.image_index + 1, timeout=30.0)
+        assert len(photos(w)) == 2
+
+
+async def test_recording_of_the_pilot_is_shown_with_its_time() -> None:
+    async with world() as w:
+        mark = w.client.mark()
+        press(w, camera_messages.SetCameraMode(0, camera_messages.CameraCameraMode.RECORDING))
+        press(w, camera_messages.StartRecording(0))
+        status = await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.video_status == 1, since=mark)
+        assert status.recording_time_ms < 1000
+        assert await command(w.client, dialect.MAV_CMD_VIDEO_STOP_CAPTURE, 0) == ACCEPTED
+        assert len(videos(w)) == 1
+
+
+async def test_index_and_recording_survive_a_restart_of_the_gateway(tmp_path: Path) -> None:
+    drone, address = loopback(), loopback()
+    spec = DroneSpec(address=drone, home=HOME, http_port=WEB_PORT)
+    config = Config(
+        endpoints=(f"tcpin://{address}:5760",),
+        drones=(DroneConfig(name="alpha", sysid=1, address=drone, http_port=WEB_PORT),),
+        state=str(tmp_path / "state"),
+    )
+    async with Simulator([spec], speed=1.0, seed=1) as simulator:
+        async with Gateway(config) as gateway:
+            w = World(simulator, gateway, address)
+            await w.connect()
+            assert await gateway.ready(10.0)
+            await w.client.wait("GLOBAL_POSITION_INT", since=0)
+            await enter(w.client, PHOTO)
+            assert (await shoot(w.client)).image_index == 0
+            await enter(w.client, VIDEO)
+            assert await command(w.client, dialect.MAV_CMD_VIDEO_START_CAPTURE, 0, 0) == ACCEPTED
+            status = await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.video_status == 1, since=0)
+            began = simulator.drones[0].time
+            await w.client.close()
+        async with Gateway(config) as gateway:
+            w = World(simulator, gateway, address)
+            await w.connect()
+            assert await gateway.ready(10.0)
+            await w.client.wait("GLOBAL_POSITION_INT", since=0)
+            status = await request(w.client, "CAMERA_CAPTURE_STATUS")
+            assert (status.video_status, status.image_count) == (1, 1)
+            assert status.recording_time_ms / 1e3 == pytest.approx(simulator.drones[0].time - began, abs=1.5)
+            assert await command(w.client, dialect.MAV_CMD_VIDEO_STOP_CAPTURE, 0) == ACCEPTED
+            await enter(w.client, PHOTO)
+            assert (await shoot(w.client)).image_index == 1
+            await w.client.close()
+            await simulator.close()
+
+
+@pytest.mark.parametrize("model", ["thermal", "usa"])
+async def test_camera_source_chooses_the_shown_picture(model: str) -> None:
+    async with world(model=model) as w:
+        for params, mode, rendering in (
+            ((0, dialect.CAMERA_SOURCE_IR, 0), ThermalMode.BLENDED, RenderingMode.THERMAL),
+            ((0, dialect.CAMERA_SOURCE_RGB, dialect.CAMERA_SOURCE_IR), ThermalMode.BLENDED, RenderingMode.BLENDED),
+            ((0, dialect.CAMERA_SOURCE_RGB, 0), ThermalMode.DISABLED, None),
+        ):
+            assert await command(w.client, SOURCE, *params) == ACCEPTED
+            thermal = w.drone.firmware.payload.thermal
+            assert thermal.mode is mode
+            if rendering is not None:
+                assert w.commands("thermal.set_rendering")[-1].args["mode"] == rendering
+        assert await command(w.client, SOURCE, 0, dialect.CAMERA_SOURCE_NDVI, 0) == DENIED
+        await enter(w.client, VIDEO)
+        assert await command(w.client, dialect.MAV_CMD_VIDEO_START_CAPTURE, 0, 0) == ACCEPTED
+        assert await command(w.client, SOURCE, 0, dialect.CAMERA_SOURCE_IR, 0) == REJECTED
+
+
+async def test_camera_source_of_a_model_without_thermal_camera_is_unsupported() -> None:
+    async with world() as w:
+        assert await command(w.client, SOURCE, 0, dialect.CAMERA_SOURCE_IR, 0) == UNSUPPORTED
+        assert await command(w.client, dialect.MAV_CMD_REQUEST_MESSAGE, 277) == REJECTED
+
+
+async def test_thermal_range_is_that_of_an_absolute_palette() -> None:
+    async with world(model="thermal") as w:
+        assert await command(w.client, dialect.MAV_CMD_REQUEST_MESSAGE, 277) == REJECTED
+        assert await command(w.client, SOURCE, 0, dialect.CAMERA_SOURCE_IR, 0) == ACCEPTED
+        for name, value, kind in (("CAM_THM_PALETTE", 0.0, 1), ("CAM_THM_LOW", 5.0, 9), ("CAM_THM_HIGH", 60.0, 9)):
+            assert (await write(w.client, name, value, kind)).param_result == dialect.PARAM_ACK_ACCEPTED, name
+        shown = await request(w.client, "CAMERA_THERMAL_RANGE")
+        assert (shown.stream_id, shown.min, shown.max) == (2, pytest.approx(5.0, abs=0.1), pytest.approx(60.0, abs=0.1))
+
+
+@pytest.mark.parametrize("model", ["4k", "ai"])
+async def test_reset_restores_the_settings_of_the_factory(model: str) -> None:
+    async with world(model=model) as w:
+        await enter(w.client, PHOTO)
+        for name, value in (("CAM_PHOTOMODE", 2.0), ("CAM_WBMODE", 2.0)):
+            assert (await write(w.client, name, value, 1)).param_result == dialect.PARAM_ACK_ACCEPTED
+        assert await command(w.client, dialect.MAV_CMD_SET_CAMERA_ZOOM, dialect.ZOOM_TYPE_RANGE, 50) == ACCEPTED
+        assert await command(w.client, RESET, 0) == DENIED
+        assert await command(w.client, RESET, 1) == ACCEPTED
+        assert [sim_value(w.drone, name) for name in ("CAM_PHOTOMODE", "CAM_WBMODE", "CAM_MODE")] == [0.0, 0.0, 0.0]
+        assert (await request(w.client, "CAMERA_SETTINGS")).zoomLevel == pytest.approx(0.0, abs=1.0)
+
+
+async def test_stop_overtakes_no_start_of_another_client() -> None:
+    """Both are sent in one segment: the recording has begun and has ended when both are answered."""
+    async with world() as w:
+        await enter(w.client, VIDEO)
+        mark = w.client.mark()
+        w.client.send_command(dialect.MAV_CMD_VIDEO_START_CAPTURE, 0, 0, target=(1, CAMERA))
+        assert await command(w.client, dialect.MAV_CMD_VIDEO_STOP_CAPTURE, 0) == ACCEPTED
+        acks = [(ack.command, ack.result) for _, ack in w.client.since(mark, "COMMAND_ACK")]
+        assert acks == [
+            (dialect.MAV_CMD_VIDEO_START_CAPTURE, ACCEPTED),
+            (dialect.MAV_CMD_VIDEO_STOP_CAPTURE, ACCEPTED),
+        ]
+        assert len(videos(w)) == 1
+        assert not w.drone.firmware.payload.cameras.busy
+
+
+PANORAMA = dialect.MAV_CMD_PANORAMA_CREATE
+
+
+async def test_panorama_turns_the_hovering_drone_and_hold_ends_it() -> None:
+    async with world(web=True) as w:
+        assert await command(w.client, PANORAMA, 360, 180) == REJECTED  # on the ground
+        await w.take_off(10.0)
+        mark = w.client.mark()
+        assert await command(w.client, PANORAMA, 180, 0) == ACCEPTED
+        assert w.commands("animation.start_horizontal_180_photo_panorama")
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", since=mark, timeout=60.0)
+        (panorama,) = photos(w)
+        assert panorama.mode == "PANORAMA"
+        images = [image for _, image in w.client.since(mark, "CAMERA_IMAGE_CAPTURED")]
+        assert len(images) == len(panorama.resources)
+
+        mark = w.client.mark()
+        assert await command(w.client, PANORAMA, 360, 180) == ACCEPTED
+        await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 1, since=mark)
+        assert (await w.client.command(dialect.MAV_CMD_DO_PAUSE_CONTINUE, 0)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.name == "animation.cancel")
+        for angle in range(180, 190):  # the drone offers no panorama until it has stopped
+            await w.client.wait("HEARTBEAT")
+            if (result := await command(w.client, PANORAMA, angle, 0)) == ACCEPTED:
+                break
+        assert result == ACCEPTED
+        mark = w.client.mark()
+        ack = await w.client.command(dialect.MAV_CMD_DO_REPOSITION, -1, 1, x=HOME[0] + 2e-4, y=HOME[1], z=10.0, frame=6)
+        assert ack.result == ACCEPTED, texts(w.client, mark)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 15.0, 30.0)
+
+
+@both
+@pytest.mark.parametrize("model", ["4k", "thermal", "usa", "ai"])
+async def test_conf_009_payload_commands_are_those_of_the_page(flavour: str, model: str) -> None:
+    """Each command of camera, gimbal, storage and video to both components: docs/camera.md is true."""
+    table = camera_commands.make_system()
+    autopilot, camera = table.components
+    async with world(flavour=flavour, model=model) as w:
+        for component, other in ((autopilot, camera), (camera, autopilot)):
+            for id, name in camera_commands.commands():
+                offered = [one.name for one in camera_commands.flavours(component, other, id)]
+                is_done = flavour in offered
+                if name in camera_commands.THERMAL_ONLY and model not in camera_commands.THERMAL_MODELS:
+                    is_done = False
+                ack = await w.client.command(id, NAN, NAN, NAN, NAN, target=(1, component.compid), timeout=20.0)
+                assert (ack.result != UNSUPPORTED, ack.get_srcComponent()) == (is_done, component.compid), name

@@ -1,0 +1,78 @@
+"""Pose of the camera at a moment, by events and by pictures."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from anafi_mav.services.camera.pose_track import FURTHEST, PoseTrack, SampleTrack
+
+
+def test_value_is_interpolated_between_samples() -> None:
+    track = SampleTrack()
+    track.add(1.0, 10.0)
+    track.add(1.2, 20.0)
+    assert track.value(1.05) == pytest.approx((12.5,))
+    assert track.value(0.5) == (10.0,)
+    assert track.value(1.5) == (20.0,)
+    assert track.value(1.2 + FURTHEST + 0.1) is None
+
+
+def test_sample_that_is_not_newer_is_left_out() -> None:
+    track = SampleTrack()
+    track.add(1.0, 10.0)
+    track.add(1.0, 99.0)
+    track.add(0.5, 99.0)
+    track.add(2.0, math.nan)
+    assert track.value(1.0) == (10.0,)
+    assert track.newest == 1.0
+
+
+def test_angle_is_interpolated_across_south() -> None:
+    track = SampleTrack(angles=True)
+    track.add(1.0, math.radians(175.0))
+    track.add(2.0, math.radians(-175.0))
+    assert track.value(1.5) == pytest.approx((math.pi,))
+
+
+def test_position_continues_at_the_reported_velocity() -> None:
+    poses = PoseTrack()
+    poses.events.places.add(1.0, 48.0, 2.0)
+    poses.events.velocities.add(1.0, 10.0, 0.0)
+    pose = poses.pose(1.5)
+    assert pose.place is not None
+    assert (pose.place[0] - 48.0) * 111_195.0 == pytest.approx(5.0, abs=0.05)
+    assert pose.place[1] == pytest.approx(2.0, abs=1e-9)
+
+
+def test_gimbal_and_heading_are_joined() -> None:
+    poses = PoseTrack()
+    poses.events.gimbals.add(1.0, 0.0, math.radians(-30.0), math.radians(20.0))
+    assert poses.pose(1.0).camera is None
+    poses.events.headings.add(1.0, math.radians(170.0))
+    assert poses.pose(1.0).camera == pytest.approx((0.0, math.radians(-30.0), math.radians(-170.0)))
+
+
+def test_picture_near_the_moment_is_the_source() -> None:
+    poses = PoseTrack()
+    for source, pitch in ((poses.events, -0.1), (poses.pictures, -0.2)):
+        source.gimbals.add(1.0, 0.0, pitch, 0.0)
+        source.headings.add(1.0, 0.0)
+        source.places.add(1.0, 48.0 - pitch, 2.0)
+    near, far = poses.pose(1.1), poses.pose(1.4)
+    assert near.camera is not None
+    assert near.camera[1] == pytest.approx(-0.2)
+    assert near.place == pytest.approx((48.2, 2.0))
+    assert far.camera is not None
+    assert far.camera[1] == pytest.approx(-0.1)
+
+
+def test_pose_is_complete_once_newer_samples_have_arrived() -> None:
+    poses = PoseTrack()
+    poses.events.gimbals.add(1.0, 0.0, 0.0, 0.0)
+    poses.events.places.add(1.0, 48.0, 2.0)
+    assert not poses.is_complete(1.1)
+    poses.events.gimbals.add(1.2, 0.0, 0.0, 0.0)
+    poses.events.places.add(1.2, 48.0, 2.0)
+    assert poses.is_complete(1.1)

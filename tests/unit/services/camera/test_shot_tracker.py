@@ -1,0 +1,97 @@
+"""Pictures from the drone's events about photos: times, numbers, and what is lost."""
+
+from __future__ import annotations
+
+import pytest
+
+from anafi_mav.drone.payload.camera_state import CaptureProgress, CaptureUpdate
+from anafi_mav.services.camera.shot_tracker import LOST, UNSAVED, CapturedShot, ShotTracker, named
+
+STARTED, TAKEN, SAVED, ENDED, FAILED = (
+    CaptureProgress.STARTED,
+    CaptureProgress.TAKEN,
+    CaptureProgress.SAVED,
+    CaptureProgress.ENDED,
+    CaptureProgress.FAILED,
+)
+
+
+def feed(tracker: ShotTracker, *events: tuple[float, CaptureProgress, int | None]) -> list[CapturedShot]:
+    """Events of (time, progress, count); the pictures that they complete."""
+    return [
+        shot for at, progress, count in events for shot in tracker.receive(CaptureUpdate(0, progress, count=count), at)
+    ]
+
+
+def test_single_photo_has_the_time_of_its_shutter() -> None:
+    tracker = ShotTracker()
+    assert feed(tracker, (1.0, STARTED, None), (1.1, STARTED, None), (1.2, TAKEN, 1)) == []
+    assert tracker.pending == (1.2,)
+    assert feed(tracker, (1.6, SAVED, 1)) == [CapturedShot(1, 1, 1.2, True)]
+    assert feed(tracker, (1.6, ENDED, None), (1.7, SAVED, 1)) == []  # the same report again
+    assert feed(tracker, (2.0, STARTED, None), (2.1, TAKEN, 1), (2.5, SAVED, 1)) == [CapturedShot(2, 1, 2.1, True)]
+
+
+def test_burst_with_left_out_reports_spreads_its_times() -> None:
+    tracker = ShotTracker()
+    shots = feed(tracker, (1.0, STARTED, None), (1.2, TAKEN, 2), (2.0, TAKEN, 4), (2.3, SAVED, 4))
+    assert [(shot.number, pytest.approx(shot.at)) for shot in shots] == [(1, 1.1), (2, 1.2), (3, 1.6), (4, 2.0)]
+
+
+def test_count_wraps_and_older_count_adds_nothing() -> None:
+    tracker = ShotTracker()
+    shots = feed(
+        tracker, (0.0, STARTED, None), (1.0, TAKEN, 100), (2.0, TAKEN, 200), (3.0, TAKEN, 44), (3.5, TAKEN, 40)
+    )
+    assert shots == []
+    assert tracker.taken == 300  # 44 is 300 modulo 256
+
+
+def test_saved_without_other_reports_is_a_picture() -> None:
+    tracker = ShotTracker()
+    assert feed(tracker, (5.0, SAVED, None)) == [CapturedShot(1, 1, 5.0, True)]
+
+
+def test_end_before_saved_loses_nothing() -> None:
+    tracker = ShotTracker()
+    feed(tracker, (1.0, STARTED, None), (1.2, TAKEN, None), (1.3, ENDED, None))
+    assert tracker.expire(1.3 + LOST / 2, is_series=False) == []
+    assert feed(tracker, (2.0, SAVED, None)) == [CapturedShot(1, 1, 1.2, True)]
+    assert tracker.expire(1.3 + LOST, is_series=False) == []
+
+
+def test_picture_that_is_never_saved_is_lost() -> None:
+    tracker = ShotTracker()
+    feed(tracker, (1.0, STARTED, None), (1.2, TAKEN, None), (1.3, ENDED, None))
+    assert tracker.expire(1.3 + LOST, is_series=False) == [CapturedShot(1, 1, 1.2, False)]
+    assert tracker.expire(2.0 + LOST, is_series=False) == []
+
+
+def test_next_photo_reports_the_lost_one_of_before() -> None:
+    tracker = ShotTracker()
+    feed(tracker, (1.0, STARTED, None), (1.2, TAKEN, None), (1.3, ENDED, None))
+    assert feed(tracker, (3.0, STARTED, None)) == [CapturedShot(1, 1, 1.2, False)]
+    assert feed(tracker, (3.2, TAKEN, None), (3.4, SAVED, None)) == [CapturedShot(2, 1, 3.2, True)]
+
+
+def test_failure_before_the_shutter_is_one_lost_picture() -> None:
+    tracker = ShotTracker()
+    assert feed(tracker, (1.0, FAILED, None)) == []  # a photo that never began
+    assert feed(tracker, (1.0, STARTED, None), (1.4, FAILED, None)) == [CapturedShot(1, 1, 1.4, False)]
+
+
+def test_series_of_newer_feature_is_reported_before_its_media() -> None:
+    tracker = ShotTracker()
+    feed(tracker, (0.0, STARTED, None), (1.0, TAKEN, None))
+    assert tracker.expire(1.0 + UNSAVED, is_series=True) == [CapturedShot(1, 1, 1.0, True)]
+    feed(tracker, (3.0, TAKEN, None))
+    last = CaptureUpdate(0, SAVED, "media", is_last=True)
+    assert tracker.receive(last, 3.2) == [CapturedShot(1, 2, 3.0, True)]
+    assert feed(tracker, (5.0, STARTED, None), (5.1, TAKEN, None), (5.4, SAVED, None)) == [
+        CapturedShot(2, 1, 5.1, True)
+    ]
+
+
+def test_file_of_a_picture_is_its_jpeg() -> None:
+    files = [("a2.DNG", 1), ("a2.JPG", 2), ("a1.JPG", 3), ("a1.DNG", 4), ("a3.DNG", 5)]
+    assert named(files) == [3, 2, 5]
