@@ -467,6 +467,7 @@ The camera is component 100 of each drone's system, in every flavour. Its settin
 |---|---|
 | photo in video mode, recording in photo mode | TEMPORARILY_REJECTED to component 100: change the mode first |
 | the same to component 1 (ArduPilot flavour, and the older commands) | the mode is changed first |
+| photo mode while the thermal or blended picture is shown | TEMPORARILY_REJECTED: that camera only records |
 | change of mode while it records or takes photos | TEMPORARILY_REJECTED |
 | no card, or one that cannot be used | DENIED with a text; TEMPORARILY_REJECTED while it is checked or formatted |
 
@@ -493,6 +494,8 @@ Photos of the history are requested by index (param2), by range (param2 to param
 time; 2000 are kept until the gateway ends. Their places and orientations are not kept over a restart of the
 gateway. The index goes on, and begins again only after a format. MAVSDK requests missing photos; an index that does
 not exist is DENIED.
+
+Photos that are taken while the drone's link is lost are not reported.
 
 PANORAMA_CREATE takes one of Parrot's panoramas: from 360 deg the spherical one, from 180 deg the horizontal or
 vertical one, below it the super wide one where the drone has it. It turns the drone, so the drone must hover; any

@@ -148,18 +148,44 @@ async def test_conf_087_series_counts_and_ends(flavour: str) -> None:
         assert await command(w.client, STOP_PHOTO, 0) == ACCEPTED
 
 
-async def test_conf_087_burst_is_one_message_per_file() -> None:
-    for model in ("4k", "ai"):
-        async with world(model=model, web=True) as w:
-            await enter(w.client, PHOTO)
-            assert (await write(w.client, "CAM_PHOTOMODE", 2.0, 1)).param_result == dialect.PARAM_ACK_ACCEPTED
+@pytest.mark.parametrize("model", ["4k", "ai"])
+async def test_conf_087_burst_and_bracketing_are_one_message_per_file(model: str) -> None:
+    async with world(model=model, web=True) as w:
+        await enter(w.client, PHOTO)
+        first = 0
+        for mode, name in ((2.0, "BURST"), (1.0, "BRACKETING")):
+            assert (await write(w.client, "CAM_PHOTOMODE", mode, 1)).param_result == dialect.PARAM_ACK_ACCEPTED
             mark = w.client.mark()
             assert await command(w.client, START_PHOTO, 0, 0, 1) == ACCEPTED
-            await w.client.wait("CAMERA_IMAGE_CAPTURED", lambda image: image.image_index == 13, since=mark)
+            await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 1, since=mark)
+            await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 0, timeout=10.0)
+            media = photos(w)[-1]
+            last = first + len(media.resources) - 1
+            await w.client.wait("CAMERA_IMAGE_CAPTURED", lambda image, n=last: image.image_index == n, since=mark)
             images = [image for _, image in w.client.since(mark, "CAMERA_IMAGE_CAPTURED")]
-            assert [image.file_url.rpartition("/")[2] for image in images] == [
-                resource.id for resource in photos(w)[0].resources
+            assert (media.mode, last > first) == (name, True)
+            assert [(image.image_index, image.file_url.rpartition("/")[2]) for image in images] == [
+                (index, resource.id) for index, resource in enumerate(media.resources, first)
             ]
+            first = last + 1
+
+
+@both
+async def test_conf_087_photos_by_distance(flavour: str) -> None:
+    async with world(flavour=flavour, web=True) as w:
+        await w.take_off(8.0)
+        mark = w.client.mark()
+        distance = dialect.MAV_CMD_DO_SET_CAM_TRIGG_DIST
+        assert (await w.client.command(distance, 5.0)).result == ACCEPTED
+        w.client.send_command(dialect.MAV_CMD_DO_REPOSITION, 4, 1, x=HOME[0] + 3e-4, y=HOME[1], z=8.0, frame=6)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 28.0, 30.0)
+        assert (await w.client.command(distance, 0.0)).result == ACCEPTED
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", lambda image: image.image_index == 5, since=mark)
+        places = [resource.scene.north for resource in photos(w)[0].resources]
+        assert all(later - earlier == pytest.approx(5.0, abs=0.7) for earlier, later in pairwise(places))
+        images = [image for _, image in w.client.since(mark, "CAMERA_IMAGE_CAPTURED")]
+        assert len(images) == len(places)
+        assert [image.image_index for image in images] == list(range(len(places)))
 
 
 @both
@@ -198,9 +224,11 @@ async def test_conf_089_recording_that_ends_by_itself_is_a_text() -> None:
         await enter(w.client, VIDEO)
         assert await command(w.client, START_VIDEO, 0, 0) == ACCEPTED
         mark = w.client.mark()
-        w.drone.inject(
-            camera_messages.RecordingProgress(0, camera_messages.RecordingResult.STOPPED_NO_STORAGE_SPACE, "")
-        )
+        results = camera_messages.RecordingResult
+        w.drone.inject(camera_messages.RecordingProgress(0, results.ERROR_BAD_STATE, ""))  # it goes on
+        await w.client.wait("HEARTBEAT")
+        assert not texts(w.client, mark)
+        w.drone.inject(camera_messages.RecordingProgress(0, results.STOPPED_NO_STORAGE_SPACE, ""))
         text = await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Recording ended"), since=mark)
         assert text.severity == dialect.MAV_SEVERITY_WARNING
 

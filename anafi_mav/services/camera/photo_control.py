@@ -121,7 +121,7 @@ class PhotoControl:
         if state.mode is mode:
             return
         if mode not in (state.modes or ()):
-            raise Refused(what, texts.CAMERA_MODE_KEPT, lasting=True)
+            raise Refused(what, texts.CAMERA_LACKS_MODE)
         require_free(self.host.vehicle, what)
         require_idle(drone, what)
         if await drone.camera.set_mode(mode, id) is not mode:
