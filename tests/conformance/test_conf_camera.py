@@ -18,6 +18,7 @@ from support.world import HOME, world
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import camera as camera_messages
 from anafi_mav.arsdk.messages import user_storage
+from anafi_mav.arsdk.messages.proto import camera2
 from anafi_mav.arsdk.messages.user_storage import FsState, PhyState
 from anafi_mav.mavlink import dialect
 
@@ -98,6 +99,35 @@ async def test_conf_086_photo_is_reported_with_file(flavour: str, model: str) ->
             states = [status.image_status for _, status in w.client.since(mark, "CAMERA_CAPTURE_STATUS")]
             assert states[0] == 1
             assert states[-1] == 0
+
+
+@pytest.mark.parametrize("model", ["4k", "ai"])
+async def test_conf_086_refused_and_unannounced_photos_are_told_apart(model: str) -> None:
+    """The pilot's button is refused while a client's photo is taken; later one has no report but its media."""
+    async with world(model=model, web=True) as w:
+        await enter(w.client, PHOTO)
+        mark = w.client.mark()
+        assert await command(w.client, START_PHOTO, 0, 0, 1) == ACCEPTED
+        assert w.drone.firmware.payload.cameras.busy
+        press(w, camera_messages.TakePhoto(0))
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", since=mark)
+        await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 0 and s.image_count, since=mark)
+        if model == "ai":
+            w.drone.inject(
+                camera2.Photo(
+                    camera_id=0,
+                    type=camera2.PhotoEvent.STOP,
+                    stop_reason=camera2.PhotoStopReason.CAPTURE_DONE,
+                    media_id="unannounced",
+                )
+            )
+        else:
+            result = camera_messages.PhotoResult.PHOTO_SAVED
+            w.drone.inject(camera_messages.PhotoProgress(0, result, 1, "unannounced"))
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", lambda image: image.image_index == 1, since=mark)
+        images = [image for _, image in w.client.since(mark, "CAMERA_IMAGE_CAPTURED")]
+        assert [(image.image_index, image.capture_result) for image in images] == [(0, 1), (1, 1)]
+        assert len(photos(w)) == 1
 
 
 async def test_conf_086_geotag_is_that_of_the_shutter() -> None:

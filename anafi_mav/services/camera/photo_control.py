@@ -54,6 +54,8 @@ class PhotoControl:
         if update.progress is CaptureProgress.TAKEN and self._limit is not None and taken >= self._limit:
             self._limit = None
             self.host.spawn(self._end_series())
+        if update.is_refused:
+            return
         saved = update.progress is CaptureProgress.SAVED and not self.host.drone.camera[update.camera].taking
         if saved or update.progress in (CaptureProgress.ENDED, CaptureProgress.FAILED):
             self._limit = None
