@@ -475,7 +475,8 @@ The camera is component 100 of each drone's system, in every flavour. Its settin
 
 | MAV_CMD_IMAGE_START_CAPTURE | effect |
 |---|---|
-| one picture | what the setting `CAM_PHOTOMODE` says: single, burst, bracketing, or a series until it is stopped |
+| one picture | what the setting `CAM_PHOTOMODE` says: single, burst or bracketing; of a series the first picture |
+| a fraction or a negative number of pictures | DENIED |
 | an interval, with 0 or several pictures | a time-lapse; the photo settings of before are restored at its end |
 | sequence number (param4) from 1 | the same number again takes no second photo |
 | without a sequence number | each command takes a photo, unless its `confirmation` is above 0 |

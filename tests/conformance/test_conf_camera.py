@@ -179,6 +179,25 @@ async def test_conf_087_series_counts_and_ends(flavour: str) -> None:
 
 
 @pytest.mark.parametrize("model", ["4k", "ai"])
+async def test_conf_087_one_picture_of_a_series_is_one(model: str) -> None:
+    async with world(model=model, web=True) as w:
+        await enter(w.client, PHOTO)
+        for count in (0.5, -1.0, math.inf):
+            assert await command(w.client, START_PHOTO, 0, 1, count) == DENIED
+        assert (await write(w.client, "CAM_PHOTOMODE", 3.0, 1)).param_result == dialect.PARAM_ACK_ACCEPTED
+        mark = w.client.mark()
+        assert await command(w.client, START_PHOTO, 0, 0, 1) == ACCEPTED
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", since=mark)
+        await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 0 and s.image_count, since=mark)
+        assert not w.drone.firmware.payload.cameras.busy
+        assert [(media.mode, len(media.resources)) for media in photos(w)] == [("TIMELAPSE", 1)]
+        # The limit was that series' alone.
+        assert await command(w.client, START_PHOTO, 0, 0, 0) == ACCEPTED
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", lambda image: image.image_index == 2, timeout=20.0)
+        assert w.drone.firmware.payload.cameras.busy
+
+
+@pytest.mark.parametrize("model", ["4k", "ai"])
 async def test_conf_087_burst_and_bracketing_are_one_message_per_file(model: str) -> None:
     async with world(model=model, web=True) as w:
         await enter(w.client, PHOTO)

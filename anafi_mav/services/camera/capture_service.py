@@ -225,15 +225,17 @@ class CaptureService(Service):
     async def _start_capture(self, command: Command) -> None:
         """MAV_CMD_IMAGE_START_CAPTURE: param2 interval (s), param3 pictures (0: until stopped).
 
-        One picture is what the camera's photo mode means by it: single, burst, bracketing, or a series that continues
-        until it is stopped. Any other number is a time-lapse for as long as it lasts.
+        One picture is what the camera's photo mode means by it: single, burst, bracketing, or the first picture of a
+        series. Any other number is a time-lapse for as long as it lasts.
         """
         require_camera(texts.PHOTO, command.params[0])
         interval, count = _number(command.params[1]), command.params[2]
         if math.isnan(count):
             count = 0.0 if interval > 0.0 else 1.0
-        if interval < 0.0 or not math.isfinite(interval) or count < 0.0 or not math.isfinite(count):
+        if interval < 0.0 or not math.isfinite(interval):
             raise Refused(texts.PHOTO, texts.NEGATIVE, lasting=True)
+        if count < 0.0 or not count.is_integer():  # infinity is none
+            raise Refused(texts.PHOTO, texts.NO_COUNT, lasting=True)
         if count == 1.0:
             await self._photos.take()
             return

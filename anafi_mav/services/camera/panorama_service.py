@@ -94,9 +94,7 @@ class PanoramaService(Service):
             self._require_hovering()
         await vehicle.take_over()
         self._require_hovering()
-        await drone.animations.photo_panorama(
-            panorama_type(wide, high, drone.animations.state.available or ())
-        )
+        await drone.animations.photo_panorama(panorama_type(wide, high, drone.animations.state.available or ()))
         vehicle.select(FlightMode.HOLD, self)
         self._is_active = True
 

@@ -147,7 +147,10 @@ class CommandService(Service):
         return running is not None and running.replaced_by_order
 
     def end_others(self, group: ActionGroup = ActionGroup.FLIGHT) -> list[asyncio.Task[None]]:
-        """Cancel all older running actions of a group, of every component; their senders get CANCELLED."""
+        """Cancel all older running actions of a group, of every component.
+
+        Their senders get CANCELLED.
+        """
         return self._all.end_others(group)
 
     def _receive(self, inbound: Inbound, decode: _Decode) -> None:

@@ -44,9 +44,9 @@ class RunningActions:
         return None if task is None else self.tasks.get(task)
 
     def end_others(self, group: ActionGroup) -> list[asyncio.Task[None]]:
-        """Cancel all actions of a group that are older than the calling one; their senders get CANCELLED.
+        """Cancel all actions of a group that are older than the calling one.
 
-        A newer action than the calling one continues: it will replace this one.
+        Their senders get CANCELLED. A newer action than the calling one continues: it will replace this one.
         """
         task, current = asyncio.current_task(), self.current
         older = itertools.takewhile(lambda other: other is not task, self.tasks)
