@@ -517,6 +517,8 @@ rate goes on to the end of the range or until a rate of 0; ACCEPTED means that t
 
 Each storage has a number from 1: on the Ai 1 is the internal memory and 2 the card. STORAGE_INFORMATION is sent when
 anything of it changes. A removed card is EMPTY, a card that the drone does not accept NOT_SUPPORTED, with a text.
+The one with the flag STORAGE_USAGE_FLAG_SET is written to: the setting `CAM_STORAGE` and the present cards decide.
+`available_capacity` is its free space.
 
 MAV_CMD_STORAGE_FORMAT needs the number where there are two storages. It is refused in flight, while recording and
 while photos are taken, and UNSUPPORTED for a storage that the drone cannot format. It cannot be cancelled.

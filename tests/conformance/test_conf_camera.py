@@ -18,6 +18,7 @@ from support.world import HOME, world
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import camera as camera_messages
 from anafi_mav.arsdk.messages import user_storage
+from anafi_mav.arsdk.messages import user_storage_v2 as v2
 from anafi_mav.arsdk.messages.proto import camera2
 from anafi_mav.arsdk.messages.user_storage import FsState, PhyState
 from anafi_mav.mavlink import dialect
@@ -335,6 +336,26 @@ async def test_conf_092_unusable_storage_is_pushed_and_refuses_photos() -> None:
         w.drone.inject(user_storage.State(PhyState.AVAILABLE, FsState.READY, 0, 1, 5))
         await w.client.wait("STATUSTEXT", lambda m: m.text == "Storage 1: ready", since=mark)
         await shoot(w.client)
+
+
+async def test_conf_092_photo_without_card_goes_to_the_internal_storage() -> None:
+    """The Ai writes to its internal storage without a card, unless its setting forbids that."""
+    async with world(model="ai") as w:
+        await enter(w.client, PHOTO)
+        mark = w.client.mark()
+        absent = v2.PhyState.UNDETECTED
+        w.drone.inject(v2.State(1, absent, v2.FsState.UNKNOWN, 0, 1, 5, "", 0))
+        await w.client.wait("STORAGE_INFORMATION", is_in(dialect.STORAGE_STATUS_EMPTY), since=mark)
+        used = dialect.STORAGE_USAGE_FLAG_SET
+        await w.client.wait("STORAGE_INFORMATION", lambda m: m.storage_id == 1 and m.storage_usage & used, since=mark)
+        status = await request(w.client, "CAMERA_CAPTURE_STATUS")
+        assert status.available_capacity == pytest.approx(8e9 / 2**20, rel=0.1)
+        assert (await shoot(w.client)).capture_result == 1
+        assert await command(w.client, FORMAT, 1, 1) == ACCEPTED
+        assert (await request(w.client, "CAMERA_CAPTURE_STATUS")).image_count == 0
+        assert (await write(w.client, "CAM_STORAGE", 1.0, 1)).param_result == dialect.PARAM_ACK_ACCEPTED
+        assert await command(w.client, START_PHOTO, 0, 0, 1) == DENIED
+        assert "Photo refused: no storage" in texts(w.client, mark)
 
 
 def is_in(status: int) -> Callable[[Any], bool]:
