@@ -16,7 +16,8 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Protocol
 
-from anafi_mav.drone.payload.media_file import UNKNOWN, WRITTEN, Place, Resource, fetch, file_name
+from anafi_mav.drone.payload.media_file import UNKNOWN, Place, Resource, fetch, file_name
+from anafi_mav.drone.payload.media_part import WRITTEN
 from anafi_mav.errors import AnafiMavError, CommandTimeout, LinkLost
 
 TRIES = 6

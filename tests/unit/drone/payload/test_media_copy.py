@@ -5,13 +5,16 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import json
+import os
+import sys
+import threading
 from collections.abc import AsyncGenerator
 from pathlib import Path
 
 import pytest
 
 from anafi_mav.drone.payload.media_copy import TRIES, copy, read_xmp, sidecar, sidecar_of
-from anafi_mav.drone.payload.media_file import Place, Resource
+from anafi_mav.drone.payload.media_file import Place, Resource, fetch
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost, RemoteProtocolError
 
 PHOTO = b"\xff\xd8 a photo \xff\xd9" * 1000
@@ -180,3 +183,34 @@ def test_sidecar_of_unreadable_data_is_unknown(data: bytes) -> None:
     assert told["camera_attitude"] is None
     assert told["time"] is None
     assert json.dumps(told, allow_nan=False)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a pipe stands for the slow disk")
+async def test_cancelled_download_to_blocked_disk_ends_at_once(tmp_path: Path) -> None:
+    """A part that is a pipe takes 64 KiB and then no byte, like a disk that sleeps."""
+    content = bytes(3 << 20)
+    part = tmp_path / f"a.MP4.{'0' * 12}.part"
+    os.mkfifo(part)
+    pipe = os.open(part, os.O_RDONLY | os.O_NONBLOCK)
+    begun, ended, drained = asyncio.Event(), threading.Event(), []
+
+    def drain() -> None:
+        ended.wait(10.0)  # without the mend the event loop waits for this
+        os.set_blocking(pipe, True)
+        with open(pipe, "rb") as reader:
+            drained.append(len(reader.read()))
+
+    loop = asyncio.get_running_loop()
+    loop.add_reader(pipe, begun.set)
+    copying = asyncio.ensure_future(fetch(resource(content, "a.MP4"), tmp_path, Source(content).read_from, "0" * 32))
+    disk = threading.Thread(target=drain)
+    disk.start()
+    await begun.wait()
+    loop.remove_reader(pipe)
+    copying.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await copying
+    assert not drained  # the loop went on while the disk took nothing
+    ended.set()
+    disk.join()
+    assert drained == [len(content)]  # the thread has written the rest and closed the file
