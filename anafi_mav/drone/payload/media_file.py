@@ -23,6 +23,9 @@ _TIME = re.compile(r"[0-9]{8}T[0-9]{6}([+-][0-9]{4}|Z)?")
 
 _TYPES = {"JPG": "image/jpeg", "DNG": "image/x-adobe-dng", "MP4": "video/mp4", "PNG": "image/png"}
 
+MAX_FILE = 1 << 63
+"""Bytes that no file has: offsets of files are signed."""
+
 UNDATED = "undated"
 """Folder of a file without a readable time."""
 
@@ -66,6 +69,11 @@ class Resource(msgspec.Struct, frozen=True):
     width: int | None = None
     height: int | None = None
     gps: Place | None = None
+
+    @property
+    def is_usable(self) -> bool:
+        """True when its id can be a file name and its size that of a file."""
+        return _FILE_NAME.fullmatch(self.resource_id) is not None and 0 <= self.size < MAX_FILE
 
     @property
     def date(self) -> str:
