@@ -17,7 +17,7 @@ from anafi_mav.drone.payload.media_file import Resource
 from anafi_mav.errors import LinkLost, RemoteProtocolError
 
 PIECE = 1 << 17
-"""Bytes of a file that are kept together: four bursts of MAVLink FTP."""
+"""Bytes of a file that are kept together: two bursts of MAVLink FTP."""
 
 KEPT = 32
 """Pieces that are kept of all files: 4 MiB, so that a client can repeat what it has lost."""
