@@ -38,7 +38,7 @@ class PayloadHistory:
         self._turns: dict[ActionGroup, asyncio.Lock] = defaultdict(asyncio.Lock)
 
     def turn(self, group: ActionGroup) -> contextlib.AbstractAsyncContextManager[None]:
-        """Return the lock that an action of an `in_order` group holds while it runs; none for others."""
+        """Return the lock that an action holds while it runs; none unless its group is `in_order`."""
         return self._turns[group] if group.in_order else contextlib.nullcontext()
 
     def retransmission(self, command: Command, now: float) -> int | None:
