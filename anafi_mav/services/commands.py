@@ -168,7 +168,8 @@ class Definition:
     mode: Callable[[Command], FlightMode | None] | None = None
     """The mode that it names, None for one that we do not have. Only for commands that name modes."""
     progress: ProgressPolicy = ProgressPolicy.PROMPT
-    group: ActionGroup = ActionGroup.FLIGHT
+    group: ActionGroup | Callable[[Command], ActionGroup] = ActionGroup.FLIGHT
+    """One for all, or by the command's parameters."""
     offered: Callable[[Flavour], bool] = lambda flavour: True
     """Return True for flavours whose clients have the command."""
     still_holds: Callable[[], bool] = lambda: True
@@ -182,8 +183,8 @@ class Definition:
             raise ValueError(f"MAV_CMD {id}: its z cannot be a height, it has no location")
         if (self.effect is effect_of_mode) != (self.mode is not None):
             raise ValueError(f"MAV_CMD {id}: it must have both mode and `effect_of_mode`, or none of them")
-        is_flight = self.group is ActionGroup.FLIGHT
-        if not is_flight and isinstance(self.effect, Effect) and not self.effect.is_of_payload:
+        may_fly = self.group is ActionGroup.FLIGHT or not isinstance(self.group, ActionGroup)
+        if not may_fly and isinstance(self.effect, Effect) and not self.effect.is_of_payload:
             raise ValueError(f"MAV_CMD {id}: its group has no {self.effect.name}: say if it counts or sets a target")
 
 
@@ -239,6 +240,12 @@ class Command:
         """Effect that it requests."""
         effect = self.definition.effect
         return effect if isinstance(effect, Effect) else effect(self)
+
+    @property
+    def group(self) -> ActionGroup:
+        """Group of actions that it may replace."""
+        group = self.definition.group
+        return group if isinstance(group, ActionGroup) else group(self)
 
     @property
     def mode(self) -> FlightMode | None:
@@ -359,7 +366,7 @@ class CommandHistory:
         and modes that have ended by themselves (`mode` is the vehicle's). A command that another client has replaced
         is neither executed against that client nor confirmed: it is answered with CANCELLED.
         """
-        newest = self._newest.get((client, command.definition.group))
+        newest = self._newest.get((client, command.group))
         if newest is None or not newest.command.same_as(command):
             return None
         if newest.result == dialect.MAV_RESULT_IN_PROGRESS:
@@ -379,7 +386,7 @@ class CommandHistory:
 
     def begin(self, client: Hashable, command: Command) -> Execution:
         """Note that an action begins; this client's next one of its group is compared with it."""
-        key = (client, command.definition.group)
+        key = (client, command.group)
         self._newest.pop(key, None)  # so that the dictionary is in the order of use
         execution = self._newest[key] = Execution(client, command)
         if len(self._newest) > MAX_CLIENTS:

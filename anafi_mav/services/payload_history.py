@@ -62,7 +62,7 @@ class PayloadHistory:
     def begin(self, command: Command) -> Execution:
         """Note that an action begins; it overtakes all others of its group."""
         for other in self._newest.values():
-            if other.command.definition.group is command.definition.group:
+            if other.command.group is command.group:
                 other.overtaken = True
         key = _key(command)
         self._newest.pop(key, None)  # so that the dictionary is in the order of use

@@ -175,7 +175,7 @@ class CommandService(Service):
         # Before it is known whether it is a retransmission: a program that repeats its Hold is to be noticed.
         counted = command.effect is not Effect.HOLD or self.host.vehicle.holds.arrive(command.client, now)
         command = replace(command, at=now, counted=counted, component=self.host.compid)
-        flies = command.definition.group is ActionGroup.FLIGHT
+        flies = command.group is ActionGroup.FLIGHT
         if flies:
             ended_at = self.host.vehicle.landing_ended_at
             repeated = self._history.retransmission(command.client, command, now, mode, ended_at)
@@ -187,7 +187,7 @@ class CommandService(Service):
                 self._acknowledge(inbound, command.id, repeated)
             return
         execution = self._history.begin(command.client, command) if flies else self.host.payload_history.begin(command)
-        running = RunningAction(command.client, (inbound, execution), group=command.definition.group)
+        running = RunningAction(command.client, (inbound, execution), group=command.group)
         self._spawn(self._execute(inbound, execution), running)
 
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:
@@ -205,7 +205,7 @@ class CommandService(Service):
             progress.set_in(LATE_PROGRESS_AFTER if policy is ProgressPolicy.LATE else PROGRESS_AFTER)
         result = dialect.MAV_RESULT_FAILED
         try:
-            async with self.host.payload_history.turn(command.definition.group):
+            async with self.host.payload_history.turn(command.group):
                 await self._actions[command.id].handler(command)
             result = dialect.MAV_RESULT_ACCEPTED
         except AnafiMavError as error:

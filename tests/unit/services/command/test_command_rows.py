@@ -159,10 +159,10 @@ async def test_payload_rows_of_both_components_equal_the_list() -> None:
             continue
         found.add(name)
         group, effects = PAYLOAD_ROWS[name]
-        assert row.group is group, name
         for params, effect in effects.items():
             sent: Any = (*params, *[NAN] * (4 - len(params)))
-            assert Command(id, row, sent, NAN, NAN, NAN, None).effect is effect, (name, params)
+            command = Command(id, row, sent, NAN, NAN, NAN, None)
+            assert (command.group, command.effect) == (group, effect), (name, params)
             assert group is ActionGroup.FLIGHT or effect in PAYLOAD
     assert found == {*PAYLOAD_ROWS}
 
