@@ -78,7 +78,7 @@ class Effect(enum.Enum):
     RETURN = "asks for the way home: when that is flown already, it is carried out again; never cancelled"
     LAPSING = "a mode that ends without another command: asked for after its end, it begins again, or is refused"
     EACH = "counts each time: after its end it is executed again, unless its confirmation says that it is repeated"
-    TARGET = "a target that may be set twice: carried out each time it arrives, and never cancelled"
+    TARGET = "may be set twice: carried out each time, but after another client's command; never cancelled"
     IRREVOCABLE = "cannot be cancelled: the drone does it whatever is sent then, so CANCELLED would be a lie"
 
     @property
@@ -152,7 +152,8 @@ class Definition:
     mode: Callable[[Command], FlightMode | None] | None = None
     """The mode that it names, None for one that we do not have. Only for commands that name modes."""
     progress: ProgressPolicy = ProgressPolicy.PROMPT
-    group: ActionGroup = ActionGroup.FLIGHT
+    group: ActionGroup | Callable[[Command], ActionGroup] = ActionGroup.FLIGHT
+    """One for all, or by the command's parameters."""
     offered: Callable[[Flavour], bool] = lambda flavour: True
     """Return True for flavours whose clients have the command."""
 
@@ -216,6 +217,12 @@ class Command:
         """Effect that it requests."""
         effect = self.definition.effect
         return effect if isinstance(effect, Effect) else effect(self)
+
+    @property
+    def group(self) -> ActionGroup:
+        """Group of actions that it may replace."""
+        group = self.definition.group
+        return group if isinstance(group, ActionGroup) else group(self)
 
     @property
     def mode(self) -> FlightMode | None:
@@ -315,11 +322,12 @@ class CommandHistory:
         """Return the MAV_RESULT that answers a retransmission; None: execute the command.
 
         These may be executed twice: commands that stop something always, except a landing that another client has
-        ended (`landing_ended_at` is when a client last ended one); a return while no other client has replaced it;
+        ended (`landing_ended_at` is when a client last ended one); a return and a target while no other client has
+        replaced it;
         and modes that have ended by themselves (`mode` is the vehicle's). A command that another client has replaced
         is neither executed against that client nor confirmed: it is answered with CANCELLED.
         """
-        newest = self._newest.get((client, command.definition.group))
+        newest = self._newest.get((client, command.group))
         if newest is None or not newest.command.same_as(command):
             return None
         if newest.result == dialect.MAV_RESULT_IN_PROGRESS:
@@ -328,7 +336,8 @@ class CommandHistory:
         if effect is Effect.EACH and not command.confirmation:
             return None
         landing_ended = effect is Effect.LAND and newest.superseded and landing_ended_at >= newest.ended
-        if effect.is_repeatable and not landing_ended:
+        target_replaced = effect is Effect.TARGET and newest.superseded
+        if effect.is_repeatable and not (landing_ended or target_replaced):
             return None
         succeeded = newest.result in (dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_CANCELLED)
         if now - newest.ended >= (RESEND_WINDOW if succeeded else REFUSAL_WINDOW):
@@ -340,7 +349,7 @@ class CommandHistory:
 
     def begin(self, client: Hashable, command: Command) -> Execution:
         """Note that an action begins; this client's next one of its group is compared with it."""
-        key = (client, command.definition.group)
+        key = (client, command.group)
         self._newest.pop(key, None)  # so that the dictionary is in the order of use
         execution = self._newest[key] = Execution(client, command)
         if len(self._newest) > MAX_CLIENTS:

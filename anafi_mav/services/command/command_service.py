@@ -203,7 +203,7 @@ class CommandService(Service):
                 self._acknowledge(inbound, command.id, repeated)
             return
         execution = self._history.begin(command.client, command)
-        running = _Running(command.client, (inbound, execution), group=command.definition.group)
+        running = _Running(command.client, (inbound, execution), group=command.group)
         self._spawn(self._execute(inbound, execution), running)
 
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:
