@@ -69,8 +69,11 @@ def state_in_use(folder: Path, holder: Holder) -> ConfigError:
 
 
 def download_folder(media: MediaConfig) -> Path | None:
-    """Return the folder for copies of media; None: they are not copied."""
-    return None if media.download_folder is None else Path(media.download_folder).expanduser()
+    """Return the folder for copies of media; None: they are not copied. Raises `ConfigError`."""
+    try:
+        return None if media.download_folder is None else Path(media.download_folder).expanduser()
+    except RuntimeError as error:  # no such home
+        raise ConfigError("media.download_folder", f"expected the path of a folder: {error}") from error
 
 
 class _Supervised:

@@ -467,6 +467,7 @@ The camera is component 100 of each drone's system, in every flavour. Its settin
 |---|---|
 | photo in video mode, recording in photo mode | TEMPORARILY_REJECTED to component 100: change the mode first |
 | the same to component 1 (ArduPilot flavour, and the older commands) | the mode is changed first |
+| photo mode while the thermal or blended picture is shown | TEMPORARILY_REJECTED: that camera only records |
 | change of mode while it records or takes photos | TEMPORARILY_REJECTED |
 | no card, or one that cannot be used | DENIED with a text; TEMPORARILY_REJECTED while it is checked or formatted |
 
@@ -474,7 +475,8 @@ The camera is component 100 of each drone's system, in every flavour. Its settin
 
 | MAV_CMD_IMAGE_START_CAPTURE | effect |
 |---|---|
-| one picture | what the setting `CAM_PHOTOMODE` says: single, burst, bracketing, or a series until it is stopped |
+| one picture | what the setting `CAM_PHOTOMODE` says: single, burst or bracketing; of a series the first picture |
+| a fraction or a negative number of pictures | DENIED |
 | an interval, with 0 or several pictures | a time-lapse; the photo settings of before are restored at its end |
 | sequence number (param4) from 1 | the same number again takes no second photo |
 | without a sequence number | each command takes a photo, unless its `confirmation` is above 0 |
@@ -493,6 +495,8 @@ Photos of the history are requested by index (param2), by range (param2 to param
 time; 2000 are kept until the gateway ends. Their places and orientations are not kept over a restart of the
 gateway. The index goes on, and begins again only after a format. MAVSDK requests missing photos; an index that does
 not exist is DENIED.
+
+Photos that are taken while the drone's link is lost are not reported.
 
 PANORAMA_CREATE takes one of Parrot's panoramas: from 360 deg the spherical one, from 180 deg the horizontal or
 vertical one, below it the super wide one where the drone has it. It turns the drone, so the drone must hover; any
@@ -513,6 +517,8 @@ rate goes on to the end of the range or until a rate of 0; ACCEPTED means that t
 
 Each storage has a number from 1: on the Ai 1 is the internal memory and 2 the card. STORAGE_INFORMATION is sent when
 anything of it changes. A removed card is EMPTY, a card that the drone does not accept NOT_SUPPORTED, with a text.
+The one with the flag STORAGE_USAGE_FLAG_SET is written to: the setting `CAM_STORAGE` and the present cards decide.
+`available_capacity` is its free space.
 
 MAV_CMD_STORAGE_FORMAT needs the number where there are two storages. It is refused in flight, while recording and
 while photos are taken, and UNSUPPORTED for a storage that the drone cannot format. It cannot be cancelled.

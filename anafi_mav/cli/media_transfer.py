@@ -78,6 +78,7 @@ async def delete_media(arguments: argparse.Namespace) -> int:
         if files and not arguments.yes:
             size = sum(file.size for file in files) / 1e6
             if not consent.confirmed(f"delete {len(files)} files ({size:.1f} MB) on the drone?"):
+                complain("no file deleted", style="yellow")
                 return 1
         for file in files:
             await client.delete_resource(file.resource_id)

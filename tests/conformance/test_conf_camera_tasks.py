@@ -134,6 +134,9 @@ async def test_camera_source_chooses_the_shown_picture(model: str) -> None:
         await enter(w.client, VIDEO)
         assert await command(w.client, dialect.MAV_CMD_VIDEO_START_CAPTURE, 0, 0) == ACCEPTED
         assert await command(w.client, SOURCE, 0, dialect.CAMERA_SOURCE_IR, 0) == REJECTED
+        assert await command(w.client, dialect.MAV_CMD_VIDEO_STOP_CAPTURE, 0) == ACCEPTED
+        assert await command(w.client, SOURCE, 0, dialect.CAMERA_SOURCE_IR, 1) == ACCEPTED
+        assert await command(w.client, dialect.MAV_CMD_SET_CAMERA_MODE, 0, PHOTO) == REJECTED
 
 
 async def test_camera_source_of_a_model_without_thermal_camera_is_unsupported() -> None:
@@ -213,6 +216,28 @@ async def test_panorama_turns_the_hovering_drone_and_hold_ends_it() -> None:
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 15.0, 30.0)
 
 
+async def test_panorama_overtakes_no_newer_flight_command() -> None:
+    """Both are sent at once while the camera has to change its mode first."""
+    async with world(web=True, clients=2) as w:
+        other = w.clients[1]
+        await w.take_off(10.0)
+        for id, params, others in (
+            (dialect.MAV_CMD_DO_SET_MODE, (1, 4, 3), {}),
+            (dialect.MAV_CMD_DO_REPOSITION, (-1, 1), {"x": HOME[0] + 2e-4, "y": HOME[1], "z": 10.0, "frame": 6}),
+            (dialect.MAV_CMD_NAV_LAND, (), {}),
+        ):
+            await enter(w.client, VIDEO)
+            mark = w.client.mark()
+            w.client.send_command(PANORAMA, 180, 0, target=(1, CAMERA))
+            assert (await other.command(id, *params, **others)).result == ACCEPTED
+            ack = await w.client.wait("COMMAND_ACK", lambda a: a.command == PANORAMA and a.result != 5, since=mark)
+            assert ack.result == dialect.MAV_RESULT_CANCELLED
+            if id == dialect.MAV_CMD_DO_REPOSITION:
+                await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 15.0, 30.0)
+        await w.drone.wait_log(lambda e: e.name.endswith("FlyingStateChanged") and "LANDED" in str(e.args), 30.0)
+        assert not [entry for entry in w.drone.log if entry.name.startswith("animation.start")]
+
+
 @both
 @pytest.mark.parametrize("model", ["4k", "thermal", "usa", "ai"])
 async def test_conf_009_payload_commands_are_those_of_the_page(flavour: str, model: str) -> None:
@@ -228,3 +253,24 @@ async def test_conf_009_payload_commands_are_those_of_the_page(flavour: str, mod
                     is_done = False
                 ack = await w.client.command(id, NAN, NAN, NAN, NAN, target=(1, component.compid), timeout=20.0)
                 assert (ack.result != UNSUPPORTED, ack.get_srcComponent()) == (is_done, component.compid), name
+
+
+async def test_geotag_is_that_of_the_picture_while_the_video_runs() -> None:
+    async with world(web=True, speed=1.0, video_latency=0.1) as w:
+        await w.take_off(8.0)
+        await enter(w.client, PHOTO)
+        mark = w.client.mark()
+        exposure = dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE
+        assert (await w.client.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, exposure, 1e6)).result == ACCEPTED
+        await w.client.wait("ANAFI_CAMERA_EXPOSURE", since=mark, timeout=10.0)
+        turned = dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW  # held to the body, which pitches as it accelerates
+        assert (await w.client.command(turned, -40, NAN, x=0.0, z=0.0)).result == ACCEPTED
+        w.client.send_command(dialect.MAV_CMD_DO_REPOSITION, 6, 1, x=HOME[0] + 3e-4, y=HOME[1], z=12.0, frame=6)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 6.0, 20.0)
+        image = await shoot(w.client)
+        scene = photos(w)[0].resources[0].scene
+        w0, x, y, z = image.q
+        pitch = math.degrees(math.asin(2 * (w0 * y - z * x)))
+        assert pitch == pytest.approx(scene.pitch, abs=1.0)
+        assert abs(scene.pitch + 40.0) > 5.0
+        assert image.alt / 1e3 == pytest.approx(scene.altitude, abs=0.4)

@@ -26,6 +26,7 @@ AT_CONNECTION = {
     "common.Common.CurrentDateTime",
     "common.Common.AllStates",
     "common.Settings.AllSettings",
+    "user_storage.start_monitoring",
 }
 """What a connection begins with: no order to do anything."""
 

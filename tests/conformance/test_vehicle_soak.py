@@ -1,6 +1,7 @@
 """A hundred rounds of random flight through MAVLink, judged by the simulated drone's log (`support.soak`).
 
-The seeds are fixed: a red suite is no matter of luck. `tests/bench/soak.py` flies others, and one of these alone.
+The seeds are fixed: a red suite is no matter of luck. The default run flies the first half. `tests/bench/soak.py` flies
+other seeds, and one of these alone.
 """
 
 from __future__ import annotations
@@ -16,12 +17,19 @@ pytestmark = pytest.mark.soak
 
 ROUNDS, GROUP = 100, 10
 
+BY_DEFAULT = 50
+"""Rounds of the default run: some 20 s of processor time."""
+
+GROUPS = [
+    pytest.param(first, marks=[pytest.mark.full] if first >= BY_DEFAULT else []) for first in range(0, ROUNDS, GROUP)
+]
+
 KNOWN: dict[int, str] = {}
 """Seeds whose round shows a defect that `support.soak.DEFECTS` cannot recognise, with the reason."""
 
 
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize("first", range(0, ROUNDS, GROUP))
+@pytest.mark.parametrize("first", GROUPS)
 async def test_rounds_of_random_flight_keep_every_promise(
     first: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

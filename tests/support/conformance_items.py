@@ -115,6 +115,8 @@ ITEMS: dict[int, Item] = {
     91: Item("VIDEO_STREAM_INFORMATION of each stream and of all; each URI opens once its stream is shown"),
     92: Item("STORAGE_INFORMATION per storage, pushed"),
     93: Item("format erases, resets the index, and is refused when it must be"),
+    94: Item("camera definition: every option set, and read back from the drone", NEITHER),
+    95: Item("extended parameters: list, read, set, each acknowledgement", NEITHER),
     96: Item("what the pilot changes reaches every client"),
     97: Item("zoom by range, step and rate; focus UNSUPPORTED"),
     98: Item("the gimbal is device 1 of component 1: 280, 281, 283, 285"),
@@ -170,5 +172,5 @@ ITEMS: dict[int, Item] = {
     155: Item("LINK_NODE_STATUS, ONBOARD_COMPUTER_STATUS on request", NEITHER),
     156: Item("the standard flavour connects and takes off", NEITHER),
 }
-"""In scope so far, by number. Missing: 94, 95 (definition), 139 (gimbal),
+"""In scope so far, by number. Missing: 139 (gimbal),
 123, 124, 144, 145, 151, 152 (fleet)."""

@@ -17,7 +17,7 @@ from anafi_mav.drone.payload.media_file import Resource
 from anafi_mav.errors import LinkLost, RemoteProtocolError
 
 PIECE = 1 << 17
-"""Bytes of a file that are kept together: four bursts of MAVLink FTP."""
+"""Bytes of a file that are kept together: two bursts of MAVLink FTP."""
 
 KEPT = 32
 """Pieces that are kept of all files: 4 MiB, so that a client can repeat what it has lost."""
@@ -207,8 +207,6 @@ class _Read:
     async def _run(self) -> None:
         try:
             await self._read()
-        except asyncio.TimeoutError:  # no reader wants more
-            pass
         except Exception as error:
             self.problem = error
         finally:
@@ -229,7 +227,10 @@ class _Read:
                         return
                     while self.next > self._wanted + AHEAD:
                         self._more.clear()
-                        await asyncio.wait_for(self._more.wait(), IDLE)
+                        try:
+                            await asyncio.wait_for(self._more.wait(), IDLE)
+                        except asyncio.TimeoutError:  # no reader wants more
+                            return
         ended = self.next * PIECE + len(buffer)
         raise RemoteProtocolError(f"{self.resource.resource_id}: the answer ended at byte {ended}")
 

@@ -44,6 +44,9 @@ LEVEL_GROUND = math.radians(0.5)
 ZOOM_STEP = 1.25
 """Ratio of one step of the zoom: a range of 3 is five steps."""
 
+MAX_STEPS = 100.0
+"""Steps of zoom in one command: more than any camera has."""
+
 MODES = {
     CameraMode.PHOTO: dialect.CAMERA_MODE_IMAGE,
     CameraMode.RECORDING: dialect.CAMERA_MODE_VIDEO,
@@ -115,6 +118,11 @@ def zoom_percent(camera: CameraState) -> float:
 def zoom_factor(camera: CameraState, percent: float) -> float:
     """Return the zoom factor of a share of its range, %; the inverse of `zoom_percent`."""
     return 1.0 + units.clip(percent, 0.0, 100.0) / 100.0 * ((camera.zoom_max or 1.0) - 1.0)
+
+
+def stepped_zoom(camera: CameraState, steps: float) -> float:
+    """Return the zoom factor after some steps in, or out where `steps` is negative."""
+    return (camera.zoom or 1.0) * math.pow(ZOOM_STEP, units.clip(steps, -MAX_STEPS, MAX_STEPS))
 
 
 def settings(drone: Drone, times: Times) -> dialect.MAVLink_message | None:

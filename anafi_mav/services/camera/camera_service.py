@@ -119,7 +119,7 @@ class CameraService(Service):
                 self._set_mode,
                 location=False,
                 altitude=Altitude.UNUSED,
-                effect=Effect.CHANGE,
+                effect=Effect.IRREVOCABLE,
                 group=ActionGroup.CAMERA,
             ),
             dialect.MAV_CMD_RESET_CAMERA_SETTINGS: Action(
@@ -165,8 +165,10 @@ class CameraService(Service):
         camera = drone.camera[drone.camera.active_id]
         if camera.modes is None:
             raise Refused(texts.CAMERA_MODE, texts.CAMERA_UNKNOWN)
-        if wanted is None or wanted not in camera.modes:
+        if wanted is None:
             raise Refused(texts.CAMERA_MODE, texts.NO_SUCH_MODE, lasting=True)
+        if wanted not in camera.modes:  # the thermal camera only records
+            raise Refused(texts.CAMERA_MODE, texts.CAMERA_LACKS_MODE)
         if camera.mode is not wanted:
             require_free(self.host.vehicle, texts.CAMERA_MODE)
             require_idle(drone, texts.CAMERA_MODE)
@@ -196,7 +198,7 @@ class CameraService(Service):
         if kind == dialect.ZOOM_TYPE_CONTINUOUS:
             await drone.camera.start_zoom(value, id)
         elif kind == dialect.ZOOM_TYPE_STEP:
-            await drone.camera.zoom((camera.zoom or 1.0) * camera_messages.ZOOM_STEP**value, id)
+            await drone.camera.zoom(camera_messages.stepped_zoom(camera, value), id)
         else:
             await drone.camera.zoom(camera_messages.zoom_factor(camera, value), id)
         self._send_settings()
@@ -258,10 +260,8 @@ SINGLE = PhotoSettings(mode=PhotoMode.SINGLE, format=PhotoFormat.FULL_FRAME, fil
 
 
 def _effect_of_zoom(command: Command) -> Effect:
-    """A step counts each time; a rate of 0 is a stop."""
-    if command.params[0] == dialect.ZOOM_TYPE_STEP:
-        return Effect.EACH
-    return Effect.STOP if command.params[1] == 0.0 else Effect.CHANGE
+    """A step counts each time; a factor or a rate may be set twice."""
+    return Effect.EACH if command.params[0] == dialect.ZOOM_TYPE_STEP else Effect.TARGET
 
 
 def _thermal_range(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:

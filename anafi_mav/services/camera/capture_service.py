@@ -19,8 +19,14 @@ from anafi_mav.drone.payload.camera_state import CaptureProgress
 from anafi_mav.drone.payload.storage import Storage
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
-from anafi_mav.services.camera.camera_messages import MEBIBYTE, ZOOM_STEP, zoom_factor
-from anafi_mav.services.camera.camera_targets import is_at_autopilot, require_camera, require_free, require_storage
+from anafi_mav.services.camera.camera_messages import MEBIBYTE, stepped_zoom, zoom_factor
+from anafi_mav.services.camera.camera_targets import (
+    is_at_autopilot,
+    media_storage,
+    require_camera,
+    require_free,
+    require_storage,
+)
 from anafi_mav.services.camera.photo_control import PhotoControl
 from anafi_mav.services.camera.photo_reporter import PhotoReporter
 from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect
@@ -52,6 +58,8 @@ class CaptureService(Service):
         """A stop waits for the answer to the start before it."""
         self._recording_since: float | None = None
         """When the recording under way began (s, monotonic)."""
+        self._recording_failure = ""
+        """Reason of a reported error; the recording may continue nevertheless."""
         self._sent: _Status | None = None
         """Content of the last CAMERA_CAPTURE_STATUS to all."""
         self._rates: dict[Channel, tuple[float, float]] = {}
@@ -63,7 +71,7 @@ class CaptureService(Service):
         self._reporter.link_up()
         self._photos.link_up()
         self._recordings = asyncio.Lock()
-        self._recording_since = self._found_recording(self.host.clock.monotonic())
+        self._recording_since, self._recording_failure = self._found_recording(self.host.clock.monotonic()), ""
         self._sent = self._status()
 
     def link_down(self) -> None:
@@ -109,19 +117,26 @@ class CaptureService(Service):
         update = Camera.recording_update(message)
         if update is None:
             return
-        ran = self._recording_since is not None
-        if update.progress is CaptureProgress.STARTED and not ran:
-            self._recording_since = now
-        elif update.progress in (CaptureProgress.ENDED, CaptureProgress.FAILED):
-            if update.reason and ran:
-                self.host.text(Severity.WARNING, texts.RECORDING_ENDED.fill(reason=update.reason))
-            if update.progress is CaptureProgress.ENDED:
-                self._recording_since = None
+        if update.progress is CaptureProgress.STARTED:
+            self._recording_failure = ""
+            if self._recording_since is None:
+                self._recording_since = now
+        elif update.progress is CaptureProgress.FAILED:
+            self._recording_failure = update.reason
+        elif update.progress is CaptureProgress.ENDED:
+            self._end_recording(update.reason)
         self._send_changed()
+
+    def _end_recording(self, reason: str) -> None:
+        """Note the end of the recording; `reason` of one that no command has ended, else empty."""
+        if reason and self._recording_since is not None:
+            self.host.text(Severity.WARNING, texts.RECORDING_ENDED.fill(reason=reason))
+        self._recording_since, self._recording_failure = None, ""
 
     def _on_formatted(self, message: events.Message, now: float) -> None:
         """Begin the index again when the storage for media was formatted."""
-        if Storage.formatted(message) == self.host.drone.storage.main:
+        formatted = Storage.formatted(message)
+        if formatted is not None and formatted == media_storage(self.host.drone):
             self._reporter.reset()
             self._send_changed()
 
@@ -130,7 +145,7 @@ class CaptureService(Service):
         if self._recording_since is None:
             self._recording_since = self._found_recording(now)
         elif not self._records:
-            self._recording_since = None
+            self._end_recording(self._recording_failure)
         self._send_changed()
         for channel, (interval, due) in tuple(self._rates.items()):
             if not self._records:
@@ -167,7 +182,9 @@ class CaptureService(Service):
         since, elapsed = self._recording_since, 0
         if since is not None and records:
             elapsed = max(1, round((self.host.clock.monotonic() - since) * 1e3)) & 0xFFFFFFFF
-        free = vehicle.drone.storage[vehicle.drone.storage.main].available
+        id = media_storage(vehicle.drone)
+        storage = None if id is None else vehicle.drone.storage[id]
+        free = 0 if storage is None or storage.physical == events.PhyState.UNDETECTED else storage.available
         available = math.nan if free is None else free / MEBIBYTE
         return dialect.MAVLink_camera_capture_status_message(
             times.boot_ms, status, int(records), interval, elapsed, available, count, 0
@@ -216,15 +233,17 @@ class CaptureService(Service):
     async def _start_capture(self, command: Command) -> None:
         """MAV_CMD_IMAGE_START_CAPTURE: param2 interval (s), param3 pictures (0: until stopped).
 
-        One picture is what the camera's photo mode means by it: single, burst, bracketing, or a series that continues
-        until it is stopped. Any other number is a time-lapse for as long as it lasts.
+        One picture is what the camera's photo mode means by it: single, burst, bracketing, or the first picture of a
+        series. Any other number is a time-lapse for as long as it lasts.
         """
         require_camera(texts.PHOTO, command.params[0])
         interval, count = _number(command.params[1]), command.params[2]
         if math.isnan(count):
             count = 0.0 if interval > 0.0 else 1.0
-        if interval < 0.0 or not math.isfinite(interval) or count < 0.0 or not math.isfinite(count):
+        if interval < 0.0 or not math.isfinite(interval):
             raise Refused(texts.PHOTO, texts.NEGATIVE, lasting=True)
+        if count < 0.0 or not count.is_integer():  # infinity is none
+            raise Refused(texts.PHOTO, texts.NO_COUNT, lasting=True)
         if count == 1.0:
             await self._photos.take()
             return
@@ -246,14 +265,14 @@ class CaptureService(Service):
     async def _digicam(self, command: Command) -> None:
         """MAV_CMD_DO_DIGICAM_CONTROL: param2 zoom (%), param3 steps of zoom, param5 1 takes a photo."""
         zoom, steps, shoot = _number(command.params[1]), _number(command.params[2]), _number(command.x)
-        if not (math.isfinite(zoom) and abs(steps) <= MAX_STEPS):
+        if not (math.isfinite(zoom) and math.isfinite(steps)):
             raise Refused(texts.ZOOM, texts.NUMBER_MISSING, lasting=True)
         drone = self.host.drone
         id = drone.camera.active_id
         if zoom > 0.0 or steps != 0.0:
             require_free(self.host.vehicle, texts.ZOOM)
             camera = drone.camera[id]
-            factor = zoom_factor(camera, zoom) if zoom > 0.0 else (camera.zoom or 1.0) * ZOOM_STEP**steps
+            factor = zoom_factor(camera, zoom) if zoom > 0.0 else stepped_zoom(camera, steps)
             await drone.camera.zoom(factor, id)
         if shoot == 1.0:
             await self._photos.enter(CameraMode.PHOTO, texts.PHOTO)
@@ -331,10 +350,6 @@ class CaptureService(Service):
             return
         await self._photos.enter(CameraMode.RECORDING, texts.RECORDING)
         await self._record()
-
-
-MAX_STEPS = 100.0
-"""Steps of zoom in one command: more than any camera has."""
 
 
 def _action(

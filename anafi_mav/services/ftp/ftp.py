@@ -44,8 +44,8 @@ Clients that number their sessions themselves (MAVSDK's is always 0) may have lo
 restarted; a session that is being read is not closed under its reader, which would get the wrong file.
 """
 
-BURST_PARTS = 128
-"""Parts of one burst, some 30 KB.
+BURST_PARTS = 256
+"""Parts of one burst, some 60 KB: as many as a client's socket holds (Linux: 208 KiB, 768 bytes for each).
 
 The client requests the next burst, which shows that it is still connected.
 """
@@ -187,6 +187,8 @@ class _Session:
     """Sequence number of the request that created its file."""
     used: float = 0.0
     """Time of its client's last request."""
+    sent: float = 0.0
+    """Time of the last part of a burst."""
     burst_seq: int = 0
     """Sequence number of the next part."""
     burst_offset: int = 0
@@ -333,21 +335,25 @@ class FtpServer:
             replies.append(self._reply(client, request, answer))
         return replies
 
-    def burst(self, who: Hashable) -> bytes | None:
-        """Return the next part of this client's burst; None when none is due."""
+    def burst(self, who: Hashable, now: float) -> bytes | None:
+        """Return the next part of this client's burst; None when none is due.
+
+        It keeps the session open: on a slow line a burst takes longer than `SESSION_TIMEOUT`.
+        """
         client = self._clients.get(who)
         if client is None:
             return None
         for number, session in client.sessions.items():
             if session.state is State.BURSTING:
+                session.sent = now
                 return self._part(number, session)
         return None
 
     def expire(self, now: float) -> None:
-        """Close the sessions that no client has used for `SESSION_TIMEOUT`."""
+        """Close the sessions that were not used, and have sent nothing, for `SESSION_TIMEOUT`."""
         for who, client in list(self._clients.items()):
             for number, session in list(client.sessions.items()):
-                if now - session.used >= SESSION_TIMEOUT:
+                if now - max(session.used, session.sent) >= SESSION_TIMEOUT:
                     self._close(client, number, Event.EXPIRE)
             if not client.sessions and not client.waits and now - client.seen >= SESSION_TIMEOUT:
                 del self._clients[who]

@@ -121,7 +121,7 @@ class FtpService(Service):
 
     def _burst(self, who: Hashable, inbound: Inbound) -> Iterator[dialect.MAVLink_message]:
         """Yield the remaining messages of a burst."""
-        while (part := self._server.burst(who)) is not None:
+        while (part := self._server.burst(who, self.host.clock.monotonic())) is not None:
             yield _message(part, inbound)
 
     # Metadata.

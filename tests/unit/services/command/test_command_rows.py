@@ -63,7 +63,7 @@ ROWS: dict[str, tuple[bool, Altitude, object, ProgressPolicy]] = {
     "IMAGE_STOP_CAPTURE": (False, Altitude.UNUSED, Effect.STOP, ProgressPolicy.PROMPT),
     "PANORAMA_CREATE": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),
     "RESET_CAMERA_SETTINGS": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),
-    "SET_CAMERA_MODE": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "SET_CAMERA_MODE": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),
     "SET_CAMERA_SOURCE": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),
     "SET_CAMERA_ZOOM": (False, Altitude.UNUSED, BY_PARAMETER, ProgressPolicy.PROMPT),
     "STORAGE_FORMAT": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),

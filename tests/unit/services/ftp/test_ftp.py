@@ -156,7 +156,7 @@ def test_bursts() -> None:
     b = Bench()
     b.ask(request(Opcode.OPEN_FILE_RO, b"/data.bin", seq=0))
     parts = [b.ask(request(Opcode.BURST_READ_FILE, seq=4, size=100, offset=24))]
-    while (part := b.server.burst("a")) is not None:
+    while (part := b.server.burst("a", 0.0)) is not None:
         parts.append(Reply(part))
     assert b"".join(part.data for part in parts) == CONTENT[24:]
     assert [part.seq for part in parts] == list(range(5, 15))
@@ -172,10 +172,24 @@ def test_a_burst_ends_after_a_while() -> None:
     server = FtpServer()
     server.receive("a", request(Opcode.OPEN_FILE_RO, b"/long"), long, 0.0)
     parts = [Reply(server.receive("a", request(Opcode.BURST_READ_FILE, size=DATA), long, 0.0))]
-    while (part := server.burst("a")) is not None:
+    while (part := server.burst("a", 0.0)) is not None:
         parts.append(Reply(part))
     assert len(parts) == BURST_PARTS
     assert [part.complete for part in parts][-2:] == [0, 1]
+
+
+def test_burst_slower_than_the_timeout_keeps_its_session() -> None:
+    b = Bench()
+    b.ask(request(Opcode.OPEN_FILE_RO, b"/data.bin"))
+    b.ask(request(Opcode.BURST_READ_FILE, seq=2, size=200))
+    for _ in range(5):
+        b.now += SESSION_TIMEOUT / 2
+        assert b.server.burst("a", b.now) is not None
+        b.server.expire(b.now)
+    assert b.server.sessions == 1
+    assert not b.server.bursting("a")
+    b.server.expire(b.now + SESSION_TIMEOUT)
+    assert b.server.sessions == 0
 
 
 @pytest.mark.parametrize("interruption", [Opcode.TERMINATE_SESSION, Opcode.RESET_SESSIONS, Opcode.READ_FILE])
@@ -184,7 +198,7 @@ def test_burst_ends_on_each_of_these_requests(interruption: Opcode) -> None:
     b.ask(request(Opcode.OPEN_FILE_RO, b"/data.bin"))
     b.ask(request(Opcode.BURST_READ_FILE, seq=2, size=10))
     b.ask(request(interruption, seq=4, size=5))
-    assert b.server.burst("a") is None
+    assert b.server.burst("a", 0.0) is None
 
 
 def test_an_empty_file() -> None:
@@ -437,7 +451,7 @@ def test_late_read_and_burst_are_answered_with_their_bytes() -> None:
     wait = b.ask(request(Opcode.BURST_READ_FILE, seq=6, size=100, offset=24))
     assert not b.server.bursting("a")
     parts = b.finish(wait, CONTENT[24:])
-    while (part := b.server.burst("a")) is not None:
+    while (part := b.server.burst("a", 0.0)) is not None:
         parts.append(Reply(part))
     assert b"".join(part.data for part in parts) == CONTENT[24:]
     assert [part.complete for part in parts] == [0] * 9 + [1]
@@ -531,7 +545,7 @@ def test_no_bytes_break_it() -> None:
         who = rng.randrange(50)
         answer = server.receive(who, payload, files, step * 0.01)
         assert answer is None or len(answer) == PAYLOAD
-        part = server.burst(who)
+        part = server.burst(who, 0.0)
         assert part is None or len(part) == PAYLOAD
         if step % 100 == 0:
             server.expire(step * 0.01)
