@@ -87,7 +87,7 @@ class Effect(enum.Enum):
     RETURN = "asks for the way home: when that is flown already, it is carried out again; never cancelled"
     LAPSING = "a mode that ends without another command: asked for after its end, it begins again, or is refused"
     EACH = "counts each time: after its end it is executed again, unless its confirmation says that it is repeated"
-    TARGET = "a target that may be set twice: carried out each time it arrives, and never cancelled"
+    TARGET = "may be set twice: carried out each time, in flight not after another client's command; never cancelled"
     NUMBERED = "counts, and its sender numbers it: the same number is no new one, whatever was commanded since"
     ONCE = "counts: answered, not repeated, until another action of its group began or what it did no longer holds"
     IRREVOCABLE = "cannot be cancelled: the drone does it whatever is sent then, so CANCELLED would be a lie"
@@ -362,7 +362,8 @@ class CommandHistory:
         """Return the MAV_RESULT that answers a retransmission; None: execute the command.
 
         These may be executed twice: commands that stop something always, except a landing that another client has
-        ended (`landing_ended_at` is when a client last ended one); a return while no other client has replaced it;
+        ended (`landing_ended_at` is when a client last ended one); a return and a target while no other client has
+        replaced it;
         and modes that have ended by themselves (`mode` is the vehicle's). A command that another client has replaced
         is neither executed against that client nor confirmed: it is answered with CANCELLED.
         """
@@ -375,7 +376,8 @@ class CommandHistory:
         if effect is Effect.EACH and not command.confirmation:
             return None
         landing_ended = effect is Effect.LAND and newest.superseded and landing_ended_at >= newest.ended
-        if effect.is_repeatable and not landing_ended:
+        target_replaced = effect is Effect.TARGET and newest.superseded
+        if effect.is_repeatable and not (landing_ended or target_replaced):
             return None
         if not is_in_window(newest, now):
             return None

@@ -29,6 +29,7 @@ from support.world import World, world
 
 from anafi_mav import units
 from anafi_mav.arsdk.messages.gimbal import Axis, AxisLockState
+from anafi_mav.drone import Aim
 from anafi_mav.mavlink import dialect as newer
 from anafi_mav.sim.world.faults import Impairment
 
@@ -390,3 +391,44 @@ async def test_conf_103_yaw_has_one_frame_and_agrees_with_the_heading() -> None:
         pitch_lock = dialect.GIMBAL_DEVICE_FLAGS_PITCH_LOCK
         await w.client.wait("GIMBAL_DEVICE_ATTITUDE_STATUS", lambda m: not m.flags & pitch_lock)
         assert truth(w).pitch_relative == pytest.approx(-20.0, abs=0.5)
+
+
+async def test_neutral_is_carried_out_again_after_the_gimbal_has_left_it() -> None:
+    async with world() as w:
+
+        def neutral() -> None:
+            flags = LEVEL | dialect.GIMBAL_MANAGER_FLAGS_NEUTRAL
+            w.client.send(dialect.MAVLink_gimbal_manager_set_attitude_message(1, 1, flags, 1, [NAN] * 4, *[NAN] * 3))
+
+        async def flagged(expected: bool) -> None:
+            bit = dialect.GIMBAL_DEVICE_FLAGS_NEUTRAL
+            await w.client.wait("GIMBAL_DEVICE_ATTITUDE_STATUS", lambda m: bool(m.flags & bit) is expected)
+
+        assert await angles(w, -30.0) == ACCEPTED
+        neutral()
+        await looks(w, pitch_absolute=0.0)
+        neutral()  # one of a stream
+        await flagged(True)
+        for _ in range(5):  # until the drone has reported that it rests
+            await next_truth(w)
+        assert len(w.commands("gimbal.reset_orientation")) == 1
+        await w.gateway.systems[0].drone.gimbal.point(pitch=Aim(-40.0))  # by other means than MAVLink
+        await flagged(False)
+        neutral()
+        await looks(w, pitch_absolute=0.0)
+        assert len(w.commands("gimbal.reset_orientation")) == 2
+
+
+async def test_secondary_client_and_mount_mode_need_control() -> None:
+    async with world() as w:
+        other = await w.connect(254, 190)
+        assert (await w.client.command(CONFIGURE, -1, -1, -2, -2)).result == REJECTED
+        status = await request(w.client, STATUS, "GIMBAL_MANAGER_STATUS")
+        assert (status.primary_control_sysid, status.secondary_control_sysid) == (0, 0)
+        beat(w.client)
+        assert (await w.client.command(CONFIGURE, -2, -2, -1, -1)).result == ACCEPTED
+        other.send(dialect.MAVLink_mount_configure_message(1, 1, dialect.MAV_MOUNT_MODE_GPS_POINT, 1, 1, 1))
+        await other.wait("STATUSTEXT", lambda m: m.text == "Gimbal refused: system 255 has control", since=0)
+        # The owner's MOUNT_CONTROL still means angles.
+        w.client.send(dialect.MAVLink_mount_control_message(1, 1, -1500, 0, 0, 0))
+        await looks(w, pitch_absolute=-15.0)

@@ -32,6 +32,8 @@ from support.world import HOME, World, world
 
 from anafi_mav import geo, units
 from anafi_mav.arsdk.messages.ardrone3 import PoiMode, PoiStatus
+from anafi_mav.mavlink import dialect as newer
+from anafi_mav.vehicle.base.modes import FlightMode
 
 ACCEPTED, DENIED, REJECTED, UNSUPPORTED = (
     dialect.MAV_RESULT_ACCEPTED,
@@ -39,6 +41,7 @@ ACCEPTED, DENIED, REJECTED, UNSUPPORTED = (
     dialect.MAV_RESULT_TEMPORARILY_REJECTED,
     dialect.MAV_RESULT_UNSUPPORTED,
 )
+CANCELLED = newer.MAV_RESULT_CANCELLED
 ROI, NO_ROI, ROI_SYSTEM, ROI_BESIDE, OLD_ROI = (
     dialect.MAV_CMD_DO_SET_ROI_LOCATION,
     dialect.MAV_CMD_DO_SET_ROI_NONE,
@@ -141,6 +144,108 @@ async def test_region_beside_the_path_turns_nose_and_gimbal() -> None:
         await heads(w, 30.0)
         await w.client.wait(ATTITUDE, lambda m: abs(euler(m)[1] - 35.0) < 3.0)
         assert truth(w).pitch_absolute == pytest.approx(35.0, abs=3.0)
+
+
+async def answer(client: Client, command: int, since: int) -> int:
+    """Return the final result of a command that was sent without waiting."""
+    final = dialect.MAV_RESULT_IN_PROGRESS
+    ack = await client.wait("COMMAND_ACK", lambda m: m.command == command and m.result != final, since=since)
+    return int(ack.result)
+
+
+async def test_angle_beside_the_end_of_a_region_starts_no_region() -> None:
+    """The drone reports the end later than it is commanded: until then nothing may be sent for the region."""
+    async with world() as w:
+        await w.take_off(20.0)
+        other = await w.connect(254, 190)
+        place = {"x": EAST[0], "y": EAST[1], "z": HOME[2]}
+        assert (await w.client.command(ROI, **place)).result == ACCEPTED
+        # The same region after an angle is no retransmission: it locks the gimbal again.
+        assert (await w.client.command(PITCHYAW, -10.0, x=LEVEL)).result == ACCEPTED
+        assert (await w.client.command(ROI, **place)).result == ACCEPTED
+        modes = [PoiMode.LOCKED_GIMBAL, PoiMode.FREE_GIMBAL, PoiMode.LOCKED_GIMBAL]
+        assert [poi["mode"] for poi in pois(w)] == modes
+
+        ends: list[tuple[int, tuple[float, ...]]] = [
+            (NO_ROI, ()),
+            (dialect.MAV_CMD_DO_SET_MODE, (1, 4, 3)),
+            (dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, ()),
+        ]
+        for number, (end, params) in enumerate(ends):
+            # A Hold of this client ends the second region, a return of the other client the third.
+            if number:
+                assert (await other.command(ROI, **place)).result == ACCEPTED
+            count, sender = len(pois(w)), other if number == 2 else w.client
+            mark, since = sender.mark(), w.client.mark()
+            sender.send_command(end, *params)
+            w.client.send_command(PITCHYAW, -20.0 - number, x=LEVEL)
+            assert await answer(sender, end, mark) == ACCEPTED
+            assert await answer(w.client, PITCHYAW, since) == ACCEPTED
+            await looks(w, pitch_absolute=-20.0 - number)
+            assert len(pois(w)) == count
+            assert w.gateway.systems[0].drone.poi.state.status == PoiStatus.AVAILABLE
+            if sender is w.client and number:  # retransmitted after another client's command, it is not begun again
+                assert (await other.command(ROI, **place)).result == CANCELLED
+                other.send_command(NO_ROI)
+        assert w.gateway.systems[0].vehicle.mode is FlightMode.RETURN
+        # A return is not replaced by a region, by whichever command or message.
+        for command, params in ((ROI, {}), (MOUNT, {"z": GPS_POINT})):
+            assert (await other.command(command, 0.0, 0.0, 0.0, 0.0, **{**place, **params})).result == REJECTED
+        assert len(pois(w)) == count
+
+
+async def test_mount_place_replaces_a_goto_as_a_region_does() -> None:
+    there = geo.destination(HOME[0], HOME[1], 200.0, 0.0)
+    async with world() as w:
+        await w.take_off(10.0)
+        other = await w.connect(254, 190)
+        frame = dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
+        goto = {"frame": frame, "x": there[0], "y": there[1], "z": 10.0}
+        assert (await w.client.command(dialect.MAV_CMD_DO_REPOSITION, -1, 1, 0, NAN, **goto)).result == ACCEPTED
+        # A message, which may be one of a stream, is refused; the flight goes on.
+        other.send(dialect.MAVLink_mount_configure_message(1, 1, GPS_POINT, 1, 1, 1))
+        other.send(dialect.MAVLink_mount_control_message(1, 1, *[round(value * 1e7) for value in EAST], 300, 0))
+        await other.wait("STATUSTEXT", lambda m: m.text == "ROI refused: drone flies", since=0)
+        # A command replaces it, in the order of flight commands.
+        ack = await other.command(MOUNT, 0.0, 0.0, 0.0, 0.0, x=EAST[0], y=EAST[1], z=GPS_POINT)
+        assert ack.result == ACCEPTED
+        await heads(w, 90.0)
+        names = [entry.name.rpartition(".")[2] for entry in w.drone.log if entry.kind == "command"]
+        assert [name for name in names if name in ("moveTo", "CancelMoveTo", "StartPilotedPOIV2")] == [
+            "moveTo",
+            "CancelMoveTo",
+            "StartPilotedPOIV2",
+        ]
+
+
+async def test_region_is_refused_while_a_mission_is_flown() -> None:
+    async with world(web=True) as w:
+        await put(w, [takeoff(6.0), way(60.0, 0.0, 6.0), way(90.0, 0.0, 6.0)])
+        mark = w.client.mark()
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=mark)
+        for command in (ROI, OLD_ROI):
+            assert (await w.client.command(command, 0.0, x=EAST[0], y=EAST[1], z=HOME[2])).result == REJECTED
+        assert pois(w) == []
+        assert w.gateway.systems[0].vehicle.mission.flying
+
+
+async def test_message_beside_a_command_on_a_region_is_carried_out() -> None:
+    """Both wait until the drone frees the gimbal; the newer target counts."""
+    async with world() as w:
+        await w.take_off(20.0)
+        assert (await w.client.command(ROI, x=EAST[0], y=EAST[1], z=HOME[2])).result == ACCEPTED
+        await region(w, PoiStatus.RUNNING, PoiMode.LOCKED_GIMBAL)
+        mark = w.client.mark()
+        began = w.drone.log[-1].t
+        w.client.send_command(PITCHYAW, -20.0, x=LEVEL)
+        await w.drone.wait_log(lambda e: e.name == "ardrone3.Piloting.StartPilotedPOIV2", 5.0, since=began)
+        pitch = 30.0 * units.RAD_PER_DEG
+        w.client.send(dialect.MAVLink_gimbal_manager_set_pitchyaw_message(1, 1, LEVEL, 1, pitch, NAN, NAN, NAN))
+        assert await answer(w.client, PITCHYAW, mark) == CANCELLED
+        await looks(w, pitch_absolute=30.0)
+        assert [poi["mode"] for poi in pois(w)] == [PoiMode.LOCKED_GIMBAL, PoiMode.FREE_GIMBAL]
+        assert w.commands("ardrone3.Piloting.StopPilotedPOI") == []
 
 
 @pytest.mark.parametrize(

@@ -79,6 +79,15 @@ class Poi(Commanding[PoiState]):
         command = ardrone3.StartPilotedPOIV2(latitude, longitude, altitude, mode)
         await self._commander.begin(command, (ardrone3.PilotedPOIV2,), judge, timeout, ardrone3.StopPilotedPOI())
 
+    def abort(self) -> None:
+        """Command the end of pointing at the place, without waiting.
+
+        An unanswered start is withdrawn. Does nothing without a place or a link.
+        """
+        self._commander.abort_pending("stopped", ardrone3.StopPilotedPOI)
+        if self.state.status in (PoiStatus.RUNNING, PoiStatus.PENDING):
+            self._commander.send_stop_if_connected(ardrone3.StopPilotedPOI())
+
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """End pointing at the place; returns at once when none is active or about to be."""
         self._require(self.state.status, "points of interest")

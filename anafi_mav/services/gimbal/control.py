@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TypeAlias
 
 ClientId: TypeAlias = tuple[int, int]
@@ -63,6 +63,7 @@ class Answer(enum.Enum):
     DONE = "in force"
     MISSION = "the mission has control"
     INVALID = "not ids of a client"
+    NO_PRIMARY = "secondary control without a primary client"
 
 
 class Heartbeats:
@@ -71,12 +72,13 @@ class Heartbeats:
     def __init__(self) -> None:
         self._heard: dict[ClientId, float] = {}
 
-    def receive(self, client: ClientId, now: float) -> None:
-        """Note a heartbeat of a client."""
+    def receive(self, client: ClientId, now: float, kept: Collection[ClientId | None] = ()) -> None:
+        """Note a heartbeat of a client; those in `kept` are never forgotten for it."""
         self._heard.pop(client, None)
         self._heard[client] = now
         if len(self._heard) > MAX_CLIENTS:
-            del self._heard[next(iter(self._heard))]
+            oldest = next((one for one in self._heard if one not in kept), client)
+            del self._heard[oldest]
 
     def last(self, client: ClientId) -> float | None:
         """Return when a client was last heard; None if it has sent none."""
@@ -104,7 +106,9 @@ class GimbalControl:
         return self.state is State.MISSION
 
     def allows(self, client: ClientId) -> bool:
-        """Return True when this client may move the gimbal."""
+        """Return True when this client may move the gimbal; `NO_CLIENT` never may."""
+        if client == NO_CLIENT:
+            return False
         if self.state is State.CLIENT:
             return client in (self.primary, self.secondary)
         return self.state is State.FREE
@@ -112,8 +116,11 @@ class GimbalControl:
     def configure(self, client: ClientId, ids: Sequence[float], now: float) -> Answer:
         """Take, release or hand on control: system, component of primary and secondary client.
 
-        -1 and NaN leave one unchanged, -2 is the sender, -3 removes the sender, 0 removes any.
+        -1 and NaN leave one unchanged, -2 is the sender, -3 removes the sender, 0 removes any. Secondary control
+        exists beside primary control only: without a primary client every client moves the gimbal.
         """
+        if client == NO_CLIENT:
+            return Answer.INVALID
         if self.state is State.MISSION:
             return Answer.MISSION
         primary = _named(ids[:2], client, self.primary)
@@ -123,6 +130,8 @@ class GimbalControl:
         if primary not in (self.primary, NO_CLIENT) and secondary == self.primary:
             secondary = NO_CLIENT  # MAVSDK takes both; whom another client replaces moves nothing any longer
         if primary == NO_CLIENT:
+            if secondary not in (self.secondary, NO_CLIENT):
+                return Answer.NO_PRIMARY
             secondary = NO_CLIENT
         for taken in {primary, secondary} - {self.primary, self.secondary, NO_CLIENT}:
             self._since[taken] = now

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from anafi_mav import texts, units
@@ -23,18 +23,22 @@ from anafi_mav.services.command_targets import height, place
 from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.gimbal import gimbal_messages, mount, targets
-from anafi_mav.services.gimbal.control import Answer, ClientId, GimbalControl, Heartbeats
+from anafi_mav.services.gimbal.control import NO_CLIENT, Answer, ClientId, GimbalControl, Heartbeats
 from anafi_mav.services.gimbal.motion import GimbalMotion
 from anafi_mav.services.gimbal.roi import RegionOfInterest
 from anafi_mav.services.gimbal.targets import Frames, GimbalTarget
-from anafi_mav.services.service import Host, MessageHandler, Service
+from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.geo_point import GeoPoint
+from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
+
+HOVERING = (FlightMode.HOLD, FlightMode.GUIDED, FlightMode.POSITION)
+"""Modes without a flight of the drone's own."""
 
 
 def client_id(client: object) -> ClientId:
@@ -71,18 +75,20 @@ class GimbalService(Service):
         # MAVSDK's gimbal plugin takes an IN_PROGRESS for a failure (gimbal_impl.cpp, receive_command_result).
         late = ProgressPolicy.LATE
 
-        def aim(handler: mount.Handler) -> Action:
+        def aim(
+            handler: mount.Handler, group: ActionGroup | Callable[[Command], ActionGroup] = ActionGroup.GIMBAL
+        ) -> Action:
             return Action(
                 handler,
                 location=False,
                 altitude=Altitude.UNUSED,
                 effect=Effect.TARGET,
                 progress=late,
-                group=ActionGroup.GIMBAL,
+                group=group,
             )
 
         def look(
-            handler: mount.Handler, altitude: Altitude = Altitude.UNUSED, effect: Effect = Effect.CHANGE
+            handler: mount.Handler, altitude: Altitude = Altitude.UNUSED, effect: Effect = Effect.TARGET
         ) -> Action:
             has_location = altitude is not Altitude.UNUSED
             return Action(handler, location=has_location, altitude=altitude, effect=effect, progress=late)
@@ -90,8 +96,8 @@ class GimbalService(Service):
         return {
             dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: aim(self._pitch_yaw),
             dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE: aim(self._configure),
-            dialect.MAV_CMD_DO_MOUNT_CONFIGURE: aim(self._mount_configure),
-            dialect.MAV_CMD_DO_MOUNT_CONTROL: aim(self._mount_control),
+            dialect.MAV_CMD_DO_MOUNT_CONFIGURE: aim(self._mount_configure, mount.group_of_configure),
+            dialect.MAV_CMD_DO_MOUNT_CONTROL: aim(self._mount_control, mount.group_of_control),
             dialect.MAV_CMD_DO_SET_ROI_LOCATION: look(self._look_at, Altitude.AMSL),
             dialect.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET: look(self._look_beside),
             dialect.MAV_CMD_DO_SET_ROI_SYSID: look(self._look_at_system),
@@ -145,6 +151,7 @@ class GimbalService(Service):
     def link_up(self) -> None:
         self._ticked = math.inf
         self._motion.link_up()
+        self._roi.link_up()
 
     def link_down(self) -> None:
         self._motion.link_down()
@@ -154,7 +161,8 @@ class GimbalService(Service):
         self._status = ()
 
     def heartbeat(self, inbound: Inbound) -> None:
-        self._heartbeats.receive((inbound.sysid, inbound.compid), inbound.now)
+        kept = {self._control.primary, self._control.secondary, self._motion.turner}
+        self._heartbeats.receive((inbound.sysid, inbound.compid), inbound.now, kept)
 
     def subscriptions(self) -> Subscriptions:
         return {GimbalAttitudeChanged: lambda message, now: self._motion.watch_attitude()}
@@ -215,6 +223,8 @@ class GimbalService(Service):
             raise Refused(texts.GIMBAL, texts.GIMBAL_OF_MISSION)
         if answer is Answer.INVALID:
             raise Refused(texts.GIMBAL, texts.GIMBAL_IDS, lasting=True)
+        if answer is Answer.NO_PRIMARY:
+            raise Refused(texts.GIMBAL, texts.GIMBAL_NO_PRIMARY)
         self._end_of_others(client_id(command.client))
         self._announce()
 
@@ -229,13 +239,15 @@ class GimbalService(Service):
         known = client_id(client)
         self._watch_mission()
         if not self._control.allows(known):
-            raise Refused(texts.GIMBAL, self._holder)
+            raise Refused(texts.GIMBAL, self._objection(known))
         return known
 
-    @property
-    def _holder(self) -> OperatorText:
+    def _objection(self, client: ClientId) -> OperatorText:
+        """Return why this client may not move the gimbal."""
         if self._control.is_of_mission:
             return texts.GIMBAL_OF_MISSION
+        if client == NO_CLIENT:
+            return texts.GIMBAL_NO_CLIENT
         return texts.GIMBAL_OF_CLIENT.fill(system=self._control.primary[0])
 
     # Angles and rates by command.
@@ -291,7 +303,7 @@ class GimbalService(Service):
         elif isinstance(target, str):
             reason = target
         elif not self._control.allows(client):
-            reason = self._holder
+            reason = self._objection(client)
         elif self._motion.is_calibrating:
             reason = texts.GIMBAL_CALIBRATES
         if reason is not None or isinstance(target, str):
@@ -323,6 +335,7 @@ class GimbalService(Service):
 
     async def _look(self, command: Command, where: GeoPoint, ato: float) -> None:
         self._require_control(command.client)
+        self._roi.require_possible()
         await self._motion.rest()
         await self._roi.look_at(where, ato)
 
@@ -333,6 +346,8 @@ class GimbalService(Service):
 
     async def _look_at_number(self, command: Command, system: float) -> None:
         self._require_control(command.client)
+        self._roi.require_possible()
+        self._roi.position_of(system)
         await self._motion.rest()
         await self._roi.look_at_system(system)
 
@@ -375,6 +390,7 @@ class GimbalService(Service):
         goto, here = vehicle.guided.goto, vehicle.place
         if goto is None or here is None or piloting.altitude is None:
             raise Refused(texts.ROI, texts.ROI_NO_WAYPOINT)
+        self._motion.require_ready()
         bearing, elevation = mount.direction(here, goto.place, goto.ato - piloting.altitude)
         await vehicle.guided.go(goto.with_heading(units.wrap_pi(bearing + yaw * units.RAD_PER_DEG)))
         ahead = {Axis.PITCH: elevation * units.DEG_PER_RAD + pitch, Axis.ROLL: roll, Axis.YAW: 0.0}
@@ -435,7 +451,10 @@ class GimbalService(Service):
 
     def _mount_configured(self, inbound: Inbound) -> None:
         """MOUNT_CONFIGURE has no acknowledgement; it decides what the next MOUNT_CONTROL means."""
-        mode = inbound.message.mount_mode
+        mode, client = inbound.message.mount_mode, (inbound.sysid, inbound.compid)
+        if not self._control.allows(client):
+            self.host.warn_throttled(texts.REFUSED.fill(what=texts.GIMBAL, reason=self._objection(client)))
+            return
         if mode == dialect.MAV_MOUNT_MODE_NEUTRAL:
             self._stream(inbound, targets.DEVICES[0], GimbalTarget(neutral=True))
         if mode in mount.MESSAGE_MODES:
@@ -449,8 +468,8 @@ class GimbalService(Service):
         if self._mount_mode == dialect.MAV_MOUNT_MODE_GPS_POINT:
             where = GeoPoint(message.input_a / 1e7, message.input_b / 1e7)
             self._mount_place = (inbound.sysid, inbound.compid), where, message.input_c / 100.0
-            if self._mount_look is None:
-                self._mount_look = self.host.spawn(self._look_for_mount())
+            if self._mount_look is None or self._mount_look.done():
+                self._mount_look = self.host.run_action(client_of(inbound), self._look_for_mount())
         elif self._mount_mode == dialect.MAV_MOUNT_MODE_MAVLINK_TARGETING:
             angles = {
                 Axis.PITCH: message.input_a / 100.0,
@@ -466,15 +485,22 @@ class GimbalService(Service):
         self.host.warn_throttled(texts.REFUSED.fill(what=texts.GIMBAL, reason=reason))
 
     async def _look_for_mount(self) -> None:
-        """Look at the newest place of MOUNT_CONTROL, which may arrive often; at the same place once."""
+        """Look at the newest place of MOUNT_CONTROL, which may arrive often; at the same place once.
+
+        A stream of them never ends what flies the drone, which would begin again with each command of a client.
+        """
         task = asyncio.current_task()
         try:
             while self._mount_place is not None:
                 client, where, ato = self._mount_place
                 self._mount_place = None
                 if not self._control.allows(client):
-                    raise Refused(texts.ROI, self._holder)
+                    raise Refused(texts.ROI, self._objection(client))
                 if not self._roi.is_locked_on(where, ato):
+                    self._roi.require_possible()
+                    vehicle = self.host.vehicle
+                    if not self._roi.is_active and (vehicle.mode not in HOVERING or vehicle.overridable):
+                        raise Refused(texts.ROI, texts.DRONE_FLIES)
                     await self._motion.rest()
                     await self._roi.look_at(where, ato)
         except AnafiMavError as error:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 from collections.abc import Callable, Mapping
 from typing import TypedDict
 
@@ -18,7 +19,7 @@ from anafi_mav.drone.events import Axis, FrameOfReference, GimbalCalibrationStat
 from anafi_mav.errors import AnafiMavError, LinkLost
 from anafi_mav.services.gimbal import targets
 from anafi_mav.services.gimbal.control import ClientId, Heartbeats
-from anafi_mav.services.gimbal.rates import GimbalRates
+from anafi_mav.services.gimbal.rates import MESSAGE_SILENCE, GimbalRates
 from anafi_mav.services.gimbal.roi import RegionOfInterest
 from anafi_mav.services.gimbal.targets import GimbalTarget
 from anafi_mav.services.service import Host
@@ -31,6 +32,9 @@ looks as if it stood."""
 
 STANDS = 0.1
 """deg between two reported attitudes of an axis that stands."""
+
+REFERENCE_LEFT = 1.0
+"""deg from the reference orientation at which the gimbal has left it."""
 
 REPEATS = 3
 """Times that the angles of a message are sent again: the drone may have lost the first."""
@@ -56,7 +60,11 @@ class GimbalMotion:
 
     def __init__(self, host: Host, heartbeats: Heartbeats, roi: RegionOfInterest) -> None:
         self.is_neutral = False
-        """The last target was the reference orientation."""
+        """The last target was the reference orientation, and the gimbal has not left it since."""
+        self._reference: GimbalAttitude | None = None
+        """Attitude that the drone reported in the reference orientation; None before it has reached it."""
+        self._neutral_at = -math.inf
+        """When the last message that requests the reference orientation arrived."""
         self._host = host
         self._rates = GimbalRates(heartbeats)
         self._roi = roi
@@ -99,17 +107,21 @@ class GimbalMotion:
 
     # Targets.
 
+    def require_ready(self) -> frozenset[Axis]:
+        """Return the gimbal's axes. Raises `Refused` when it has none, or the drone calibrates it."""
+        if self._gimbal.axes is None:
+            raise Unsupported(texts.GIMBAL, texts.NO_GIMBAL)
+        if self.is_calibrating:
+            raise Refused(texts.GIMBAL, texts.GIMBAL_CALIBRATES)
+        return self._gimbal.axes
+
     async def move(self, client: ClientId, target: GimbalTarget) -> None:
         """Carry out the target of a command; return when the drone turns the gimbal.
 
         Raises `Refused` when it has none, or calibrates it.
         """
         gimbal = self._host.drone.gimbal
-        if self._gimbal.axes is None:
-            raise Unsupported(texts.GIMBAL, texts.NO_GIMBAL)
-        if self.is_calibrating:
-            raise Refused(texts.GIMBAL, texts.GIMBAL_CALIBRATES)
-        target = target.on(self._gimbal.axes)
+        target = target.on(self.require_ready())
         if target.is_empty:
             return  # yaw alone, of a gimbal without this axis
         self._begin(target)
@@ -117,14 +129,14 @@ class GimbalMotion:
         task = self._command = asyncio.current_task()
         try:
             await self._roi.free_gimbal()
-            self.is_neutral = target.neutral
+            self.is_neutral, self._reference = target.neutral, None
             self._turn(self._zero_rates())
             if target.rates:
                 self._rates.take(client, target.rates, self._host.clock.monotonic(), by_message=False)
             else:
                 self._rates.replace_by_angles()
             if target.neutral:
-                await gimbal.reset_orientation()
+                self._reference = await gimbal.reset_orientation()
             elif target.is_zero_rate:
                 self._is_stopping = True
                 await gimbal.stop()
@@ -135,6 +147,8 @@ class GimbalMotion:
                 if self._rates.turns:
                     await gimbal.sweep(**_by_axis(self._rates.rates))
         except BaseException:
+            if self._command is task:
+                self.is_neutral = False
             if self._command is task and self._rates.end():  # nothing newer, and it has not been confirmed
                 self._command = None
                 self._stop_turning()
@@ -151,8 +165,11 @@ class GimbalMotion:
             return
         self._client = client
         if self._roi.holds_gimbal:
+            is_freeing = self._waiting is not None
             self._waiting = client, target
-            if self._command is None:
+            if not is_freeing:
+                if self._command is not None:
+                    self._command.cancel()  # a newer target replaces it
                 self._command = self._host.spawn(self._free())
             return
         self._apply(client, target)
@@ -160,10 +177,12 @@ class GimbalMotion:
     def _apply(self, client: ClientId, target: GimbalTarget) -> None:
         now = self._host.clock.monotonic()
         if target.neutral:
-            if not self.is_neutral:
+            is_repeated = self.is_neutral and now - self._neutral_at < MESSAGE_SILENCE
+            self._neutral_at = now
+            if not is_repeated:
                 self._begin()
                 self._rates.replace_by_angles()
-                self.is_neutral = True
+                self.is_neutral, self._reference = True, None
                 self._halt = self._host.spawn(self._reset())
             return
         self.is_neutral = False
@@ -193,20 +212,20 @@ class GimbalMotion:
         try:
             await self._roi.free_gimbal()
             if self._command is task and self._waiting is not None:
-                self._command = None
-                self._apply(*self._waiting)
+                waiting, self._command, self._waiting = self._waiting, None, None
+                self._apply(*waiting)
         except AnafiMavError as error:
             self._host.warn_throttled(texts.from_below(error))
         finally:
             if self._command is task:
-                self._command = None
-            self._waiting = None
+                self._command = self._waiting = None
 
     async def _reset(self) -> None:
         task = asyncio.current_task()
         try:
-            await self._host.drone.gimbal.reset_orientation()
+            self._reference = await self._host.drone.gimbal.reset_orientation()
         except AnafiMavError as error:
+            self.is_neutral = False
             self._host.warn_throttled(texts.from_below(error))
         finally:
             if self._halt is task:
@@ -230,7 +249,7 @@ class GimbalMotion:
         self._still = still
         if self._command is not None and self._command is not asyncio.current_task():
             self._command.cancel()
-            self._command = None
+            self._command = self._waiting = None
         if self._halt is not None:
             self._halt.cancel()
             self._halt = None
@@ -273,8 +292,14 @@ class GimbalMotion:
             await self._host.drone.gimbal.stop()
 
     def leave_to_mission(self) -> None:
-        """End what moves the gimbal; the mission's first target may follow soon."""
-        self._zeros = STOPS if self._end() else 0
+        """End what moves the gimbal.
+
+        All zero rates leave now: later ones would stop the gimbal on the way to the mission's first angle.
+        """
+        may_turn, self._zeros = self._end(), 0
+        with contextlib.suppress(AnafiMavError):
+            for _ in range(STOPS if may_turn else 0):
+                self._host.drone.gimbal.halt()
 
     def _end(self) -> bool:
         """End what moves the gimbal; return True when it may turn by a rate."""
@@ -332,7 +357,12 @@ class GimbalMotion:
             self._send_again(now)
 
     def watch_attitude(self) -> None:
-        """Send further zero rates while an axis that is to stand turns: earlier ones may be lost."""
+        """Notice a gimbal that leaves the reference orientation, and an axis that turns on.
+
+        To an axis that is to stand further zero rates are sent: earlier ones may be lost.
+        """
+        if self.is_neutral and self._has_left_reference():
+            self.is_neutral, self._reference = False, None
         last, attitude = self._seen, self._gimbal.attitude
         self._seen = attitude
         if last is None or attitude is None:
@@ -341,6 +371,19 @@ class GimbalMotion:
             frame = attitude.frames[axis]
             if abs(targets.wrap_180(attitude.angle(axis, frame) - last.angle(axis, frame))) > STANDS:
                 self._still_zeros = STOPS
+
+    def _has_left_reference(self) -> bool:
+        """True when another controller, or the drone, has moved the gimbal since it was reset."""
+        reference, attitude = self._reference, self._gimbal.attitude
+        if reference is None or attitude is None:
+            return False
+        for axis in self._gimbal.axes or ():
+            frame = reference.frames[axis]
+            if attitude.frames[axis] != frame:
+                return True
+            if abs(targets.wrap_180(attitude.angle(axis, frame) - reference.angle(axis, frame))) > REFERENCE_LEFT:
+                return True
+        return False
 
     def _watch_rates(self, now: float) -> None:
         client, is_by_command = self._rates.client, self._rates.is_by_command

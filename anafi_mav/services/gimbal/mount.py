@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from anafi_mav import geo
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.commands import Command
+from anafi_mav.services.commands import ActionGroup, Command
 from anafi_mav.services.gimbal.targets import Frames
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 
@@ -35,6 +35,31 @@ HORIZON = Frames(0, locks_horizon=True, heading=None)
 
 DEGREES = 180.0
 """A larger coordinate of DO_MOUNT_CONTROL is in degE7: common.xml says so, and some clients send deg."""
+
+
+_PLACES = (
+    dialect.MAV_MOUNT_MODE_GPS_POINT,
+    dialect.MAV_MOUNT_MODE_SYSID_TARGET,
+    dialect.MAV_MOUNT_MODE_HOME_LOCATION,
+)
+"""Modes that turn the drone to a place, as a region of interest does."""
+
+
+def group_of_control(command: Command) -> ActionGroup:
+    """Return the group of a DO_MOUNT_CONTROL.
+
+    A place turns the drone, angles turn the gimbal alone.
+    """
+    return ActionGroup.FLIGHT if command.z in _PLACES else ActionGroup.GIMBAL
+
+
+def group_of_configure(command: Command) -> ActionGroup:
+    """Return the group of a DO_MOUNT_CONFIGURE.
+
+    Of its modes, that of home alone turns the drone at once.
+    """
+    home = command.params[0] == dialect.MAV_MOUNT_MODE_HOME_LOCATION
+    return ActionGroup.FLIGHT if home else ActionGroup.GIMBAL
 
 
 def point(latitude: float, longitude: float) -> GeoPoint | None:

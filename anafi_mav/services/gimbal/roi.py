@@ -1,7 +1,8 @@
 """Region of interest: a place, or another system, that nose and camera follow.
 
 It is Parrot's piloted POI. The nose follows the place in either case; the gimbal is locked on it, or free for angles
-and rates of clients. The drone needs a hover to begin, and waits for one. Whatever else flies the drone ends it.
+and rates of clients. The drone needs a hover to begin. It is a flight task of the vehicle: each takeover, landing and
+return ends it at once, and nothing is sent for it from then on, although the drone reports its end later.
 """
 
 from __future__ import annotations
@@ -11,12 +12,13 @@ import math
 from dataclasses import dataclass
 
 from anafi_mav import geo, texts
-from anafi_mav.drone.events import PoiMode, PoiStatus
+from anafi_mav.drone.events import PilotedPOIV2, PoiMode, PoiStatus
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.base.bounds import amsl_to_ato, check_on_earth
 from anafi_mav.vehicle.base.geo_point import GeoPoint
+from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, reason_of
 from anafi_mav.vehicle.base.severity import Severity
 
@@ -38,6 +40,11 @@ UPDATE_EVERY = 1.0
 _LOOKING = (PoiStatus.RUNNING, PoiStatus.PENDING)
 
 
+def _holds(status: PoiStatus | None, mode: PoiMode | None) -> bool:
+    """Return True for a region that the drone aims the gimbal at."""
+    return status in _LOOKING and mode != PoiMode.FREE_GIMBAL
+
+
 @dataclass(frozen=True)
 class SystemPosition:
     """Position of another system, as its GLOBAL_POSITION_INT reported it last."""
@@ -49,11 +56,29 @@ class SystemPosition:
     """s, monotonic."""
 
 
+@dataclass
+class Region:
+    """One attempt to look at places.
+
+    It has ended when another one, or none, is the region in force.
+    """
+
+    mode: PoiMode
+    """Relation of the gimbal to the place that is wanted."""
+    is_confirmed: bool = False
+    """The drone has reported it."""
+    freeing: asyncio.Task[None] | None = None
+    """Frees the gimbal; one task for all targets that wait for it."""
+
+
 class RegionOfInterest:
-    """The region of interest of one vehicle."""
+    """The region of interest of one vehicle: one of its flight tasks."""
 
     def __init__(self, host: Host) -> None:
         self._host = host
+        self._region: Region | None = None
+        """The region in force, or about to be; None as soon as its end is commanded."""
+        host.vehicle.helms = (*host.vehicle.helms, self)
         self._systems: dict[int, SystemPosition] = {}
         self._system: int | None = None
         """The system that is looked at; None: a place, or nothing."""
@@ -67,42 +92,144 @@ class RegionOfInterest:
     def holds_gimbal(self) -> bool:
         """True while the drone aims the gimbal at the region by itself."""
         state = self._host.drone.poi.state
-        return state.status in _LOOKING and state.mode != PoiMode.FREE_GIMBAL
+        return _holds(state.status, state.mode)
 
     def is_locked_on(self, where: GeoPoint, ato: float) -> bool:
         """Return True while the drone aims the gimbal at this place (height: m above take-off)."""
-        target = self._host.drone.poi.state.target
+        region, target = self._region, self._host.drone.poi.state.target
+        if region is None or region.freeing is not None or self._update is not None:
+            return False  # a newer start is under way
         if not self.holds_gimbal or target is None:
             return False
         apart = geo.distance(target.latitude, target.longitude, *where.point)
         return math.hypot(apart, target.altitude - ato) < SAME_PLACE
 
-    async def look_at(self, where: GeoPoint, ato: float) -> None:
-        """Look at a place (height: m above take-off), with the gimbal locked on it."""
-        self.forget_system()
-        await self._start(where, ato, PoiMode.LOCKED_GIMBAL)
+    @property
+    def is_active(self) -> bool:
+        """True while a region is in force or begins, and its end is not commanded."""
+        return self._region is not None
 
-    async def look_at_system(self, system: float) -> None:
-        """Look at another system, and follow it as far as it reports its position."""
+    def require_possible(self) -> None:
+        """Raise `Refused` when no region can begin: landing, return, mission, ground."""
+        vehicle = self._host.vehicle
+        if (descent := vehicle.descent) is not None:
+            raise Refused(texts.ROI, descent)
+        if vehicle.mission.flying or vehicle.mode is FlightMode.MISSION:
+            raise Refused(texts.ROI, texts.GIMBAL_OF_MISSION)
+        if not vehicle.in_air:
+            raise Refused(texts.ROI, texts.NOT_IN_AIR)
+
+    async def look_at(self, where: GeoPoint, ato: float) -> None:
+        """Look at a place (height: m above take-off), with the gimbal locked on it.
+
+        It replaces what flies the drone, as every flight command. A region in force moves to the new place.
+        """
+        check_on_earth(where, texts.ROI)
+        self.require_possible()
+        is_locked = self.is_locked_on(where, ato)
+        self.forget_system()
+        if is_locked:
+            return
+        if self._region is None:
+            await self._take_over()
+        region = self._region = Region(PoiMode.LOCKED_GIMBAL)  # no await from the checks to the start
+        await self._start(region, where, ato)
+        region.is_confirmed = True
+
+    async def _take_over(self) -> None:
+        """End what flies the drone. Raises `Refused` when it does not hover then."""
+        vehicle = self._host.vehicle
+        await vehicle.take_over()
+        if vehicle.drone.piloting.moving:
+            await vehicle.drone.piloting.stop()
+        await vehicle.drone.piloting.cancel_return_home()
+        if not vehicle.in_air or vehicle.returning:
+            raise Refused(texts.ROI, vehicle.activity)
+
+    def position_of(self, system: float) -> SystemPosition:
+        """Return the position of another system. Raises `Refused` without a recent one."""
         seen = self._systems.get(int(system)) if math.isfinite(system) else None
         if seen is None or self._host.clock.monotonic() - seen.at > POSITION_OLD:
             raise Refused(texts.ROI, texts.ROI_NO_SYSTEM.fill(system=system))
-        self.forget_system()
-        await self._start(seen.place, amsl_to_ato(self._host.vehicle, seen.amsl), PoiMode.LOCKED_GIMBAL)
-        self._system, self._looked, self._is_lost = int(system), seen, False
+        return seen
+
+    async def look_at_system(self, system: float) -> None:
+        """Look at another system, and follow it as far as it reports its position."""
+        seen = self.position_of(system)
+        await self.look_at(seen.place, amsl_to_ato(self._host.vehicle, seen.amsl))
+        if self._region is not None:
+            self._system, self._looked, self._is_lost = int(system), seen, False
 
     async def stop(self) -> None:
         """Look at nothing in particular."""
+        self._region = None
         self.forget_system()
         await self._host.drone.poi.stop()
 
     async def free_gimbal(self) -> None:
-        """Let the nose follow the region alone; returns when the gimbal takes angles and rates."""
-        target = self._host.drone.poi.state.target
-        if not self.holds_gimbal or target is None:
+        """Let the nose follow the region alone; returns when the gimbal takes angles and rates.
+
+        Sends nothing for a region that ends: the drone frees the gimbal by itself, and until it has reported that, the
+        gimbal would turn to the region and look as if it obeyed.
+        """
+        if self._update is not None:
+            await asyncio.wait({self._update})
+        region = self._region
+        if not self.holds_gimbal:
             return
-        poi = self._host.drone.poi
-        await poi.start(target.latitude, target.longitude, target.altitude, PoiMode.FREE_GIMBAL)
+        if region is None:
+            await self._released()
+            return
+        if region.freeing is None:
+            region.freeing = self._host.spawn(self._free(region))
+            region.freeing.add_done_callback(lambda task: task.cancelled() or task.exception())
+        try:
+            await asyncio.shield(region.freeing)  # a newer target waits for the same
+        except AnafiMavError:
+            if self._region is not None:
+                raise
+            await self._released()
+
+    async def _released(self) -> None:
+        """Return when the drone reports that it does not aim the gimbal. Raises `CommandTimeout`."""
+        if self.holds_gimbal:
+            await self._host.drone.expect(PilotedPOIV2, lambda message: not _holds(message.status, message.mode))
+
+    async def _free(self, region: Region) -> None:
+        target = self._host.drone.poi.state.target
+        try:
+            if target is not None and self._region is region:
+                region.mode = PoiMode.FREE_GIMBAL
+                await self._start(region, GeoPoint(target.latitude, target.longitude), target.altitude)
+        finally:
+            region.freeing = None
+
+    async def _start(self, region: Region, where: GeoPoint, ato: float) -> None:
+        """Command the region in force. A start that fails is undone by a stop, so it ends then."""
+        try:
+            await self._host.drone.poi.start(where.latitude, where.longitude, ato, region.mode)
+        except BaseException:
+            if self._region is region:
+                self._region = None
+            raise
+
+    # The flight task.
+
+    def end(self) -> list[asyncio.Task[None]]:
+        """End the region: something else flies the drone now."""
+        region, self._region = self._region, None
+        if region is None:
+            return []
+        ended = [task for task in (self._update, region.freeing) if task is not None]
+        self.forget_system()
+        self._host.drone.poi.abort()
+        return ended
+
+    def link_up(self) -> None:
+        """Adopt the region that the drone reports, of an earlier connection or another controller."""
+        state = self._host.drone.poi.state
+        if state.status in _LOOKING:
+            self._region = Region(state.mode or PoiMode.LOCKED_GIMBAL, is_confirmed=True)
 
     def forget_system(self) -> None:
         """Follow no system any longer; the drone looks at its last place."""
@@ -112,7 +239,8 @@ class RegionOfInterest:
             self._update = None
 
     def link_down(self) -> None:
-        """Forget the systems: the drone is disconnected."""
+        """Forget the region and the systems: the drone is disconnected."""
+        self._region = None
         self.forget_system()
         self._systems.clear()
 
@@ -129,10 +257,14 @@ class RegionOfInterest:
 
     def tick(self, now: float) -> None:
         """Look at the new place of the system that is followed."""
-        if self._system is None or self._looked is None or self._update is not None:
+        region = self._region
+        if region is None or not region.is_confirmed or region.freeing is not None or self._update is not None:
             return
         if self._host.drone.poi.state.status not in _LOOKING:
-            self.forget_system()  # something else flies the drone, or another controller has ended it
+            self._region = None  # the drone, or another controller, has ended it
+            self.forget_system()
+            return
+        if self._system is None or self._looked is None:
             return
         seen = self._systems.get(self._system, self._looked)
         is_lost = now - seen.at > POSITION_OLD
@@ -141,21 +273,19 @@ class RegionOfInterest:
         self._is_lost = is_lost
         moved = geo.distance(*seen.place.point, *self._looked.place.point)
         if now - self._looked.at >= UPDATE_EVERY and math.hypot(moved, seen.amsl - self._looked.amsl) >= MOVED:
-            mode = PoiMode.LOCKED_GIMBAL if self.holds_gimbal else PoiMode.FREE_GIMBAL
             self._looked = SystemPosition(seen.place, seen.amsl, now)
-            self._update = self._host.spawn(self._look_again(seen, mode))
+            self._update = self._host.spawn(self._look_again(region, seen))
 
-    async def _look_again(self, seen: SystemPosition, mode: PoiMode) -> None:
+    async def _look_again(self, region: Region, seen: SystemPosition) -> None:
+        task = asyncio.current_task()
         try:
-            await self._start(seen.place, amsl_to_ato(self._host.vehicle, seen.amsl), mode)
+            if self._region is region:
+                check_on_earth(seen.place, texts.ROI)
+                await self._start(region, seen.place, amsl_to_ato(self._host.vehicle, seen.amsl))
         except AnafiMavError as error:
-            self._system = None
-            self._host.text(Severity.WARNING, texts.ROI_ENDED.fill(reason=reason_of(error)))
+            if self._update is task:  # else its end was commanded
+                self._system = None
+                self._host.text(Severity.WARNING, texts.ROI_ENDED.fill(reason=reason_of(error)))
         finally:
-            self._update = None
-
-    async def _start(self, where: GeoPoint, ato: float, mode: PoiMode) -> None:
-        check_on_earth(where, texts.ROI)
-        if not self._host.vehicle.in_air:
-            raise Refused(texts.ROI, texts.NOT_IN_AIR)
-        await self._host.drone.poi.start(where.latitude, where.longitude, ato, mode)
+            if self._update is task:
+                self._update = None

@@ -301,6 +301,18 @@ def test_repeated_return_runs_again_unless_another_client_commanded() -> None:
     )
 
 
+def test_repeated_target_runs_again_unless_another_client_commanded() -> None:
+    definition = commands.Definition(location=True, altitude=commands.Altitude.AMSL, effect=commands.Effect.TARGET)
+    look = commands.Command(dialect.MAV_CMD_DO_SET_ROI_LOCATION, definition, (NAN,) * 4, 48.0, 2.0, NAN, None)
+    history = commands.CommandHistory()
+    execution = history.begin("a", look)
+    execution.result, execution.ended = dialect.MAV_RESULT_ACCEPTED, 0.0
+    assert history.retransmission("a", look, 1.0) is None
+    history.supersede("b")
+    assert history.retransmission("a", look, 1.0) == dialect.MAV_RESULT_CANCELLED
+    assert history.retransmission("a", look, 3.5) is None
+
+
 def test_repeated_offboard_command_after_its_end_is_executed() -> None:
     history = commands.CommandHistory()
     offboard = mode_command(dialect.MAV_CMD_DO_SET_MODE, 1.0, 6.0, 0.0)

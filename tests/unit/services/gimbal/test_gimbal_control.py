@@ -117,6 +117,38 @@ def test_heartbeats_of_invented_clients_are_bounded() -> None:
     assert heartbeats.last(((MAX_CLIENTS + 4) % 256, 1)) == MAX_CLIENTS + 4
 
 
+def test_heartbeats_of_clients_in_control_are_kept() -> None:
+    gimbal, heartbeats = made()
+    gimbal.configure(STATION, TAKE, 0.0)
+    heartbeats.receive(STATION, 9.9, {STATION, PROGRAM})
+    heartbeats.receive(PROGRAM, 9.9, {STATION, PROGRAM})
+    for number in range(MAX_CLIENTS):
+        heartbeats.receive((1 + number, 7), 10.0, {STATION, PROGRAM, None})
+    assert (heartbeats.last(STATION), heartbeats.last(PROGRAM)) == (9.9, 9.9)
+    assert heartbeats.last((1, 7)) is None
+    assert gimbal.expire(10.0) is None
+
+
+def test_sender_without_an_id_neither_moves_nor_takes() -> None:
+    gimbal, _ = made()
+    assert not gimbal.allows(NO_CLIENT)
+    assert gimbal.configure(NO_CLIENT, TAKE, 0.0) is Answer.INVALID
+    gimbal.configure(STATION, TAKE, 0.0)
+    assert not gimbal.allows(NO_CLIENT)
+    assert gimbal.configure(NO_CLIENT, TAKE, 1.0) is Answer.INVALID
+    assert gimbal.primary == STATION
+
+
+def test_secondary_client_needs_a_primary_one() -> None:
+    gimbal, _ = made()
+    assert gimbal.configure(PROGRAM, (-1.0, -1.0, -2.0, -2.0), 0.0) is Answer.NO_PRIMARY
+    assert (gimbal.state, gimbal.secondary) == (State.FREE, NO_CLIENT)
+    gimbal.configure(STATION, TAKE, 0.0)
+    assert gimbal.configure(PROGRAM, (-1.0, -1.0, -2.0, -2.0), 1.0) is Answer.DONE
+    assert gimbal.configure(STATION, RELEASE, 2.0) is Answer.DONE
+    assert (gimbal.state, gimbal.secondary) == (State.FREE, NO_CLIENT)
+
+
 def test_tables_of_transitions_name_only_states_and_events() -> None:
     for table, states, events in (
         (control.TRANSITIONS, control.State, control.Event),
