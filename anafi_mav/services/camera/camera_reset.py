@@ -100,7 +100,7 @@ DEFAULTS = (
 
 
 async def reset_camera(camera: Camera, id: int) -> bool:
-    """Reset the settings that this camera has; return True if the drone reports all of them as reset."""
+    """Reset the settings that this camera has; return True if the drone confirms all."""
     restored: list[DefaultSetting] = []
     for setting in DEFAULTS:
         if setting.read(camera[id]) is None:
