@@ -11,6 +11,7 @@ import aiohttp
 import pytest
 from msgspec import structs
 from support.camera_states import MODEL_KEYS
+from support.cameras import PHOTO, enter
 from support.definition_readers import Described, ReadDefinition, read_definition
 from support.ext_params import fetch, read, send_set, value_of, write
 from support.flavours import both
@@ -198,6 +199,22 @@ async def test_conf_095_repeated_write_is_not_carried_out_again() -> None:
             ack = await write(w.client, "CAM_EV", 1.0, 9)
             assert (ack.param_result, value_of(ack)) == (ACCEPTED, 1.0)
         assert len(w.commands("camera.set_ev_compensation")) == 1
+
+
+@pytest.mark.parametrize("model", ["4k", "ai"])
+async def test_conf_095_unreported_value_is_not_accepted_unwritten(model: str) -> None:
+    """The interval of a series is shown as its default in other photo modes; the drone has another one."""
+    async with world(model=model) as w:
+        await enter(w.client, PHOTO)
+        for name, value, kind in (("CAM_PHOTOMODE", 3.0, 1), ("CAM_PHOTOLAPSE", 7.0, 9), ("CAM_PHOTOMODE", 0.0, 1)):
+            assert (await write(w.client, name, value, kind)).param_result == ACCEPTED
+        assert value_of(await read(w.client, "CAM_PHOTOLAPSE")) == 2.0
+        for _ in range(2):
+            assert (await write(w.client, "CAM_PHOTOLAPSE", 2.0, 9)).param_result == FAILED
+        assert sim_value(w.drone, "CAM_PHOTOLAPSE") == 7.0
+        assert (await write(w.client, "CAM_PHOTOMODE", 3.0, 1)).param_result == ACCEPTED
+        assert (await write(w.client, "CAM_PHOTOLAPSE", 2.0, 9)).param_result == ACCEPTED
+        assert sim_value(w.drone, "CAM_PHOTOLAPSE") == 2.0
 
 
 async def test_conf_095_late_answer_is_announced_as_in_progress() -> None:

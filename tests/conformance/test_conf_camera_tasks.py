@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -166,6 +167,18 @@ async def test_reset_restores_the_settings_of_the_factory(model: str) -> None:
         assert await command(w.client, RESET, 1) == ACCEPTED
         assert [sim_value(w.drone, name) for name in ("CAM_PHOTOMODE", "CAM_WBMODE", "CAM_MODE")] == [0.0, 0.0, 0.0]
         assert (await request(w.client, "CAMERA_SETTINGS")).zoomLevel == pytest.approx(0.0, abs=1.0)
+
+
+async def test_reset_is_refused_if_the_drone_keeps_a_value() -> None:
+    async with world() as w:
+        camera = w.drone.firmware.payload.cameras[0]
+        flat = camera_messages.CameraStyle.PLOG
+        camera.lens = replace(camera.lens, styles=(flat,))
+        press(w, camera_messages.SetStyle(0, flat))
+        mark = w.client.mark()
+        assert await command(w.client, RESET, 1) == REJECTED
+        assert "Camera reset refused: drone keeps its value" in texts(w.client, mark)
+        assert w.commands("camera.set_style")
 
 
 async def test_stop_overtakes_no_start_of_another_client() -> None:

@@ -6,29 +6,17 @@ MAVLink camera.md; conformance A8, C6. What a client or the pilot changes is sen
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import math
-from collections.abc import Callable, Coroutine, Mapping
-from typing import Any
+from collections.abc import Mapping
 
 from anafi_mav import texts
-from anafi_mav.drone.payload.camera_enums import (
-    CameraMode,
-    ExposureMode,
-    Metering,
-    PhotoFile,
-    PhotoFormat,
-    PhotoMode,
-    Style,
-    WhiteBalance,
-)
-from anafi_mav.drone.payload.camera_state import ExposureSettings, PhotoSettings
+from anafi_mav.drone.payload.camera_enums import CameraMode
 from anafi_mav.drone.video.stream_choice import StreamKind
-from anafi_mav.errors import NotSupported
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.camera import camera_messages
 from anafi_mav.services.camera.camera_pose import current_pose
+from anafi_mav.services.camera.camera_reset import reset_camera
 from anafi_mav.services.camera.camera_targets import is_at_autopilot, require_camera, require_free, require_idle
 from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect
 from anafi_mav.services.service import Answer, Host, Request, Service
@@ -222,41 +210,17 @@ class CameraService(Service):
         await drone.streams.show(kind)
 
     async def _reset(self, command: Command) -> None:
-        """MAV_CMD_RESET_CAMERA_SETTINGS: set the active camera as after a factory reset.
-
-        ARSDK resets all settings of a drone or none, so that each is set. Mode and storage stay.
-        """
+        """MAV_CMD_RESET_CAMERA_SETTINGS: set the active camera as after a factory reset."""
         require_camera(texts.CAMERA_RESET, command.params[1])
         if command.params[0] != 1.0:
             raise Refused(texts.CAMERA_RESET, texts.RESET_VALUE, lasting=True)
         require_free(self.host.vehicle, texts.CAMERA_RESET)
         require_idle(self.host.drone, texts.CAMERA_RESET)
-        for change in self._defaults():
-            with contextlib.suppress(NotSupported):
-                await change()
-        self._send_settings()
-
-    def _defaults(self) -> list[Callable[[], Coroutine[Any, Any, Any]]]:
         camera = self.host.drone.camera
-        id = camera.active_id
-        state = camera[id]
-        changes: list[tuple[object, Callable[[], Coroutine[Any, Any, Any]]]] = [
-            (state.exposure, lambda: camera.set_exposure(AUTOMATIC, id)),
-            (state.exposure_locked, lambda: camera.lock_exposure(False, id=id)),
-            (state.ev, lambda: camera.set_ev(0.0, id)),
-            (state.white_balance, lambda: camera.set_white_balance(WhiteBalance.AUTOMATIC, id=id)),
-            (state.white_balance_locked, lambda: camera.lock_white_balance(False, id)),
-            (state.hdr, lambda: camera.set_hdr(False, id)),
-            (state.style, lambda: camera.set_style(Style.STANDARD, id)),
-            (state.photo if state.photos else None, lambda: camera.set_photo(SINGLE, id)),
-            (state.autorecord, lambda: camera.set_autorecord(False, id)),
-            (state.zoom_max, lambda: camera.reset_zoom(id)),
-        ]
-        return [change for reported, change in changes if reported is not None]
-
-
-AUTOMATIC = ExposureSettings(mode=ExposureMode.AUTOMATIC, metering=Metering.STANDARD)
-SINGLE = PhotoSettings(mode=PhotoMode.SINGLE, format=PhotoFormat.FULL_FRAME, file=PhotoFile.JPEG)
+        is_reset = await reset_camera(camera, camera.active_id)
+        self._send_settings()
+        if not is_reset:
+            raise Refused(texts.CAMERA_RESET, texts.VALUE_KEPT)
 
 
 def _effect_of_zoom(command: Command) -> Effect:

@@ -166,9 +166,17 @@ class ParamExtService(Service):
     # Values.
 
     def _value(self, entry: CatalogueEntry) -> float:
-        """Return the value of the camera at work; of another one where it has no such setting.
+        """Return the value to send.
 
         The default stands for a setting that no camera reports now, as the interval of a series in another photo mode.
+        """
+        reported = self._reported(entry)
+        return entry.default if reported is None else reported
+
+    def _reported(self, entry: CatalogueEntry) -> float | None:
+        """Return the value of the camera at work; of another one where it has no such setting.
+
+        None: no camera reports it.
         """
         drone = self.host.drone
         cameras, thermal = drone.camera.state, drone.thermal.state
@@ -177,7 +185,7 @@ class ParamExtService(Service):
             value = entry.setting.value_of(View(drone.camera[id], cameras, thermal))
             if value is not None:
                 return value
-        return entry.default
+        return None
 
     def _message(self, place: int) -> dialect.MAVLink_message:
         """PARAM_EXT_VALUE of one setting."""
@@ -241,7 +249,7 @@ class ParamExtService(Service):
                 other.is_reported = True
                 self._acknowledge(write, dialect.PARAM_ACK_IN_PROGRESS)
                 return
-        if not any(other.name == name for other in under_way) and self._value(entry) == value:
+        if not any(other.name == name for other in under_way) and self._reported(entry) == value:
             self._acknowledge(write, dialect.PARAM_ACK_ACCEPTED)
             return
         self._queue(write)
@@ -281,7 +289,7 @@ class ParamExtService(Service):
             except AnafiMavError as error:
                 reason = reason_of(error)
             else:
-                if self._value(entry) == write.value:
+                if self._reported(entry) == write.value:
                     result = dialect.PARAM_ACK_ACCEPTED
                 elif (reason := self._capturing()) is None:
                     result, reason = dialect.PARAM_ACK_VALUE_UNSUPPORTED, texts.VALUE_KEPT
