@@ -20,6 +20,7 @@ from anafi_mav.arsdk.video.rtcp import ReceiverReport
 from anafi_mav.arsdk.video.rtp_h264 import Picture, PictureSender
 from anafi_mav.arsdk.video.video_metadata import PROTO_PROFILE, V3_PROFILE, Quaternion
 from anafi_mav.drone import Drone
+from anafi_mav.drone.video import stream as stream_module
 from anafi_mav.drone.video import video as video_module
 from anafi_mav.drone.video.video import VideoFrame, VideoState
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
@@ -382,6 +383,18 @@ async def test_closing_says_goodbye() -> None:
         assert server.methods()[-1] == "TEARDOWN"
         assert drone.video.state == VideoState()
         await stack.__aexit__(None, None, None)
+
+
+async def test_close_after_link_loss_does_not_wait_for_teardown(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stream_module, "GOODBYE", 60.0)
+    server = VideoServer()
+    server.answers["TEARDOWN"] = lambda _: None
+    async with watched(server) as (drone, device), drone.video.watching():
+        device.session.end("gone")
+        await asyncio.wait({drone.lost})
+        await asyncio.wait_for(drone.close(), 10.0)  # the next attempt to connect begins now
+        await server.until(lambda: server.methods()[-1] == "TEARDOWN")
+        server.hang_up()
 
 
 async def test_only_the_drones_datagrams_count() -> None:
