@@ -10,7 +10,6 @@ gateway knows addresses only; that some of them are simulated is the command lin
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 from collections import Counter
 from collections.abc import Awaitable, Callable
