@@ -76,7 +76,7 @@ def download_folder(media: MediaConfig) -> Path | None:
 
 
 async def _guarded(name: str, ending: Awaitable[None]) -> None:
-    """Wait for the end of one part; a mistake of ours there is logged and must not keep the others from ending."""
+    """Wait for the end of one part, and log a failure: it must not keep the others from ending."""
     try:
         await ending
     except AnafiMavError as error:
