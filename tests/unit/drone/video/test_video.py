@@ -113,6 +113,17 @@ async def test_the_drones_description_of_its_video() -> None:
     assert [one.uri.rpartition("/")[2] for one in server.asked if one.method == "SETUP"] == ["stream=1", "stream=0"]
 
 
+@pytest.mark.parametrize("fov", ["70000,42", "69,1e999", "nan,42", "0,42", "-69,42", "69"])
+async def test_impossible_field_of_view_is_unknown(fov: str) -> None:
+    server = VideoServer()
+    description = SDP.replace("69.00,42.00", fov)
+    head = "Content-Type: application/sdp\r\n"
+    server.answers["DESCRIBE"] = lambda asked: ok(asked, f"{head}Content-Base: {asked.uri}\r\n", description)
+    async with watched(server) as (drone, _), drone.video.watching():
+        assert drone.video.state.shown is not None
+        assert drone.video.state.shown.fov_deg is None
+
+
 async def test_video_runs_while_it_is_watched() -> None:
     server = VideoServer()
     async with watched(server) as (drone, _):
