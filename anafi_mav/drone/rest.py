@@ -38,6 +38,8 @@ NOT_INDEXED = 541
 """Parrot's status for a question about media while there is no index yet (developer.parrot.com, media API)."""
 
 
+NOT_FOUND = 404
+
 UNAVAILABLE = 503
 """Status of a server that will answer later (RFC 9110 §15.6.4): of a gateway whose drone is not connected."""
 
@@ -45,6 +47,10 @@ PARTIAL = 206
 """Status of an answer with one range of a file (RFC 9110 §15.3.7)."""
 
 _CONTENT_RANGE = re.compile(r"bytes ([0-9]{1,18})-[0-9]{1,18}/([0-9]{1,18})")
+
+
+class NotFound(CommandRejected):
+    """The web server has no such thing (status 404)."""
 
 
 class Rest:
@@ -160,6 +166,8 @@ class Rest:
             ) as response:
                 if response.status == UNAVAILABLE:
                     raise LinkLost(await _refusal(what, response))
+                if response.status == NOT_FOUND:
+                    raise NotFound(await _refusal(what, response))
                 if response.status >= 300:
                     raise CommandRejected(await _refusal(what, response))
                 yield response

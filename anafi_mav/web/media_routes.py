@@ -21,7 +21,7 @@ from msgspec.structs import replace
 from anafi_mav.drone import Drone
 from anafi_mav.drone.payload.media import API, MediaItem, Resource
 from anafi_mav.drone.payload.media_file import content_type
-from anafi_mav.drone.rest import NOT_INDEXED, NOT_INDEXED_YET
+from anafi_mav.drone.rest import NOT_INDEXED, NOT_INDEXED_YET, NotFound
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, NotSupported
 from anafi_mav.web.server import HttpServer, is_loopback
 
@@ -54,11 +54,11 @@ class MediaRoutes:
                 return _refuse(404, f"no drone has system id {request.match_info['sysid']}")
             try:
                 return await answer(request, drone)
+            except (NotFound, NotSupported) as error:
+                return _refuse(404, str(error))
             except CommandRejected as error:
                 status = NOT_INDEXED if error.reason == NOT_INDEXED_YET else 409
                 return _refuse(status, str(error))
-            except NotSupported as error:
-                return _refuse(404, str(error))
             except (LinkLost, CommandTimeout) as error:
                 return _refuse(503, str(error))
             except AnafiMavError as error:
@@ -83,7 +83,7 @@ class MediaRoutes:
         resource = await _resource(request, drone)
         first, end, status = 0, resource.size, 200
         headers = {"Accept-Ranges": "bytes"}
-        if "Range" in request.headers:
+        if "Range" in request.headers and resource.size:
             with contextlib.suppress(ValueError):  # a range that cannot be read is none (RFC 9110 §14.2)
                 first, end, _ = request.http_range.indices(resource.size)
                 status, headers["Content-Range"] = 206, f"bytes {first}-{end - 1}/{resource.size}"
@@ -91,7 +91,8 @@ class MediaRoutes:
                 return web.Response(status=416, headers={"Content-Range": f"bytes */{resource.size}"})
         response = web.StreamResponse(status=status, headers=headers)
         response.content_type = content_type(resource.resource_id)
-        response.content_length = end - first
+        if resource.size:
+            response.content_length = end - first
         if request.method == "HEAD":
             await response.prepare(request)
             return response
@@ -100,10 +101,12 @@ class MediaRoutes:
                 async for piece in pieces:
                     if not response.prepared:  # a drone that refuses must still be answered with its reason
                         await response.prepare(request)
-                    await response.write(piece[: end - first])
+                    await response.write(piece[: end - first] if resource.size else piece)
                     first += len(piece)
-                    if first >= end:
+                    if resource.size and first >= end:
                         break
+            if not response.prepared:  # a file without a byte
+                await response.prepare(request)
         except AnafiMavError as error:
             if not response.prepared:
                 raise

@@ -6,7 +6,9 @@ server, which is used only on request of a caller (`/api/v1/media`, developer.pa
 
 from __future__ import annotations
 
+import asyncio
 import logging
+import re
 from collections.abc import AsyncGenerator, AsyncIterator, Callable, Mapping
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from pathlib import Path
@@ -27,15 +29,18 @@ from anafi_mav.drone.payload.media_file import fetch, file_name
 from anafi_mav.drone.payload.media_index import Listing as Listing
 from anafi_mav.drone.payload.media_index import MediaIndex
 from anafi_mav.drone.payload.media_reader import MediaReader, OpenedFile
-from anafi_mav.drone.rest import Rest
+from anafi_mav.drone.rest import NotFound, Rest
 from anafi_mav.drone.settings import Commanding
-from anafi_mav.errors import CommandRejected, RemoteProtocolError
+from anafi_mav.errors import RemoteProtocolError
 
 log = logging.getLogger("anafi_mav")
 
 API = "/api/v1/media"
 NOTIFICATION_LIMIT = 1 << 20
 """Bytes of one notification; a media with a thousand resources is half of it."""
+THREAD_LIMIT = 100_000
+"""Bytes of a list from which it is decoded in a thread: the event loop controls all drones."""
+_MD5 = re.compile("[0-9a-f]{32}")
 THUMBNAIL_LIMIT = 1 << 18
 """Bytes of a thumbnail; an ANAFI's are about a tenth of it."""
 
@@ -92,9 +97,39 @@ class Notification(msgspec.Struct, frozen=True):
 def _item(received: Any) -> MediaItem | None:
     """Return a media of the drone; None when the data is not readable as one."""
     try:
-        return msgspec.convert(received, MediaItem, strict=False)
+        return _usable(msgspec.convert(received, MediaItem, strict=False))
     except (msgspec.ValidationError, RecursionError):
         return None
+
+
+def _usable(item: MediaItem) -> MediaItem:
+    """Return a media without unusable files: an id that is no file name, an impossible size."""
+    resources = tuple(file for file in item.resources if file.is_usable)
+    return item if len(resources) == len(item.resources) else replace(item, resources=resources)
+
+
+_ITEM = msgspec.json.Decoder(MediaItem, strict=False)
+
+
+def _items(body: bytes) -> tuple[tuple[MediaItem, ...], int]:
+    """Return the media of a list, and how many of them and of their files are left out.
+
+    Decoded one by one, so that a thread does it beside the event loop. Raises `RemoteProtocolError`.
+    """
+    items, dropped = [], 0
+    try:
+        parts = msgspec.json.decode(body, type=list[msgspec.Raw])
+    except (msgspec.DecodeError, RecursionError) as error:
+        raise RemoteProtocolError("the drone's list of media is not readable") from error
+    for part in parts:
+        try:
+            received = _ITEM.decode(part)
+        except (msgspec.DecodeError, RecursionError):
+            dropped += 1
+        else:
+            items.append(_usable(received))
+            dropped += len(received.resources) - len(items[-1].resources)
+    return tuple(items), dropped
 
 
 class MediaClient:
@@ -106,17 +141,17 @@ class MediaClient:
 
     def __init__(self, rest: Rest) -> None:
         self._rest = rest
+        self._warned = False
 
     async def list(self, *, newest_first: bool = True) -> tuple[MediaItem, ...]:
         """Return all media."""
         query = {"sort_order": "newest" if newest_first else "oldest"}
-        answer = await self._rest.json("GET", f"{API}/medias", query=query)
-        if not isinstance(answer, list):
-            raise RemoteProtocolError("the drone's list of media is not readable")
-        items = [_item(one) for one in answer]
-        if None in items:
-            log.warning("%d media of the drone are not readable", items.count(None))
-        return tuple(item for item in items if item is not None)
+        body = await self._rest.read("GET", f"{API}/medias", query=query)
+        items, dropped = _items(body) if len(body) < THREAD_LIMIT else await asyncio.to_thread(_items, body)
+        if dropped and not self._warned:  # a list is requested again and again
+            self._warned = True
+            log.warning("%d media or files of the drone are not readable and left out", dropped)
+        return items
 
     async def get(self, media_id: str) -> MediaItem:
         """Return one media. Raises `CommandRejected` when no media has this id."""
@@ -128,18 +163,21 @@ class MediaClient:
     async def md5(self, resource: Resource) -> str:
         """Return the MD5 of a file on the drone, hexadecimal."""
         md5 = resource.md5
-        if md5 is None:
+        if not md5:
             answer = await self._rest.json("GET", f"{API}/md5/{file_name(resource.resource_id)}")
             md5 = answer.get("md5") if isinstance(answer, dict) else None
-        if not isinstance(md5, str) or not md5:
-            raise RemoteProtocolError(f"no MD5 of {resource.resource_id}")
+        if not isinstance(md5, str) or not _MD5.fullmatch(md5.lower()):  # it becomes part of a file name of ours
+            raise RemoteProtocolError(f"the MD5 of {resource.resource_id} is not readable")
         return md5.lower()
 
     async def known_md5(self, resource: Resource) -> str | None:
-        """Return the MD5 of a file; None when the drone has none."""
+        """Return the MD5 of a file; None when the drone has none (status 404).
+
+        Any other failure is raised: a copy that could have been compared must not pass for one that could not.
+        """
         try:
             return await self.md5(resource)
-        except (CommandRejected, RemoteProtocolError):
+        except NotFound:
             return None
 
     async def thumbnail(self, of: MediaItem | Resource) -> bytes:

@@ -11,12 +11,16 @@ import hashlib
 import json
 import re
 from collections.abc import AsyncGenerator, Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime
 from itertools import count
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
-from anafi_mav.drone.payload.media_file import UNKNOWN, WRITTEN, Place, Resource, fetch, file_name
+from msgspec.structs import replace
+
+from anafi_mav.drone.payload.media_file import UNKNOWN, Place, Resource, fetch, file_name
+from anafi_mav.drone.payload.media_part import WRITTEN
 from anafi_mav.errors import AnafiMavError, CommandTimeout, LinkLost
 
 TRIES = 6
@@ -27,6 +31,11 @@ PAUSE = 2.0
 
 XMP_LIMIT = 1 << 18
 """Bytes at the beginning of a photo that are searched for XMP; each segment before it has at most 64 KiB."""
+
+_DISK = ThreadPoolExecutor(4, thread_name_prefix="media-disk")
+"""The threads for the folder of copies: a disk that sleeps must not block the pool that flying uses."""
+
+T = TypeVar("T")
 
 _XMP = re.compile(rb"<x:xmpmeta.*?</x:xmpmeta>", re.DOTALL)
 _ANGLES = {"roll": "CameraRollDegree", "pitch": "CameraPitchDegree", "yaw": "CameraYawDegree"}
@@ -81,18 +90,65 @@ async def copy(
 
 async def _copy(source: Source, resource: Resource, folder: Path, progress: Callable[[int, int], None]) -> Path | None:
     directory = folder / resource.date
+    if await _on_disk(_is_known, directory, resource):
+        return None
     md5 = await source.known_md5(resource)
-    name = await asyncio.to_thread(_free_name, directory, resource, md5)
+    name = await _on_disk(_free_name, directory, resource, md5)
     if name is None:
         return None
     path = await fetch(resource, directory, source.read_from, md5, progress, name)
-    await asyncio.to_thread(_write_sidecar, path, resource, md5)
+    await _on_disk(_write_sidecar, path, resource, md5)
     return path
+
+
+async def _on_disk(job: Callable[..., T], *arguments: Any) -> T:
+    """Run a job that reads or writes files in a thread for such jobs."""
+    return await asyncio.get_running_loop().run_in_executor(_DISK, job, *arguments)
 
 
 def sidecar_of(path: Path) -> Path:
     """Return the path of a file's sidecar."""
     return path.with_name(path.name + ".json")
+
+
+def _is_known(directory: Path, resource: Resource) -> bool:
+    """Return True when a sidecar shows the file to be copied: no MD5 has to be requested."""
+    name = file_name(resource.resource_id)
+    if iso_time(resource.datetime) is None or not resource.size:
+        return False
+    if _describes(directory / name, resource):
+        return True
+    if not (directory / name).exists():
+        return False
+    stem, ending = _split(name)
+    return any(
+        _describes(found.with_name(found.name.removesuffix(".json")), resource)
+        for found in directory.glob(f"{stem}-*{ending}.json")
+    )
+
+
+def _describes(path: Path, resource: Resource) -> bool:
+    """Return True when the sidecar of a copy has this file's id, time and size.
+
+    Also its MD5, where the list has it.
+    """
+    try:
+        size, known = path.stat().st_size, _read_sidecar(path)
+    except OSError:
+        return False
+    wanted = {"resource_id": resource.resource_id, "time": iso_time(resource.datetime), "size": resource.size or size}
+    if resource.md5:
+        wanted["md5"] = resource.md5.lower()
+    return size == wanted["size"] and all(known.get(key, "") == value for key, value in wanted.items())
+
+
+def _read_sidecar(path: Path) -> dict[str, Any]:
+    """Return the content of a file's sidecar; empty when it is not readable."""
+    try:
+        known = json.loads(sidecar_of(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return known if isinstance(known, dict) else {}
 
 
 def _free_name(directory: Path, resource: Resource, md5: str | None) -> str | None:
@@ -112,21 +168,24 @@ def _free_name(directory: Path, resource: Resource, md5: str | None) -> str | No
 def _names(name: str, mark: str) -> Iterator[str]:
     """Yield "a.JPG", "a-1b2c3d.JPG", "a-1b2c3d-2.JPG", …"""
     yield name
-    stem, dot, ending = name.rpartition(".")
-    stem, ending = (stem, dot + ending) if dot else (name, "")
+    stem, ending = _split(name)
     yield f"{stem}-{mark}{ending}"
     for number in count(2):
         yield f"{stem}-{mark}-{number}{ending}"
 
 
+def _split(name: str) -> tuple[str, str]:
+    """Return ("a", ".JPG")."""
+    stem, dot, ending = name.rpartition(".")
+    return (stem, dot + ending) if dot else (name, "")
+
+
 def _is_copy(path: Path, resource: Resource, md5: str | None) -> bool:
-    if path.stat().st_size != resource.size:
+    if resource.size and path.stat().st_size != resource.size:
         return False
-    try:
-        known = json.loads(sidecar_of(path).read_text(encoding="utf-8")).get("md5")
-    except (OSError, ValueError, AttributeError):
-        known = None
-    return md5 is None or (known or _md5(path)) == md5
+    if md5 is None:  # a file without a sidecar may be any of the same size
+        return _describes(path, resource)
+    return (_read_sidecar(path).get("md5") or _md5(path)) == md5
 
 
 def _md5(path: Path) -> str:
@@ -140,16 +199,19 @@ def _md5(path: Path) -> str:
 def _write_sidecar(path: Path, resource: Resource, md5: str | None) -> None:
     with path.open("rb") as file:
         xmp = read_xmp(file.read(XMP_LIMIT)) if resource.format.upper() in ("JPG", "DNG") else {}
-    text = json.dumps(sidecar(path.name, resource, md5 or _md5(path), xmp), indent=2) + "\n"
+    written = replace(resource, size=path.stat().st_size)
+    text = json.dumps(sidecar(path.name, written, md5 or _md5(path), xmp, md5), indent=2) + "\n"
     part = sidecar_of(path).with_suffix(".json.part")
     part.write_text(text, encoding="utf-8")
     part.replace(sidecar_of(path))
 
 
-def sidecar(name: str, resource: Resource, md5: str, xmp: dict[str, str]) -> dict[str, Any]:
+def sidecar(
+    name: str, resource: Resource, md5: str, xmp: dict[str, str], md5_of_drone: str | None = None
+) -> dict[str, Any]:
     """Return the content of a sidecar; None: unknown.
 
-    s, m, degrees, heights above mean sea level.
+    s, m, degrees, heights above mean sea level. `md5` is that of the copy, `md5_of_drone` the one it was compared with.
     """
     place, source = resource.gps, "drone"
     if place is None or not place.is_known:
@@ -163,6 +225,7 @@ def sidecar(name: str, resource: Resource, md5: str, xmp: dict[str, str]) -> dic
         "format": resource.format or None,
         "size": resource.size,
         "md5": md5,
+        "md5_of_drone": md5_of_drone,
         "time": iso_time(resource.datetime),
         "place": None
         if place is None

@@ -3,28 +3,28 @@
 from __future__ import annotations
 
 import asyncio
-import hashlib
-import os
 import re
 from collections.abc import AsyncGenerator, Callable
 from contextlib import aclosing
 from pathlib import Path
-from typing import Any, BinaryIO
 
 import msgspec
 
-from anafi_mav.errors import CommandRejected, RemoteProtocolError
-from anafi_mav.state_lock import try_lock
-
-WRITTEN = 1 << 20
-"""Bytes that are written to the disk at once."""
+from anafi_mav.drone.payload.media_part import WRITTEN, PartFile
+from anafi_mav.errors import RemoteProtocolError
 
 _FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,127}")
 """Ids of the drone become file names of ours: nothing but plain names may."""
 
 _DATE = re.compile(r"([0-9]{4})([0-9]{2})([0-9]{2})T")
 
+_TIME = re.compile(r"[0-9]{8}T[0-9]{6}([+-][0-9]{4}|Z)?")
+"""ISO 8601 basic."""
+
 _TYPES = {"JPG": "image/jpeg", "DNG": "image/x-adobe-dng", "MP4": "video/mp4", "PNG": "image/png"}
+
+MAX_FILE = 1 << 63
+"""Bytes that no file has: offsets of files are signed."""
 
 UNDATED = "undated"
 """Folder of a file without a readable time."""
@@ -71,6 +71,11 @@ class Resource(msgspec.Struct, frozen=True):
     gps: Place | None = None
 
     @property
+    def is_usable(self) -> bool:
+        """True when its id can be a file name and its size that of a file."""
+        return _FILE_NAME.fullmatch(self.resource_id) is not None and 0 <= self.size < MAX_FILE
+
+    @property
     def date(self) -> str:
         """Day on which it was made by the drone's clock, "2026-11-22".
 
@@ -78,6 +83,16 @@ class Resource(msgspec.Struct, frozen=True):
         """
         found = _DATE.match(self.datetime)
         return UNDATED if found is None else "-".join(found.groups())
+
+    @property
+    def identity(self) -> str | None:
+        """Size and time, for a file name: with the id they identify a file, also after a format.
+
+        None when one of them is unknown.
+        """
+        if not self.size or not _TIME.fullmatch(self.datetime):
+            return None
+        return f"{self.size}-{self.datetime}"
 
 
 def content_type(name: str) -> str:
@@ -102,86 +117,41 @@ async def fetch(
 ) -> Path:
     """Download a file to a directory, compare its MD5 if that is known, and return its path.
 
-    It has its name only once it is complete. Until then it is a `.part` with its MD5 or size in the name, from which
-    the next call continues: never one of another file. Raises `RemoteProtocolError` when size or MD5 differ; a part
-    with another MD5 is deleted. Raises `CommandRejected` while another download writes it, and `OSError` of the disk.
+    It has its name only once it is complete. Until then it is a `.part`, from which the next call continues: never one
+    of another file, because its MD5 is in the name, or else size and time. Raises `RemoteProtocolError` when size or
+    MD5 differ or no byte arrives; a part with another MD5 is deleted. Raises `CommandRejected` while another download
+    writes it, and `OSError` of the disk.
     `name`: of the copy, instead of the file's own.
     """
     name = name or file_name(resource.resource_id)
-    mark = md5[:12] if md5 is not None and re.fullmatch("[0-9a-f]{32}", md5) else str(resource.size)
-    path, part = directory / name, directory / f"{name}.{mark}.part"
-    digest = hashlib.md5(usedforsecurity=False)
-    opened = await asyncio.to_thread(_open_part, part)
+    identity = md5[:12] if md5 is not None else resource.identity
+    part = PartFile(directory / f"{name}.{identity or resource.size}.part")
+    waiting = bytearray()
     try:
-        with opened as file:
-            done = await asyncio.to_thread(_digest_part, part, file, digest, resource.size)
-            waiting = bytearray()
-            try:
-                if not resource.size or done < resource.size:
-                    async with aclosing(read_from(resource, done)) as pieces:
-                        async for piece in pieces:
-                            waiting += piece
-                            if resource.size and done + len(waiting) > resource.size:
-                                raise RemoteProtocolError(f"{name}: more than its {resource.size} bytes arrive")
-                            if len(waiting) >= WRITTEN:
-                                data = bytes(waiting)
-                                waiting.clear()
-                                done += await asyncio.to_thread(_write, file, data, digest)
-                            if progress is not None:
-                                progress(done + len(waiting), resource.size)
-            finally:  # also the bytes before an interruption: the next call continues behind them
-                done += _write(file, bytes(waiting), digest)
-            await asyncio.to_thread(_sync, file)
-        if resource.size and done != resource.size:
-            raise RemoteProtocolError(f"{name}: expected {resource.size} bytes, got {done}")
-        if md5 is not None and digest.hexdigest() != md5:
-            part.unlink()
-            raise RemoteProtocolError(f"{name}: the copy is not what the drone has (MD5)")
-        part.replace(path)
-    finally:
-        if part.exists() and not part.stat().st_size:
-            part.unlink()
-    return path
-
-
-def _open_part(part: Path) -> BinaryIO:
-    """Open a part to write behind its end, and lock it.
-
-    Raises `CommandRejected` while another download has it.
-    """
-    file = part.open("ab")
-    try:
-        try:
-            is_ours = try_lock(file.fileno())
-        except OSError:  # a file system without locks: the MD5 shows what two writers have made
-            is_ours = True
-        if not is_ours or not part.exists() or not os.path.samestat(os.fstat(file.fileno()), part.stat()):
-            raise CommandRejected(f"{part.name} is written by another download")
-    except BaseException:
-        file.close()
+        done = await part.open(resource.size, continues=identity is not None)
+        if not resource.size or done < resource.size:
+            async with aclosing(read_from(resource, done)) as pieces:
+                async for piece in pieces:
+                    waiting += piece
+                    if resource.size and done + len(waiting) > resource.size:
+                        raise RemoteProtocolError(f"{name}: more than its {resource.size} bytes arrive")
+                    if len(waiting) >= WRITTEN:
+                        done = await part.write(_taken(waiting))
+                    if progress is not None:
+                        progress(done + len(waiting), resource.size)
+        await part.write(_taken(waiting))
+        await part.finish(directory / name, resource.size, md5)
+    except asyncio.CancelledError:  # by a take-off for example, which must not wait for a disk
+        part.abandon(bytes(waiting))
         raise
-    return file
+    except BaseException:
+        await part.close(bytes(waiting))
+        raise
+    await part.close(b"")
+    return directory / name
 
 
-def _digest_part(part: Path, file: BinaryIO, digest: Any, size: int) -> int:
-    """Return the bytes of an interrupted download, and put them into the digest."""
-    if not size or part.stat().st_size > size:
-        file.truncate(0)
-        return 0
-    done = 0
-    with part.open("rb") as present:
-        while data := present.read(WRITTEN):
-            digest.update(data)
-            done += len(data)
-    return done
-
-
-def _sync(file: Any) -> None:
-    file.flush()
-    os.fsync(file.fileno())
-
-
-def _write(file: Any, data: bytes, digest: Any) -> int:
-    file.write(data)
-    digest.update(data)
-    return len(data)
+def _taken(waiting: bytearray) -> bytes:
+    data = bytes(waiting)
+    waiting.clear()
+    return data

@@ -207,8 +207,6 @@ class _Read:
     async def _run(self) -> None:
         try:
             await self._read()
-        except asyncio.TimeoutError:  # no reader wants more
-            pass
         except Exception as error:
             self.problem = error
         finally:
@@ -229,7 +227,10 @@ class _Read:
                         return
                     while self.next > self._wanted + AHEAD:
                         self._more.clear()
-                        await asyncio.wait_for(self._more.wait(), IDLE)
+                        try:
+                            await asyncio.wait_for(self._more.wait(), IDLE)
+                        except asyncio.TimeoutError:  # no reader wants more
+                            return
         ended = self.next * PIECE + len(buffer)
         raise RemoteProtocolError(f"{self.resource.resource_id}: the answer ended at byte {ended}")
 

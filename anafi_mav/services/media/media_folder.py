@@ -18,7 +18,7 @@ from typing import TypeVar
 from anafi_mav import texts
 from anafi_mav.drone import Drone
 from anafi_mav.drone.payload.media import Listing, Resource
-from anafi_mav.drone.rest import NOT_INDEXED_YET
+from anafi_mav.drone.rest import NOT_INDEXED_YET, NotFound
 from anafi_mav.errors import AnafiMavError, CommandRejected
 from anafi_mav.services.checksum import crc32
 from anafi_mav.services.files import MAX_SIZE, Entry, FileError, FileRefused, FileSource
@@ -62,12 +62,12 @@ class MediaFolder:
                 return self._checksums[resource]
 
     async def _sum(self, resource: Resource) -> int:
+        md5 = await self._drone.media.known_md5(resource)
         crc, digest = 0, hashlib.md5(usedforsecurity=False)
         async with aclosing(self._drone.media.read_from(resource)) as pieces:
             async for piece in pieces:
                 crc = crc32(piece, crc)
                 digest.update(piece)
-        md5 = await self._drone.media.known_md5(resource)
         if md5 is not None and digest.hexdigest() != md5:
             raise FileRefused(FileError.FAIL, texts.FILE_DAMAGED)
         return crc
@@ -155,6 +155,6 @@ def refusing() -> Iterator[None]:
     except AnafiMavError as error:
         if isinstance(error, CommandRejected) and error.reason == NOT_INDEXED_YET:
             raise FileRefused(FileError.FAIL, texts.MEDIA_NOT_INDEXED) from error
-        if isinstance(error, CommandRejected) and "HTTP 404" in error.reason:
+        if isinstance(error, NotFound):
             raise FileRefused(FileError.FILE_NOT_FOUND) from error
         raise FileRefused(FileError.FAIL, texts.MEDIA_UNAVAILABLE.fill(error=texts.from_below(error))) from error

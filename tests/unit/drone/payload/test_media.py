@@ -163,6 +163,34 @@ async def test_media_that_are_not_readable_are_left_out() -> None:
                 await drone.media.get(wrong)
 
 
+async def test_files_that_cannot_be_shown_are_left_out(caplog: pytest.LogCaptureFixture) -> None:
+    good = {"resource_id": "1.JPG", "size": 9}
+    bad = [{"resource_id": id} for id in ("a/b", "a\tb", "a\0", "x" * 231, "..")]
+    bad += [{"resource_id": "2.JPG", "size": size} for size in (-1, 1 << 63)]
+    many = [{"media_id": str(n), "resources": [good, *bad]} for n in range(500)]  # decoded in a thread
+    async with serving(medias=told(many)) as (drone, _):
+        for _ in range(2):
+            items = await drone.media.list()
+            assert {tuple(file.resource_id for file in item.resources) for item in items} == {("1.JPG",)}
+        assert [record.message for record in caplog.records if "left out" in record.message] == [
+            "3500 media or files of the drone are not readable and left out"
+        ]
+
+
+async def test_missing_md5_differs_from_failed_md5_request() -> None:
+    answers = {"path": told({"md5": "../../x"}), "short": told({"md5": "0" * 31}), "error": web.Response(status=500)}
+    async with serving(good=told({"md5": "A" * 32}), **answers) as (drone, _):
+        assert await drone.media.known_md5(Resource("good")) == "a" * 32
+        assert await drone.media.known_md5(Resource("none")) is None
+        for name, problem in (
+            ("path", RemoteProtocolError),
+            ("short", RemoteProtocolError),
+            ("error", CommandRejected),
+        ):
+            with pytest.raises(problem):
+                await drone.media.known_md5(Resource(name))
+
+
 @pytest.mark.parametrize("body", [b"{", b"\xff\xfe", b"[" * 100_000, b'"text"', b"null"])
 async def test_answers_that_are_no_list(body: bytes) -> None:
     async with serving(medias=web.Response(body=body)) as (drone, _):

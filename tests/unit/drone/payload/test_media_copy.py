@@ -5,13 +5,17 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import json
+import os
+import sys
+import threading
 from collections.abc import AsyncGenerator
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from anafi_mav.drone.payload.media_copy import TRIES, copy, read_xmp, sidecar, sidecar_of
-from anafi_mav.drone.payload.media_file import Place, Resource
+from anafi_mav.drone.payload.media_file import Place, Resource, fetch
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost, RemoteProtocolError
 
 PHOTO = b"\xff\xd8 a photo \xff\xd9" * 1000
@@ -25,8 +29,10 @@ class Source:
         self.content = content
         self.cuts = list(cuts)
         self.offsets: list[int] = []
+        self.md5_requests = 0
 
     async def known_md5(self, resource: Resource) -> str | None:
+        self.md5_requests += 1
         return hashlib.md5(self.content).hexdigest()
 
     async def read_from(self, resource: Resource, offset: int = 0) -> AsyncGenerator[bytes, None]:
@@ -53,8 +59,10 @@ async def test_copy_has_a_sidecar_and_is_made_once(tmp_path: Path) -> None:
     assert names(tmp_path) == [f"{DAY}/100000010001.JPG", f"{DAY}/100000010001.JPG.json"]
     told = json.loads(sidecar_of(path).read_text())
     assert (told["md5"], told["size"]) == (hashlib.md5(PHOTO).hexdigest(), len(PHOTO))
+    assert told["md5_of_drone"] == told["md5"]
     assert told["time"] == "2026-11-22T10:11:12+01:00"
     assert await copy(source, resource(), tmp_path) is None
+    assert source.md5_requests == 1  # the second time the sidecar was enough
     sidecar_of(path).unlink()  # the copy was ended before it was written
     assert await copy(source, resource(), tmp_path) is None
     assert sidecar_of(path).exists()
@@ -64,12 +72,14 @@ async def test_copy_has_a_sidecar_and_is_made_once(tmp_path: Path) -> None:
 async def test_copy_of_other_content_with_one_name_keeps_both(tmp_path: Path) -> None:
     await copy(Source(), resource(), tmp_path)
     other = PHOTO[::-1]
+    later = replace(resource(other), datetime="20261122T111213+0100")
     mark = hashlib.md5(other).hexdigest()[:6]
-    assert await copy(Source(other), resource(other), tmp_path) == tmp_path / DAY / f"100000010001-{mark}.JPG"
+    assert await copy(Source(other), later, tmp_path) == tmp_path / DAY / f"100000010001-{mark}.JPG"
     assert (tmp_path / DAY / "100000010001.JPG").read_bytes() == PHOTO
     edited = tmp_path / DAY / f"100000010001-{mark}.JPG"
     edited.write_bytes(b"edited by the user")
-    assert await copy(Source(other), resource(other), tmp_path) == tmp_path / DAY / f"100000010001-{mark}-2.JPG"
+    assert await copy(Source(other), later, tmp_path) == tmp_path / DAY / f"100000010001-{mark}-2.JPG"
+    assert await copy(Source(other), later, tmp_path) is None
     assert edited.read_bytes() == b"edited by the user"
 
 
@@ -180,3 +190,86 @@ def test_sidecar_of_unreadable_data_is_unknown(data: bytes) -> None:
     assert told["camera_attitude"] is None
     assert told["time"] is None
     assert json.dumps(told, allow_nan=False)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a pipe stands for the slow disk")
+async def test_cancelled_download_to_blocked_disk_ends_at_once(tmp_path: Path) -> None:
+    """A part that is a pipe takes 64 KiB and then no byte, like a disk that sleeps."""
+    content = bytes(3 << 20)
+    part = tmp_path / f"a.MP4.{'0' * 12}.part"
+    os.mkfifo(part)
+    pipe = os.open(part, os.O_RDONLY | os.O_NONBLOCK)
+    begun, ended, drained = asyncio.Event(), threading.Event(), []
+
+    def drain() -> None:
+        ended.wait(10.0)  # without the mend the event loop waits for this
+        os.set_blocking(pipe, True)
+        with os.fdopen(pipe, "rb") as reader:
+            drained.append(len(reader.read()))
+
+    loop = asyncio.get_running_loop()
+    loop.add_reader(pipe, begun.set)
+    copying = asyncio.ensure_future(fetch(resource(content, "a.MP4"), tmp_path, Source(content).read_from, "0" * 32))
+    disk = threading.Thread(target=drain)
+    disk.start()
+    await begun.wait()
+    loop.remove_reader(pipe)
+    copying.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await copying
+    assert not drained  # the loop went on while the disk took nothing
+    ended.set()
+    disk.join()
+    assert drained == [len(content)]  # the thread has written the rest and closed the file
+
+
+class Unknowing(Source):
+    """A drone without MD5."""
+
+    async def known_md5(self, resource: Resource) -> str | None:
+        return None
+
+
+async def test_copy_that_was_not_compared_says_so(tmp_path: Path) -> None:
+    path = await copy(Unknowing(), resource(), tmp_path)
+    assert path is not None
+    told = json.loads(sidecar_of(path).read_text())
+    assert (told["md5"], told["md5_of_drone"]) == (hashlib.md5(PHOTO).hexdigest(), None)
+    assert await copy(Unknowing(), resource(), tmp_path) is None
+    sidecar_of(path).unlink()  # now it may be any file of this size
+    again = await copy(Unknowing(), resource(), tmp_path)
+    assert again not in (None, path)
+    assert await copy(Unknowing(), resource(), tmp_path) is None
+
+
+async def test_part_of_a_file_of_another_time_is_not_continued(tmp_path: Path) -> None:
+    """Ids begin again after a format, and sizes can be equal."""
+    with pytest.raises(LinkLost):
+        await copy(Unknowing(cuts=(300,) * TRIES), resource(), tmp_path)
+    other = Unknowing(PHOTO[::-1])
+    path = await copy(other, replace(resource(), datetime="20261122T111213+0100"), tmp_path)
+    assert path is not None
+    assert (path.read_bytes(), other.offsets) == (PHOTO[::-1], [0])
+    untimed = Unknowing(cuts=(300, len(PHOTO)))
+    assert await copy(untimed, replace(resource(), datetime=""), tmp_path) is not None
+    assert untimed.offsets == [0, 0]
+
+
+async def test_failed_md5_request_fails_the_copy(tmp_path: Path) -> None:
+    class Failing(Source):
+        async def known_md5(self, resource: Resource) -> str | None:
+            raise CommandRejected("GET: HTTP 500")
+
+    with pytest.raises(CommandRejected, match="500"):
+        await copy(Failing(), resource(), tmp_path)
+    assert names(tmp_path) == []
+
+
+async def test_copies_of_unknown_size_are_made_once(tmp_path: Path) -> None:
+    unknown = replace(resource(), size=0)
+    assert await copy(Unknowing(), unknown, tmp_path) is not None
+    assert await copy(Unknowing(), unknown, tmp_path) is None
+    assert await copy(Source(), unknown, tmp_path) is None
+    with pytest.raises(RemoteProtocolError, match="no bytes"):
+        await copy(Source(b""), replace(unknown, resource_id="empty.JPG"), tmp_path)
+    assert names(tmp_path) == [f"{DAY}/{unknown.resource_id}", f"{DAY}/{unknown.resource_id}.json"]

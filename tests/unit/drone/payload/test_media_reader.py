@@ -13,7 +13,7 @@ import pytest
 from anafi_mav.drone.payload import media_reader
 from anafi_mav.drone.payload.media_file import Resource, fetch
 from anafi_mav.drone.payload.media_reader import AHEAD, PIECE, READS, MediaReader
-from anafi_mav.errors import CommandRejected, LinkLost, RemoteProtocolError
+from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, RemoteProtocolError
 
 SIZE = 40 * PIECE + 7
 
@@ -206,3 +206,19 @@ async def test_download_with_a_wrong_md5_leaves_nothing(server: Server, tmp_path
     with pytest.raises(RemoteProtocolError, match="MD5"):
         await fetch(server.add("a.JPG", 1000), tmp_path, MediaReader(server).read_from, "0" * 32)
     assert names(tmp_path) == []
+
+
+async def test_answer_that_times_out_fails_its_reader(server: Server) -> None:
+    wanted = server.add("a")
+
+    class Silent(Server):
+        @asynccontextmanager
+        async def open(self, resource: Resource, offset: int = 0) -> AsyncIterator[tuple[int, AsyncIterator[bytes]]]:
+            self.opened.append((resource.resource_id, offset))
+            raise CommandTimeout("GET", 10.0)
+            yield
+
+    silent = Silent()
+    with pytest.raises(CommandTimeout):
+        await MediaReader(silent).read(wanted, 0, 10)
+    assert len(silent.opened) == 1
