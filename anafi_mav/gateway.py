@@ -10,10 +10,9 @@ gateway knows addresses only; that some of them are simulated is the command lin
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 from types import TracebackType
 
@@ -76,6 +75,16 @@ def download_folder(media: MediaConfig) -> Path | None:
         raise ConfigError("media.download_folder", f"expected the path of a folder: {error}") from error
 
 
+async def _guarded(name: str, ending: Awaitable[None]) -> None:
+    """Wait for the end of one part, and log a failure: it must not keep the others from ending."""
+    try:
+        await ending
+    except AnafiMavError as error:
+        logger.info("ending %s: %s", name, error)
+    except Exception:
+        logger.exception("ending %s failed: a mistake of ours", name)
+
+
 class _Supervised:
     """A drone with its system and the task that keeps them connected."""
 
@@ -89,6 +98,8 @@ class _Supervised:
         self.problem = ""
         """Why the last attempt to connect failed; empty while connected."""
         self.task: asyncio.Task[None] | None = None
+        self._is_closing = False
+        """True while the drone's connection is closed, which must not be interrupted."""
         self._contention = Contention()
         self._judged = drone.handshake_at
         """The handshake whose loss was judged last."""
@@ -100,7 +111,24 @@ class _Supervised:
         try:
             await self._run()
         finally:
+            await self._close()
+            await self.drone.video.close()  # after a link loss its goodbye may still be under way
+
+    async def stop(self) -> None:
+        """Cancel `run`, and wait until it has closed the drone's connection."""
+        task = self.task
+        # Before Python 3.12 wait_for forgets a cancellation that comes when what it waits for is just done.
+        while task is not None and not task.done():
+            if not self._is_closing:
+                task.cancel()
+            await asyncio.wait([task], timeout=CANCEL_WAIT)
+
+    async def _close(self) -> None:
+        self._is_closing = True
+        try:
             await self.drone.close()
+        finally:
+            self._is_closing = False
 
     async def _run(self) -> None:
         pause = RETRY_FIRST
@@ -123,7 +151,7 @@ class _Supervised:
                     self.system.link_down()
                     self._changed()
                     if not self.drone.fading:
-                        await self.drone.close()
+                        await self._close()
             except Exception as error:
                 # Whatever it is, the drone must not be out of reach until somebody restarts the gateway.
                 problem = str(error) or repr(error)
@@ -373,27 +401,24 @@ class Gateway:
         Clients are not heard any more, or one of them would fly on what has just been stopped.
         """
         self._node.stop_delivering()
-        if self.relay is not None:
-            await self.relay.close()
+        # The drones first: nothing that a viewer, a browser or a video server does may delay their hover.
         await asyncio.gather(*(self._leave(s) for s in self._supervised))
         self._supervised.clear()
+        if self.relay is not None:
+            await _guarded("the video server", self.relay.close())
         if self.web is not None:
-            await self.web.close()
+            await _guarded("the web server", self.web.close())
         await self._node.close()
         self._unlock_state()
 
     async def _leave(self, supervised: _Supervised) -> None:
-        if supervised.system.active:
-            with contextlib.suppress(AnafiMavError):
-                await supervised.system.let_go()
-        if supervised.system.active and not supervised.system.vehicle.on_ground:
+        drone, system = supervised.drone, supervised.system
+        if system.active:
+            await _guarded(f"the flight of {supervised.config.name}", system.let_go())
+        if system.active and not system.vehicle.on_ground:
             # Centred sticks are not acknowledged: stay while they are repeated.
-            await asyncio.wait([supervised.drone.lost], timeout=HOVER_TIME)
-        if supervised.task is not None:
-            # Before Python 3.12 wait_for forgets a cancellation that comes when what it waits for is just done.
-            while not supervised.task.done():
-                supervised.task.cancel()
-                await asyncio.wait([supervised.task], timeout=CANCEL_WAIT)
+            await asyncio.wait([drone.lost], timeout=HOVER_TIME)
+        await _guarded(f"the connection of {supervised.config.name}", supervised.stop())
 
     @property
     def systems(self) -> tuple[System, ...]:

@@ -559,7 +559,11 @@ class Drone:
             self._lost.set_result(why)
 
     async def close(self) -> None:
-        """End the connection; commands sent just before still leave. Does nothing without one."""
+        """End the connection; commands sent just before still leave. Does nothing without one.
+
+        After a link loss this waits for no answer of the drone, or the next attempt to connect would begin late: the
+        goodbye of its video goes on in the background, see `Video.close`.
+        """
         fading = self._fading
         self._drop_fading("closed")
         if fading is not None:
@@ -574,7 +578,7 @@ class Drone:
                 await session.close()
                 self._on_lost(session, session.lost)
         self.streams.link_lost()
-        await self.video.close()
+        self.video.link_lost()
         await self.media.close()
         await self._rest.close()
 

@@ -73,6 +73,11 @@ def finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
+def field_of_view(deg: float | None) -> float | None:
+    """Return the angle in degrees; None, unknown, for NaN and what no lens has."""
+    return deg if deg is not None and 0.0 < deg <= 360.0 else None
+
+
 def setting(message: Any) -> Range | None:
     """The current, min and max of a setting event; None when one of them is not a number."""
     if not math.isfinite(message.current + message.min + message.max):

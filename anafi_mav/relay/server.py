@@ -51,8 +51,11 @@ MAX_UNREAD = 64 * 1024
 """Bytes of responses that may wait for a client that sends requests and does not read."""
 
 READ_SIZE = 4096
+"""Bytes that are answered before other tasks run: at most some hundred requests, 2 ms."""
 TICK = 1.0
 """s between two sender reports, and between looks at silent viewers."""
+MAX_REQUESTS = 64
+"""Requests of one viewer in a `TICK`. A player sends five to begin, and then one in some seconds."""
 
 STUCK = 10.0
 """s without taking a byte after which a viewer inside its RTSP connection is gone."""
@@ -211,6 +214,10 @@ class _Connection:
         self._heard = self._moved = server.clock.monotonic()
         self._waited = 0
         """Bytes that waited at the last look."""
+        self._requests = 0
+        """Requests since the last tick."""
+        self._responses = 0
+        """Bytes of responses since the connection's buffer was empty: so many the viewer may not have read."""
         self._outlet: Outlet | None = None
         self._stream: tuple[DroneSource, StreamKind] | None = None
         self._feed: Feed | None = None
@@ -232,16 +239,34 @@ class _Connection:
                 if isinstance(event, InterleavedData):
                     self._on_report(event.data)
                 elif isinstance(event, RtspRequest):
-                    if self._watch is None and self._writer.transport.get_write_buffer_size() > MAX_UNREAD:
+                    if self._is_flooding():
+                        self._writer.transport.abort()  # what it has not read would be kept for it
                         return
                     self._heard = self._server.clock.monotonic()
                     await self._answer(self._dialogue.judge(event))
                     if self._writer.is_closing():
                         return
+            await asyncio.sleep(0)  # bytes that have arrived already are read without a pause
+
+    def _is_flooding(self) -> bool:
+        """Count a request; True when the viewer sends too many, or does not read the responses."""
+        self._requests += 1
+        if self._requests > MAX_REQUESTS:
+            log.info("video: %s sends more than %d requests in %.0f s", self._name, MAX_REQUESTS, TICK)
+            return True
+        if self._responses > MAX_UNREAD and self._writer.transport.get_write_buffer_size():
+            log.info("video: %s does not read the responses", self._name)
+            return True
+        return False
 
     def _write(self, response: Response) -> None:
-        if not self._writer.is_closing():
-            self._writer.write(rtsp.encode(response))
+        if self._writer.is_closing():
+            return
+        data = rtsp.encode(response)
+        # The buffer holds pictures, too, when they are sent inside the connection; `PictureGate` bounds those.
+        waiting = self._writer.transport.get_write_buffer_size()
+        self._responses = len(data) + (self._responses if waiting else 0)
+        self._writer.write(data)
 
     async def _answer(self, wanted: ViewerRequest) -> None:
         if wanted.response is not None:
@@ -334,6 +359,7 @@ class _Connection:
 
     def tick(self, now: float) -> None:
         """Report to the viewer, and close when nothing is heard of it."""
+        self._requests = 0
         if self._watch is None:
             if now - self._heard > SESSION_TIMEOUT:
                 self.close()

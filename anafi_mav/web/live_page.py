@@ -17,8 +17,10 @@ from anafi_mav.web.server import HttpServer, RequestCallback
 
 FOLDER = Path(__file__).parent / "page"
 
+HTML = "text/html"
+
 FILES: Final = {
-    "/": ("index.html", "text/html"),
+    "/": ("index.html", HTML),
     "/live.css": ("live.css", "text/css"),
     "/live.js": ("live.js", "text/javascript"),
     "/drone.js": ("drone.js", "text/javascript"),
@@ -50,9 +52,10 @@ class LivePage:
         """`drones` returns the entries in the order of the configuration."""
         self._drones = drones
         for path, (name, kind) in FILES.items():
-            server.add_get(path, _file((FOLDER / name).read_bytes(), kind))
+            add = server.add_page if kind == HTML else server.add_get
+            add(path, _file((FOLDER / name).read_bytes(), kind))
         path, name = DRONE_PAGE
-        server.add_get(path, _file((FOLDER / name).read_bytes(), "text/html"))
+        server.add_page(path, _file((FOLDER / name).read_bytes(), HTML))
         server.add_get("/drones", self._list)
 
     async def _list(self, request: web.Request) -> web.Response:

@@ -12,6 +12,8 @@ page of another site must not reach it through the user's browser:
 - The Host header has to be an IP address or a name of this gateway. A page whose own name was made to point to
   127.0.0.1 (DNS rebinding) sends that name.
 - A request with an Origin has to come from a page of this server. A WebSocket knows no other protection.
+- A request that a browser marks as made by another site (Sec-Fetch-Site) is refused: a picture in that site's page
+  has no Origin, and would transfer a video over the radio of a flying drone. Links to the pages work.
 - Responses permit no other page to embed or read them: no CORS, Cross-Origin-Resource-Policy, no frames.
 
 A path with ".." is refused, and a handler looks names up in what it serves; it never joins them to a folder.
@@ -51,6 +53,17 @@ MAX_BODY = 64 * 1024
 FIRST_REQUEST_LIMIT = 10.0
 """s that a connection may stay without a complete request."""
 
+BODY_LIMIT = 10.0
+"""s from the headers of a request to the end of its body."""
+
+LINGER_LIMIT = 1.0
+"""s that a refused request may still send its body, so that its client can read the answer."""
+
+STALL_LIMIT, STALL_PERIOD = 30.0, 1.0
+"""s without reading after which a client's connection is closed, and s between two looks: a video that is paused
+in a browser holds one of the two reads that a drone allows. Linux announces room in a full socket only when a third of
+some 2.5 MB is free, so a client has to read 30 kB/s."""
+
 KEEP_ALIVE = 30.0
 """s that a connection waits for its next request."""
 
@@ -64,6 +77,9 @@ HEADERS: Final = {
     "X-Content-Type-Options": "nosniff",
 }
 """Of every response."""
+
+FOREIGN_SITES: Final = ("cross-site", "same-site")
+"""Sec-Fetch-Site of another site, and of another port of this host (Fetch Metadata, W3C)."""
 
 RequestCallback = Callable[[web.Request], Awaitable[web.StreamResponse]]
 """Answers one request."""
@@ -107,10 +123,19 @@ class HttpServer:
         self._server: asyncio.Server | None = None
         self._silent: set[RequestHandler] = set()
         """Connections of the last `FIRST_REQUEST_LIMIT` that have sent no request."""
+        self._pages: set[str] = set()
+        """Paths, with their placeholders, that a link of another site may open."""
+        self._watcher: asyncio.Task[None] | None = None
 
     def add_get(self, path: str, handler: RequestCallback) -> None:
         """Serve GET and HEAD of a path, which may contain placeholders: "/media/{date}/{name}"."""
         self._app.router.add_get(path, handler)
+
+    def add_page(self, path: str, handler: RequestCallback) -> None:
+        """`add_get` for a page, which a link of another site may open."""
+        resource = self._app.router.add_get(path, handler).resource
+        assert resource is not None
+        self._pages.add(resource.canonical)
 
     def add_post(self, path: str, handler: RequestCallback) -> None:
         """Serve POST of a path; the body is at most `MAX_BODY` long."""
@@ -139,6 +164,7 @@ class HttpServer:
             access_log=None,
             logger=log,
             keepalive_timeout=KEEP_ALIVE,
+            lingering_time=LINGER_LIMIT,
             shutdown_timeout=CLOSE_LIMIT,
         )
         await runner.setup()
@@ -152,6 +178,7 @@ class HttpServer:
             await self.close()
             raise
         self.port = self._server.sockets[0].getsockname()[1]
+        self._watcher = asyncio.create_task(self._end_stalled(runner), name="web")
 
     async def _listen(self) -> asyncio.Server:
         loop = asyncio.get_running_loop()
@@ -178,6 +205,10 @@ class HttpServer:
         server, self._server = self._server, None
         runner, self._runner = self._runner, None
         self.port = 0
+        watcher, self._watcher = self._watcher, None
+        if watcher is not None:
+            watcher.cancel()
+            await asyncio.wait([watcher])
         if server is not None:
             server.close()
         if runner is not None:
@@ -231,6 +262,28 @@ class HttpServer:
             self._silent.discard(connection)
             connection.force_close()
 
+    async def _end_stalled(self, runner: web.AppRunner) -> None:
+        """Abort the connections of clients that do not read what is sent."""
+        loop = asyncio.get_running_loop()
+        stalls: dict[asyncio.Transport, tuple[int, float]] = {}
+        """Bytes that wait for a client, and the time since when they have been so many."""
+        while runner.server is not None:
+            await asyncio.sleep(STALL_PERIOD)
+            now = loop.time()
+            # A connection that is being closed has no transport in its handler; those of the last look are kept.
+            transports = {*stalls, *(handler.transport for handler in runner.server.connections)}
+            former, stalls = stalls, {}
+            for transport in transports:
+                waiting = 0 if transport is None else transport.get_write_buffer_size()
+                if transport is None or not waiting:
+                    continue
+                # While a client reads nothing, the handler waits and adds nothing.
+                before, since = former.get(transport, (waiting, now))
+                stalls[transport] = (waiting, since if before == waiting else now)
+                if now - stalls[transport][1] >= STALL_LIMIT:
+                    transport.abort()
+                    del stalls[transport]
+
     @web.middleware
     async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         """Refuse a request that a foreign page could have made a browser send."""
@@ -241,9 +294,25 @@ class HttpServer:
         origin = request.headers.get("Origin")
         if origin is not None and _place_of(origin) != host.lower():
             raise web.HTTPForbidden(text="a page of another server may not use this one\n")
+        if request.headers.get("Sec-Fetch-Site") in FOREIGN_SITES and not self._is_link_to_page(request):
+            raise web.HTTPForbidden(text="a page of another server may not use this one\n")
         if "\0" in request.path or ".." in request.path.replace("\\", "/").split("/"):
             raise web.HTTPNotFound
+        if request.can_read_body:
+            try:
+                await asyncio.wait_for(request.read(), BODY_LIMIT)  # kept for the handler
+            except asyncio.TimeoutError:
+                refusal = web.HTTPRequestTimeout()
+                refusal.force_close()
+                raise refusal from None
         return await handler(request)
+
+    def _is_link_to_page(self, request: web.Request) -> bool:
+        """True for a page that is opened as such, and not as a part of another one."""
+        resource = request.match_info.route.resource
+        is_opened = request.headers.get("Sec-Fetch-Mode") == "navigate"
+        is_whole = request.headers.get("Sec-Fetch-Dest") == "document"
+        return is_opened and is_whole and resource is not None and resource.canonical in self._pages
 
     def _is_own(self, host: str) -> bool:
         """True for the Host header of a client that knows this gateway."""

@@ -12,7 +12,8 @@ from support.mav import CAMERA, NAN, Client
 from support.missions import ACTIVE, put, said, start, state, takeoff, way
 from support.plans import Item
 from support.rtsp_client import viewer
-from support.world import world
+from support.video_server import VideoServer
+from support.world import HOME, loopback, world
 
 from anafi_mav.arsdk.messages.thermal import RenderingMode, ThermalMode
 from anafi_mav.arsdk.video.rtcp import Goodbye
@@ -268,3 +269,20 @@ async def test_conf_091_camera_has_no_streams_without_the_server() -> None:
         assert not about.flags & stock.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
         assert [stream.uri for stream in await informed(w.client)] == [""]
         assert w.client.since(mark, "STATUSTEXT") == []
+
+
+async def test_end_of_the_gateway_hovers_before_video_ends() -> None:
+    server = VideoServer(address=loopback())
+    server.answers["TEARDOWN"] = lambda _: None  # it never answers
+    async with server, world(speed=1.0, drone_address=server.address, rtsp_port=server.port) as w:
+        (stream,) = await informed(w.client)
+        await w.take_off()
+        async with opened(stream.uri) as (_, eye):
+            await eye.look(1)
+            far = {"x": HOME[0] + 0.001, "y": HOME[1], "z": 8.0, "frame": stock.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT}
+            ack = await w.client.command(stock.MAV_CMD_DO_REPOSITION, -1, 1, **far)
+            assert ack.result == ACCEPTED
+            await w.gateway.close()
+        hovered = w.commands("ardrone3.Piloting.CancelMoveTo")[0].t
+        (ended,) = [asked.at for asked in server.asked if asked.method == "TEARDOWN"]
+        assert hovered < ended

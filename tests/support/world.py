@@ -149,13 +149,14 @@ async def world(
     video_latency: float = 0.0,
     media: MediaConfig | None = None,
     pose: Literal["video", "events"] = "video",
+    rtsp_port: int = VIDEO_PORT,
 ) -> AsyncIterator[World]:
     """One simulated drone, one gateway with a TCP endpoint, and its clients, connected and ready.
 
     With `flavour` the endpoint shows that autopilot. `also` is the flavour of a second endpoint, at port 5761.
     With `udp` there is another one that waits at UDP_PORT.
     With `web` the drone has its web server, which takes flight plans. A drone at the same `drone_address` as an earlier
-    one has the same serial number.
+    one has the same serial number. With another `rtsp_port` the gateway finds a video server of the test there.
     """
     drone_address, address = drone_address or loopback(), loopback()
     spec = DroneSpec(
@@ -175,7 +176,7 @@ async def world(
             *([f"udpin://{address}:{UDP_PORT}?flavour={flavour}"] if udp else []),
         ),
         drones=(
-            DroneConfig(name="alpha", sysid=sysid, address=drone_address, http_port=WEB_PORT, rtsp_port=VIDEO_PORT),
+            DroneConfig(name="alpha", sysid=sysid, address=drone_address, http_port=WEB_PORT, rtsp_port=rtsp_port),
         ),
         video=video,
         media=media or MediaConfig(),

@@ -322,8 +322,8 @@ def decode_v3(body: bytes) -> FrameMetadata | None:
         iso_gain=gain or None,
         awb_r_gain=red / (1 << 14) or None,
         awb_b_gain=blue / (1 << 14) or None,
-        hfov=math.radians(hfov / 256.0) or None,
-        vfov=math.radians(vfov / 256.0) or None,
+        hfov=said_fov(math.radians(hfov / 256.0)),
+        vfov=said_fov(math.radians(vfov / 256.0)),
         wifi=WifiLink(goodput=link >> 8, quality=link & 0xFF, rssi=rssi) if link or rssi else None,
     )
 
@@ -344,6 +344,11 @@ def _degrees(radians: float | None) -> float | None:
 
 def said_mode(mode: PilotingMode) -> PilotingMode | None:
     return None if mode is PilotingMode.UNKNOWN else mode
+
+
+def said_fov(radians: float) -> float | None:
+    """Return a field of view; None, unknown, for NaN and what no lens has."""
+    return radians if 0.0 < radians <= 2.0 * math.pi else None
 
 
 def _timestamp(body: bytes) -> int | None:

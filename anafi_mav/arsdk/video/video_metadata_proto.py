@@ -38,6 +38,7 @@ from anafi_mav.arsdk.video.video_metadata import (
     Vector3,
     WifiLink,
     on_earth,
+    said_fov,
     said_mode,
 )
 
@@ -213,8 +214,8 @@ def decode_proto(data: bytes) -> FrameMetadata | None:
         iso_gain=camera.iso_gain or None,
         awb_r_gain=_said(camera.awb_r_gain),
         awb_b_gain=_said(camera.awb_b_gain),
-        hfov=_said(camera.hfov),
-        vfov=_said(camera.vfov),
+        hfov=said_fov(camera.hfov),
+        vfov=said_fov(camera.vfov),
         zoom_level=_said(camera.zoom_level),
         wifi=WifiLink(goodput=wifi.goodput, quality=wifi.quality, rssi=wifi.rssi) if wifi else None,
         starfish=_said_starfish(starfish),

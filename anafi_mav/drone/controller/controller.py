@@ -125,6 +125,9 @@ class Controller(Element[ControllerState]):
         self._pilot_keeps_until = -math.inf
         self._extra_axes = 0
         self._extra_buttons = 0
+        """Masks of the last `grab` that the controller has confirmed."""
+        self._grabbing: mapper.Grab | None = None
+        """The newest `grab` while it waits for its confirmation."""
         self._watching = Alarm(self._look)
 
     # -- the connection
@@ -193,7 +196,7 @@ class Controller(Element[ControllerState]):
         if not self.taken:
             self.taken, self._confirmed = True, False
             log.info("the source of piloting is ours, the axes of the Skycontroller are grabbed")
-            self._commander.send(self._grab_message())
+            self._commander.send(self._grab_message(self._extra_axes, self._extra_buttons))
             self._commander.send(skyctrl.SetPilotingSource(Source.CONTROLLER))
             self._stand_by(self._hand_back())
         if self._watching.at is None:
@@ -292,8 +295,9 @@ class Controller(Element[ControllerState]):
         else:
             self.give_back()
 
-    def _grab_message(self) -> mapper.Grab:
-        return mapper.Grab(self._extra_buttons, self._extra_axes | (STICKS if self.taken else 0))
+    def _grab_message(self, axes: int, buttons: int) -> mapper.Grab:
+        """Return the command that grabs these inputs, and the sticks while they are ours."""
+        return mapper.Grab(buttons, axes | (STICKS if self.taken else 0))
 
     # -- verbs
 
@@ -303,24 +307,37 @@ class Controller(Element[ControllerState]):
         `axes` and `buttons` are masks, bit n = number n; zeros release them. The axes of the sticks, which are
         grabbed during motion, are not changed.
 
-        Raises `LocalProtocolError` for the sticks, which are grabbed by motion alone, and for the buttons that stay
-        the pilot's.
+        Without a confirmation what was grabbed before stays so. Raises `LocalProtocolError` for the sticks, which are
+        grabbed by motion alone, and for the buttons that stay the pilot's.
         """
         self._require()
         if axes & ~(1 << TILT | 1 << ZOOM):
             raise LocalProtocolError("the sticks are grabbed while a user flies and not otherwise")
         if buttons & ALWAYS_THE_PILOTS or not 0 <= buttons <= 0xFFFF:
             raise LocalProtocolError("return home and take-off/land are the pilot's buttons")
-        self._extra_axes, self._extra_buttons = axes, buttons
-        wanted = self._grab_message()
-        if self.taken:
-            self._stand_by(self._hand_back())
-        await self._commander.confirm(
-            wanted,
-            (mapper.GrabState,),
-            lambda message: True if (message.buttons, message.axes) == (wanted.buttons, wanted.axes) else None,
-            timeout,
-        )
+        wanted = self._grabbing = self._grab_message(axes, buttons)
+        try:
+            await self._commander.confirm(
+                wanted,
+                (mapper.GrabState,),
+                lambda message: True if (message.buttons, message.axes) == (wanted.buttons, wanted.axes) else None,
+                timeout,
+            )
+        except BaseException:
+            if self._grabbing is wanted:  # the command may have been received all the same
+                with contextlib.suppress(AnafiMavError):
+                    self._commander.send(self._grab_message(self._extra_axes, self._extra_buttons))
+            raise
+        else:
+            current = self._grab_message(axes, buttons)
+            if current != wanted:  # the sticks were taken or given back meanwhile, which sent the former masks
+                self._commander.send(current)
+            self._extra_axes, self._extra_buttons = axes, buttons
+            if self.taken:
+                self._stand_by(self._hand_back())
+        finally:
+            if self._grabbing is wanted:
+                self._grabbing = None
 
     async def discover_drones(self, timeout: float = ANSWER_TIMEOUT) -> Mapping[str, KnownDrone]:
         """Search for drones; return those in sight, by serial number."""

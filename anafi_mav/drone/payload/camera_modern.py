@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from anafi_mav.arsdk.codec.wire import Message, OpenEnum
 from anafi_mav.arsdk.messages.proto import antiflicker as mains
 from anafi_mav.arsdk.messages.proto import camera2 as wire
-from anafi_mav.drone.element import MAX_ITEMS, Range, Reducer, finite
+from anafi_mav.drone.element import MAX_ITEMS, Range, Reducer, field_of_view, finite
 from anafi_mav.drone.payload.camera_enums import (
     Antiflicker,
     Bracketing,
@@ -303,7 +303,7 @@ REDUCERS: Mapping[type[Message], Reducer] = {
         state,
         m.camera_id,
         zoom=finite(m.level),
-        hfov_deg=None if m.hfov is None else finite(m.hfov),
+        hfov_deg=field_of_view(m.hfov),
     ),
     wire.Exposure: lambda state, m: changed(
         state, m.camera_id, shutter_s=quantity(m.shutter_speed), iso=quantity(m.iso_sensitivity)

@@ -21,6 +21,7 @@ from anafi_mav.arsdk.video.rtp_h264 import CLOCK_RATE, Picture, PictureReceiver
 from anafi_mav.arsdk.video.rtp_reception import Reception
 from anafi_mav.arsdk.video.rtsp import Response, RtspTransport
 from anafi_mav.arsdk.video.sdp import MediaDescription, SessionDescription
+from anafi_mav.drone.element import field_of_view
 from anafi_mav.drone.video.picture_clock import PictureClock
 from anafi_mav.drone.video.route import DatagramPair, VideoRoute
 from anafi_mav.drone.video.rtsp_client import RtspClient
@@ -260,7 +261,7 @@ def _shown(description: SessionDescription, media: MediaDescription) -> Shown:
     return Shown(
         title=media.title,
         offered=tuple(one.title for one in description.media),
-        fov_deg=(fov[0], fov[1]) if len(fov) == 2 else None,
+        fov_deg=(fov[0], fov[1]) if len(fov) == 2 and all(map(field_of_view, fov)) else None,
         principal_point=(point[0], point[1]) if len(point) == 2 else None,
         distortion=distortion if len(distortion) == 5 else None,
         sps=media.sps,

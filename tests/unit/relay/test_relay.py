@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
@@ -231,3 +232,40 @@ async def test_garbage_of_a_viewer_ends_its_connection_only() -> None:
         other.writer.write(b"\x16\x03\x01\x00\r\n\r\n")
         assert (await asyncio.wait_for(other.reader.read(), LIMIT)).startswith(b"RTSP/1.0 400 ")
         await eye.look(3)
+
+
+@pytest.mark.parametrize("transport", ["UDP", "TCP"])
+async def test_playing_viewer_that_reads_no_responses_is_aborted(
+    transport: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server_module, "MAX_REQUESTS", 1 << 30)
+    async with studio() as held, viewer(held.relay.port) as client:
+        await client.describe(LIVE)
+        await setup(client, transport)
+        await client.play(LIVE)
+        transport_of = client.writer.transport
+        assert isinstance(transport_of, asyncio.Transport)
+        transport_of.pause_reading()
+        request = f"OPTIONS {client.base}{LIVE} RTSP/1.0\r\nCSeq: 9\r\nSession: {client.session}\r\n\r\n".encode()
+
+        async def flood() -> None:
+            while True:
+                client.writer.write(request * 500)
+                await client.writer.drain()
+
+        with pytest.raises(ConnectionError):
+            await asyncio.wait_for(flood(), 6 * LIMIT)
+        assert held.relay.viewers == 0
+
+
+async def test_viewer_with_too_many_requests_is_aborted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server_module, "TICK", 3600.0)
+    async with studio() as held, viewer(held.relay.port) as client:
+        client.writer.write(f"OPTIONS {client.base}{LIVE} RTSP/1.0\r\nCSeq: 9\r\n\r\n".encode() * 1000)
+        answers = b""
+        with contextlib.suppress(ConnectionError):
+            while data := await asyncio.wait_for(client.reader.read(1 << 16), LIMIT):
+                answers += data
+        assert answers.count(b"RTSP/1.0 200") <= server_module.MAX_REQUESTS
+        async with viewer(held.relay.port) as other:
+            await other.describe(LIVE)

@@ -14,6 +14,7 @@ from aiohttp import web
 from support.world import loopback
 
 from anafi_mav.errors import ConfigError, LocalProtocolError
+from anafi_mav.web import server as server_module
 from anafi_mav.web.server import FIRST_REQUEST_LIMIT, MAX_BODY, MAX_CONNECTIONS, HttpServer
 
 
@@ -30,7 +31,7 @@ async def serving(
     host: str = "127.0.0.1", port: int | None = 0, names: tuple[str, ...] = ()
 ) -> AsyncIterator[HttpServer]:
     server = HttpServer(host, port, names=names)
-    server.add_get("/", name)
+    server.add_page("/", name)
     server.add_get("/files/{name}", name)
     server.add_post("/length", length)
     await server.start()
@@ -97,6 +98,22 @@ async def test_request_of_a_foreign_page_is_refused() -> None:
             assert (await get(server, Origin=origin))[0] == 403, origin
 
 
+def fetched(site: str, mode: str, dest: str) -> dict[str, str]:
+    return {"Sec-Fetch-Site": site, "Sec-Fetch-Mode": mode, "Sec-Fetch-Dest": dest}
+
+
+@pytest.mark.parametrize("site", ["cross-site", "same-site"])
+async def test_other_site_opens_pages_and_embeds_nothing(site: str) -> None:
+    async with serving() as server:
+        assert (await get(server, "/files/a", **fetched(site, "no-cors", "image")))[0] == 403
+        assert (await get(server, "/files/a", **fetched(site, "navigate", "document")))[0] == 403
+        assert (await get(server, "/", **fetched(site, "no-cors", "image")))[0] == 403
+        assert (await get(server, "/", **fetched(site, "navigate", "iframe")))[0] == 403
+        assert (await get(server, "/", **fetched(site, "navigate", "document")))[0] == 200
+        for own in ("same-origin", "none"):
+            assert (await get(server, "/files/a", **fetched(own, "no-cors", "image")))[0] == 200
+
+
 @pytest.mark.parametrize(
     "path",
     [
@@ -137,6 +154,41 @@ async def test_connection_without_request_is_closed_in_time() -> None:
         begun = asyncio.get_running_loop().time()
         assert await raw(server, b"GET / HTTP/1.1\r\nHost: loc") == b""
         assert asyncio.get_running_loop().time() - begun == pytest.approx(FIRST_REQUEST_LIMIT, abs=1.0)
+
+
+async def test_request_without_its_body_frees_its_connection(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server_module, "BODY_LIMIT", 0.05)
+    monkeypatch.setattr(server_module, "LINGER_LIMIT", 0.05)
+    async with serving() as server:
+        head = b"POST /length HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1000\r\n\r\n"
+        answers = await asyncio.gather(*(raw(server, head) for _ in range(MAX_CONNECTIONS)))
+        assert all(answer.startswith(b"HTTP/1.1 408 ") for answer in answers)
+        assert (await get(server))[0] == 200
+
+
+async def test_client_that_stops_reading_is_disconnected(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server_module, "STALL_LIMIT", 0.1)
+    monkeypatch.setattr(server_module, "STALL_PERIOD", 0.02)
+    ended = asyncio.get_running_loop().create_future()
+
+    async def endless(request: web.Request) -> web.StreamResponse:
+        response = web.StreamResponse()
+        try:
+            await response.prepare(request)
+            while True:
+                await response.write(bytes(1 << 16))
+        except ConnectionError:
+            ended.set_result(None)
+            return response
+
+    server = HttpServer("127.0.0.1", 0)
+    server.add_get("/endless", endless)
+    await server.start()
+    _, writer = await asyncio.open_connection(server.host, server.port)
+    writer.write(b"GET /endless HTTP/1.1\r\nHost: localhost\r\n\r\n")
+    await asyncio.wait_for(ended, 60.0)  # the reader takes 128 kB and no more
+    writer.close()
+    await server.close()
 
 
 async def test_connection_over_the_limit_is_closed() -> None:

@@ -185,6 +185,15 @@ def test_places_off_the_earth_and_broken_vectors_are_unknown() -> None:
     assert metadata.speed is None
 
 
+@pytest.mark.parametrize("fov", [7.0, -1.0, 1e30, math.nan, math.inf])
+def test_impossible_field_of_view_is_unknown(fov: float) -> None:
+    # hfov and vfov: fields 8 and 9 of the camera, floats.
+    camera = b"\x45" + struct.pack("<f", fov) + b"\x4d" + struct.pack("<f", fov)
+    metadata = decode_proto(b"\x12" + bytes((len(camera),)) + camera)
+    assert metadata is not None
+    assert (metadata.hfov, metadata.vfov) == (None, None)
+
+
 def test_noise_never_raises() -> None:
     generator = random.Random(5)
     pb = encode_proto(FLOWN)

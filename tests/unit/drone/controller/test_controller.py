@@ -587,3 +587,36 @@ async def test_host_stall_ends_the_active_flight_task() -> None:
         await device.until(ardrone3.CancelMoveTo)
         assert drone.controller.pilot_acquired_control
         assert not drone.controller.taken
+
+
+async def test_grab_without_confirmation_leaves_the_former_masks() -> None:
+    async with behind() as (drone, device):
+        obey = device.script[mapper.Grab]
+        await drone.controller.grab(buttons=1 << 3)
+        device.script[mapper.Grab] = lambda _: []
+        with pytest.raises(CommandTimeout):
+            await drone.controller.grab(axes=1 << TILT, timeout=0.05)
+        # It may have been received all the same.
+        undone = await device.until(mapper.Grab, 3)
+        assert (undone.buttons, undone.axes) == (1 << 3, 0)
+        device.script[mapper.Grab] = obey
+        drone.piloting.pilot(FORWARD)
+        flown = await device.until(mapper.Grab, 4)
+        assert (flown.buttons, flown.axes) == (1 << 3, STICKS)
+        drone.controller.give_back()
+        back = await device.until(mapper.Grab, 5)
+        assert (back.buttons, back.axes) == (1 << 3, 0)
+
+
+async def test_grab_confirmed_during_a_motion_is_kept() -> None:
+    async with behind() as (drone, device):
+        obey = device.script[mapper.Grab]
+        device.script[mapper.Grab] = lambda _: []
+        attempt = asyncio.create_task(drone.controller.grab(axes=1 << TILT))
+        grabbed = await device.until(mapper.Grab)
+        drone.piloting.pilot(FORWARD)  # grabs the sticks, with the masks of before
+        assert (await device.until(mapper.Grab, 2)).axes == STICKS
+        device.script[mapper.Grab] = obey
+        device.say(mapper.GrabState(grabbed.buttons, grabbed.axes, 0))
+        await attempt
+        assert (await device.until(mapper.Grab, 3)).axes == STICKS | 1 << TILT

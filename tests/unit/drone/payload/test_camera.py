@@ -471,6 +471,9 @@ async def test_zoom_of_an_ai(ai: ScriptedDevice, ai_drone: Drone) -> None:
     ai.script[new.SetZoomTarget] = lambda m: [new.ZoomLevel(camera_id=3, level=m.target, hfov=20.0)]
     assert await ai_drone.camera.zoom(4.0, id=3) == 4.0
     assert ai_drone.camera[3].hfov_deg == 20.0
+    ai.script[new.SetZoomTarget] = lambda m: [new.ZoomLevel(camera_id=3, level=m.target, hfov=70000.0)]
+    await ai_drone.camera.zoom(2.0, id=3)
+    assert ai_drone.camera[3].hfov_deg is None  # of no lens
     ai.script[new.ResetZoom] = lambda _: [new.ZoomLevel(camera_id=3, level=1.0)]
     assert await ai_drone.camera.reset_zoom(id=3) == 1.0
     ai.script[mains.SetMode] = lambda _: [mains.State(fixed=mains.Frequency._60_HZ)]

@@ -20,6 +20,7 @@ from anafi_mav.arsdk.video.rtcp import ReceiverReport
 from anafi_mav.arsdk.video.rtp_h264 import Picture, PictureSender
 from anafi_mav.arsdk.video.video_metadata import PROTO_PROFILE, V3_PROFILE, Quaternion
 from anafi_mav.drone import Drone
+from anafi_mav.drone.video import stream as stream_module
 from anafi_mav.drone.video import video as video_module
 from anafi_mav.drone.video.video import VideoFrame, VideoState
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
@@ -110,6 +111,17 @@ async def test_the_drones_description_of_its_video() -> None:
             assert drone.video.state.shown is not None
             assert drone.video.state.shown.title == "Thermal"
     assert [one.uri.rpartition("/")[2] for one in server.asked if one.method == "SETUP"] == ["stream=1", "stream=0"]
+
+
+@pytest.mark.parametrize("fov", ["70000,42", "69,1e999", "nan,42", "0,42", "-69,42", "69"])
+async def test_impossible_field_of_view_is_unknown(fov: str) -> None:
+    server = VideoServer()
+    description = SDP.replace("69.00,42.00", fov)
+    head = "Content-Type: application/sdp\r\n"
+    server.answers["DESCRIBE"] = lambda asked: ok(asked, f"{head}Content-Base: {asked.uri}\r\n", description)
+    async with watched(server) as (drone, _), drone.video.watching():
+        assert drone.video.state.shown is not None
+        assert drone.video.state.shown.fov_deg is None
 
 
 async def test_video_runs_while_it_is_watched() -> None:
@@ -382,6 +394,18 @@ async def test_closing_says_goodbye() -> None:
         assert server.methods()[-1] == "TEARDOWN"
         assert drone.video.state == VideoState()
         await stack.__aexit__(None, None, None)
+
+
+async def test_close_after_link_loss_does_not_wait_for_teardown(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stream_module, "GOODBYE", 60.0)
+    server = VideoServer()
+    server.answers["TEARDOWN"] = lambda _: None
+    async with watched(server) as (drone, device), drone.video.watching():
+        device.session.end("gone")
+        await asyncio.wait({drone.lost})
+        await asyncio.wait_for(drone.close(), 10.0)  # the next attempt to connect begins now
+        await server.until(lambda: server.methods()[-1] == "TEARDOWN")
+        server.hang_up()
 
 
 async def test_only_the_drones_datagrams_count() -> None:
