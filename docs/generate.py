@@ -475,7 +475,8 @@ The camera is component 100 of each drone's system, in every flavour. Its settin
 
 | MAV_CMD_IMAGE_START_CAPTURE | effect |
 |---|---|
-| one picture | what the setting `CAM_PHOTOMODE` says: single, burst, bracketing, or a series until it is stopped |
+| one picture | what the setting `CAM_PHOTOMODE` says: single, burst or bracketing; of a series the first picture |
+| a fraction or a negative number of pictures | DENIED |
 | an interval, with 0 or several pictures | a time-lapse; the photo settings of before are restored at its end |
 | sequence number (param4) from 1 | the same number again takes no second photo |
 | without a sequence number | each command takes a photo, unless its `confirmation` is above 0 |
@@ -516,6 +517,8 @@ rate goes on to the end of the range or until a rate of 0; ACCEPTED means that t
 
 Each storage has a number from 1: on the Ai 1 is the internal memory and 2 the card. STORAGE_INFORMATION is sent when
 anything of it changes. A removed card is EMPTY, a card that the drone does not accept NOT_SUPPORTED, with a text.
+The one with the flag STORAGE_USAGE_FLAG_SET is written to: the setting `CAM_STORAGE` and the present cards decide.
+`available_capacity` is its free space.
 
 MAV_CMD_STORAGE_FORMAT needs the number where there are two storages. It is refused in flight, while recording and
 while photos are taken, and UNSUPPORTED for a storage that the drone cannot format. It cannot be cancelled.

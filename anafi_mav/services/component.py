@@ -21,6 +21,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.router import EVERY_COMPONENT
 from anafi_mav.services.command.command_service import CommandService
+from anafi_mav.services.command.running_actions import RunningActions
 from anafi_mav.services.commands import Action
 from anafi_mav.services.definition_link import DefinitionLink
 from anafi_mav.services.flavours import Flavour, flavour_of
@@ -58,6 +59,7 @@ class ComponentSystem(Protocol):
     vehicle: Vehicle
     clock: Clock
     memory: Memory
+    running: RunningActions
     download_folder: Path | None
     uris: GatewayUris
     has_picture_pose: bool
@@ -116,7 +118,7 @@ class Component:
         self.spawn = system.spawn
         self.times = system.times
         self.set_muted = system.set_muted
-        self.commands = CommandService(self)
+        self.commands = CommandService(self, system.running)
         self.run_action = self.commands.run
         self.end_others = self.commands.end_others
         self.messages = MessageService(self)

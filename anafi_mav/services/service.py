@@ -113,7 +113,7 @@ class Host(Protocol):
         `is_order`: a client has commanded it; neither the gateway began it, nor a stream of setpoints."""
 
     def end_others(self, group: ActionGroup) -> list[asyncio.Task[None]]:
-        """Cancel the component's running actions of a group.
+        """Cancel the system's running actions of a group.
 
         Those that are older than the calling one. Their senders receive CANCELLED. Returns them, to be awaited.
         """

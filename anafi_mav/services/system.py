@@ -32,6 +32,8 @@ from anafi_mav.services.command.flight_service import FlightService
 from anafi_mav.services.command.guided_service import GuidedService
 from anafi_mav.services.command.modes_service import ModesService
 from anafi_mav.services.command.orbit_service import OrbitService
+from anafi_mav.services.command.running_actions import RunningActions
+from anafi_mav.services.commands import ActionGroup
 from anafi_mav.services.component import BY_AUTOPILOT, COMMANDS, Component, joined
 from anafi_mav.services.event.event_service import EventService
 from anafi_mav.services.ftp.log_service import LogService
@@ -184,6 +186,7 @@ class System:
         self.drone = drone
         self.clock = clock
         self.memory = Memory(state)
+        self.running = RunningActions()
         self.download_folder = download_folder
         self.uris = uris
         self.active = False
@@ -207,7 +210,7 @@ class System:
             allow_kill=allow_kill,
             text=self.text,
             changed=self._changed,
-            end_others=lambda: self._autopilot.commands.end_others(),
+            end_others=lambda: self.running.end_others(ActionGroup.FLIGHT),
         )
         self._autopilot: Component = Component(self, AUTOPILOT, AUTOPILOT_SERVICES)
         camera = Component(self, CAMERA, CAMERA_SERVICES)

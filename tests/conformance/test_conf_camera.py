@@ -18,6 +18,8 @@ from support.world import HOME, world
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import camera as camera_messages
 from anafi_mav.arsdk.messages import user_storage
+from anafi_mav.arsdk.messages import user_storage_v2 as v2
+from anafi_mav.arsdk.messages.proto import camera2
 from anafi_mav.arsdk.messages.user_storage import FsState, PhyState
 from anafi_mav.mavlink import dialect
 
@@ -100,6 +102,35 @@ async def test_conf_086_photo_is_reported_with_file(flavour: str, model: str) ->
             assert states[-1] == 0
 
 
+@pytest.mark.parametrize("model", ["4k", "ai"])
+async def test_conf_086_refused_and_unannounced_photos_are_told_apart(model: str) -> None:
+    """The pilot's button is refused while a client's photo is taken; later one has no report but its media."""
+    async with world(model=model, web=True) as w:
+        await enter(w.client, PHOTO)
+        mark = w.client.mark()
+        assert await command(w.client, START_PHOTO, 0, 0, 1) == ACCEPTED
+        assert w.drone.firmware.payload.cameras.busy
+        press(w, camera_messages.TakePhoto(0))
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", since=mark)
+        await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 0 and s.image_count, since=mark)
+        if model == "ai":
+            w.drone.inject(
+                camera2.Photo(
+                    camera_id=0,
+                    type=camera2.PhotoEvent.STOP,
+                    stop_reason=camera2.PhotoStopReason.CAPTURE_DONE,
+                    media_id="unannounced",
+                )
+            )
+        else:
+            result = camera_messages.PhotoResult.PHOTO_SAVED
+            w.drone.inject(camera_messages.PhotoProgress(0, result, 1, "unannounced"))
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", lambda image: image.image_index == 1, since=mark)
+        images = [image for _, image in w.client.since(mark, "CAMERA_IMAGE_CAPTURED")]
+        assert [(image.image_index, image.capture_result) for image in images] == [(0, 1), (1, 1)]
+        assert len(photos(w)) == 1
+
+
 async def test_conf_086_geotag_is_that_of_the_shutter() -> None:
     """The drone accelerates with its camera turned down; the simulator knows the pose at the shutter."""
     async with world(web=True, speed=1.0) as w:
@@ -146,6 +177,25 @@ async def test_conf_087_series_counts_and_ends(flavour: str) -> None:
         await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 0, since=mark)
         assert len(w.commands("camera.stop_photo")) == 2
         assert await command(w.client, STOP_PHOTO, 0) == ACCEPTED
+
+
+@pytest.mark.parametrize("model", ["4k", "ai"])
+async def test_conf_087_one_picture_of_a_series_is_one(model: str) -> None:
+    async with world(model=model, web=True) as w:
+        await enter(w.client, PHOTO)
+        for count in (0.5, -1.0, math.inf):
+            assert await command(w.client, START_PHOTO, 0, 1, count) == DENIED
+        assert (await write(w.client, "CAM_PHOTOMODE", 3.0, 1)).param_result == dialect.PARAM_ACK_ACCEPTED
+        mark = w.client.mark()
+        assert await command(w.client, START_PHOTO, 0, 0, 1) == ACCEPTED
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", since=mark)
+        await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 0 and s.image_count, since=mark)
+        assert not w.drone.firmware.payload.cameras.busy
+        assert [(media.mode, len(media.resources)) for media in photos(w)] == [("TIMELAPSE", 1)]
+        # The limit was that series' alone.
+        assert await command(w.client, START_PHOTO, 0, 0, 0) == ACCEPTED
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", lambda image: image.image_index == 2, timeout=20.0)
+        assert w.drone.firmware.payload.cameras.busy
 
 
 @pytest.mark.parametrize("model", ["4k", "ai"])
@@ -286,6 +336,26 @@ async def test_conf_092_unusable_storage_is_pushed_and_refuses_photos() -> None:
         w.drone.inject(user_storage.State(PhyState.AVAILABLE, FsState.READY, 0, 1, 5))
         await w.client.wait("STATUSTEXT", lambda m: m.text == "Storage 1: ready", since=mark)
         await shoot(w.client)
+
+
+async def test_conf_092_photo_without_card_goes_to_the_internal_storage() -> None:
+    """The Ai writes to its internal storage without a card, unless its setting forbids that."""
+    async with world(model="ai") as w:
+        await enter(w.client, PHOTO)
+        mark = w.client.mark()
+        absent = v2.PhyState.UNDETECTED
+        w.drone.inject(v2.State(1, absent, v2.FsState.UNKNOWN, 0, 1, 5, "", 0))
+        await w.client.wait("STORAGE_INFORMATION", is_in(dialect.STORAGE_STATUS_EMPTY), since=mark)
+        used = dialect.STORAGE_USAGE_FLAG_SET
+        await w.client.wait("STORAGE_INFORMATION", lambda m: m.storage_id == 1 and m.storage_usage & used, since=mark)
+        status = await request(w.client, "CAMERA_CAPTURE_STATUS")
+        assert status.available_capacity == pytest.approx(8e9 / 2**20, rel=0.1)
+        assert (await shoot(w.client)).capture_result == 1
+        assert await command(w.client, FORMAT, 1, 1) == ACCEPTED
+        assert (await request(w.client, "CAMERA_CAPTURE_STATUS")).image_count == 0
+        assert (await write(w.client, "CAM_STORAGE", 1.0, 1)).param_result == dialect.PARAM_ACK_ACCEPTED
+        assert await command(w.client, START_PHOTO, 0, 0, 1) == DENIED
+        assert "Photo refused: no storage" in texts(w.client, mark)
 
 
 def is_in(status: int) -> Callable[[Any], bool]:

@@ -216,6 +216,28 @@ async def test_panorama_turns_the_hovering_drone_and_hold_ends_it() -> None:
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 15.0, 30.0)
 
 
+async def test_panorama_overtakes_no_newer_flight_command() -> None:
+    """Both are sent at once while the camera has to change its mode first."""
+    async with world(web=True, clients=2) as w:
+        other = w.clients[1]
+        await w.take_off(10.0)
+        for id, params, others in (
+            (dialect.MAV_CMD_DO_SET_MODE, (1, 4, 3), {}),
+            (dialect.MAV_CMD_DO_REPOSITION, (-1, 1), {"x": HOME[0] + 2e-4, "y": HOME[1], "z": 10.0, "frame": 6}),
+            (dialect.MAV_CMD_NAV_LAND, (), {}),
+        ):
+            await enter(w.client, VIDEO)
+            mark = w.client.mark()
+            w.client.send_command(PANORAMA, 180, 0, target=(1, CAMERA))
+            assert (await other.command(id, *params, **others)).result == ACCEPTED
+            ack = await w.client.wait("COMMAND_ACK", lambda a: a.command == PANORAMA and a.result != 5, since=mark)
+            assert ack.result == dialect.MAV_RESULT_CANCELLED
+            if id == dialect.MAV_CMD_DO_REPOSITION:
+                await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 15.0, 30.0)
+        await w.drone.wait_log(lambda e: e.name.endswith("FlyingStateChanged") and "LANDED" in str(e.args), 30.0)
+        assert not [entry for entry in w.drone.log if entry.name.startswith("animation.start")]
+
+
 @both
 @pytest.mark.parametrize("model", ["4k", "thermal", "usa", "ai"])
 async def test_conf_009_payload_commands_are_those_of_the_page(flavour: str, model: str) -> None:

@@ -213,7 +213,7 @@ class Watch:
     async def unchanged(self, *counters: str) -> Counter[str]:
         """Two more heartbeats later: as many messages as ever, none of them new; and these counters went up."""
         for _ in range(2):
-            await self.client.heartbeat(lambda beat: True, timeout=2.0)
+            await self.client.heartbeat(lambda beat: True, timeout=10.0)
         duration = time.monotonic() - self.started
         for kind, rate in (("HEARTBEAT", 1.0), ("ATTITUDE", 5.0), ("GLOBAL_POSITION_INT", 5.0)):
             times = [self.started, *(at for at, _ in self.client.since(self.began, kind))]

@@ -325,7 +325,8 @@ def photo_news(m: Any) -> CaptureUpdate | None:
         return CaptureUpdate(m.cam_id, CaptureProgress.TAKEN, count=m.photo_count or None)
     if m.result == PhotoResult.TAKING_PHOTO:
         return CaptureUpdate(m.cam_id, CaptureProgress.STARTED)
-    return CaptureUpdate(m.cam_id, CaptureProgress.FAILED, reason=spoken(m.result))
+    refused = m.result == PhotoResult.ERROR_BAD_STATE
+    return CaptureUpdate(m.cam_id, CaptureProgress.FAILED, reason=spoken(m.result), is_refused=refused)
 
 
 def recording_news(m: Any) -> CaptureUpdate | None:

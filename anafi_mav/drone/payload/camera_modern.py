@@ -336,6 +336,8 @@ def photo_news(m: Any) -> CaptureUpdate | None:
         return CaptureUpdate(m.camera_id, CaptureProgress.TAKEN)
     if m.type != wire.PhotoEvent.STOP:
         return None
+    if m.stop_reason == wire.PhotoStopReason.ALREADY:  # its media id is that of an earlier photo
+        return CaptureUpdate(m.camera_id, CaptureProgress.FAILED, reason=spoken(m.stop_reason), is_refused=True)
     if m.media_id:
         reason = "" if m.stop_reason in _DONE else spoken(m.stop_reason)
         return CaptureUpdate(m.camera_id, CaptureProgress.SAVED, m.media_id, reason, is_last=True)

@@ -274,3 +274,5 @@ class CaptureUpdate(msgspec.Struct, frozen=True):
     """Pictures so far, of TAKEN and SAVED, modulo 256; None where the drone does not report it."""
     is_last: bool = False
     """SAVED: it is also the end of the photo or series."""
+    is_refused: bool = False
+    """FAILED: a command was refused for the camera's state; a photo that is being taken goes on."""

@@ -28,6 +28,7 @@ from anafi_mav.arsdk.messages.user_storage import (
 )
 from anafi_mav.drone.element import EMPTY, REMOVE, Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
+from anafi_mav.drone.payload.camera_enums import StoragePolicy
 from anafi_mav.drone.settings import Commanding, Question
 from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
@@ -180,7 +181,7 @@ def _v3_list(state: Storages, message: v3.StorageList) -> Storages:
 
 
 class Storage(Commanding[Storages]):
-    """All storages of the drone by id; the verbs use the one for media unless `id` says another."""
+    """All storages of the drone by id; the verbs use the card unless `id` says another."""
 
     NOTHING: ClassVar[Storages] = {}
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
@@ -252,9 +253,31 @@ class Storage(Commanding[Storages]):
 
     @property
     def main(self) -> int:
-        """Id of the storage for media: the card if there is one, else the first."""
+        """Id of the storage that the verbs use: the card if there is one, else the first."""
         ids = [id for id, one in self.state.items() if one.removable]
         return min(ids or self.state or [0])
+
+    def for_media(self, policy: StoragePolicy | None) -> int | None:
+        """Return the id of the storage that a camera with this policy writes to.
+
+        None: the policy allows no storage that exists. A card without a file system is still the storage: the drone
+        does not write past it.
+        """
+        if not self.state:
+            return self.main  # not reported
+        cards = sorted(id for id, one in self.state.items() if one.removable is not False)
+        built_in = sorted(id for id, one in self.state.items() if one.removable is False)
+        match policy:
+            case StoragePolicy.REMOVABLE:
+                allowed = cards
+            case StoragePolicy.INTERNAL:
+                allowed = built_in
+            case StoragePolicy.PRIORITY_INTERNAL:
+                allowed = [*(id for id in built_in if self[id].available != 0), *cards, *built_in]
+            case _:
+                allowed = [*cards, *built_in]
+        present = (id for id in allowed if self[id].physical in (None, PhyState.AVAILABLE))
+        return next(iter((*present, *allowed)), None)
 
     def questions(self) -> list[Question]:
         """Return the queries for a drone that speaks protobuf and has reported no storage."""

@@ -58,9 +58,16 @@ def require_idle(drone: Drone, what: OperatorText) -> None:
         raise Refused(what, texts.CAMERA_TAKES_PHOTOS)
 
 
-def storage_problem(drone: Drone, id: int | None = None) -> Reason | None:
+def media_storage(drone: Drone) -> int | None:
+    """Return the drone's number of the storage that the active camera writes to; None: absent."""
+    return drone.storage.for_media(drone.camera[drone.camera.active_id].storage_policy)
+
+
+def storage_problem(drone: Drone, id: int | None) -> Reason | None:
     """Return the reason why nothing can be stored; None for a storage that is ready or unknown."""
-    state = drone.storage[drone.storage.main if id is None else id]
+    if id is None:
+        return texts.NO_STORAGE
+    state = drone.storage[id]
     if state.physical is not None and state.physical in PROBLEMS:
         return PROBLEMS[state.physical]
     if state.file_system is not None and state.file_system in FILE_SYSTEM_PROBLEMS:
@@ -70,5 +77,5 @@ def storage_problem(drone: Drone, id: int | None = None) -> Reason | None:
 
 def require_storage(drone: Drone, what: OperatorText) -> None:
     """Refuse a photo or recording that could not be stored."""
-    if (problem := storage_problem(drone)) is not None:
+    if (problem := storage_problem(drone, media_storage(drone))) is not None:
         raise Refused(what, problem, lasting=problem not in PASSING)

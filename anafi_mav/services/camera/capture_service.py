@@ -20,7 +20,13 @@ from anafi_mav.drone.payload.storage import Storage
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.services.camera.camera_messages import MEBIBYTE, stepped_zoom, zoom_factor
-from anafi_mav.services.camera.camera_targets import is_at_autopilot, require_camera, require_free, require_storage
+from anafi_mav.services.camera.camera_targets import (
+    is_at_autopilot,
+    media_storage,
+    require_camera,
+    require_free,
+    require_storage,
+)
 from anafi_mav.services.camera.photo_control import PhotoControl
 from anafi_mav.services.camera.photo_reporter import PhotoReporter
 from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect
@@ -129,7 +135,8 @@ class CaptureService(Service):
 
     def _on_formatted(self, message: events.Message, now: float) -> None:
         """Begin the index again when the storage for media was formatted."""
-        if Storage.formatted(message) == self.host.drone.storage.main:
+        formatted = Storage.formatted(message)
+        if formatted is not None and formatted == media_storage(self.host.drone):
             self._reporter.reset()
             self._send_changed()
 
@@ -175,8 +182,9 @@ class CaptureService(Service):
         since, elapsed = self._recording_since, 0
         if since is not None and records:
             elapsed = max(1, round((self.host.clock.monotonic() - since) * 1e3)) & 0xFFFFFFFF
-        storage = vehicle.drone.storage[vehicle.drone.storage.main]
-        free = 0 if storage.physical == events.PhyState.UNDETECTED else storage.available
+        id = media_storage(vehicle.drone)
+        storage = None if id is None else vehicle.drone.storage[id]
+        free = 0 if storage is None or storage.physical == events.PhyState.UNDETECTED else storage.available
         available = math.nan if free is None else free / MEBIBYTE
         return dialect.MAVLink_camera_capture_status_message(
             times.boot_ms, status, int(records), interval, elapsed, available, count, 0
@@ -225,15 +233,17 @@ class CaptureService(Service):
     async def _start_capture(self, command: Command) -> None:
         """MAV_CMD_IMAGE_START_CAPTURE: param2 interval (s), param3 pictures (0: until stopped).
 
-        One picture is what the camera's photo mode means by it: single, burst, bracketing, or a series that continues
-        until it is stopped. Any other number is a time-lapse for as long as it lasts.
+        One picture is what the camera's photo mode means by it: single, burst, bracketing, or the first picture of a
+        series. Any other number is a time-lapse for as long as it lasts.
         """
         require_camera(texts.PHOTO, command.params[0])
         interval, count = _number(command.params[1]), command.params[2]
         if math.isnan(count):
             count = 0.0 if interval > 0.0 else 1.0
-        if interval < 0.0 or not math.isfinite(interval) or count < 0.0 or not math.isfinite(count):
+        if interval < 0.0 or not math.isfinite(interval):
             raise Refused(texts.PHOTO, texts.NEGATIVE, lasting=True)
+        if count < 0.0 or not count.is_integer():  # infinity is none
+            raise Refused(texts.PHOTO, texts.NO_COUNT, lasting=True)
         if count == 1.0:
             await self._photos.take()
             return

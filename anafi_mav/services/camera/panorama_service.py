@@ -56,7 +56,7 @@ class PanoramaService(Service):
                 location=False,
                 altitude=Altitude.UNUSED,
                 effect=Effect.IRREVOCABLE,
-                group=ActionGroup.PHOTO,
+                group=ActionGroup.FLIGHT,
             )
         }
 
@@ -86,6 +86,25 @@ class PanoramaService(Service):
         wide, high = (0.0 if math.isnan(angle) else angle for angle in command.params[:2])
         if not (math.isfinite(wide) and math.isfinite(high)):
             raise Refused(texts.PANORAMA, texts.NUMBER_MISSING, lasting=True)
+        self._require_hovering()
+        id = drone.camera.active_id
+        if drone.camera[id].mode is not CameraMode.PHOTO:
+            if await drone.camera.set_mode(CameraMode.PHOTO, id) is not CameraMode.PHOTO:
+                raise Refused(texts.PANORAMA, texts.CAMERA_MODE_KEPT)
+            self._require_hovering()
+        await vehicle.take_over()
+        self._require_hovering()
+        await drone.animations.photo_panorama(panorama_type(wide, high, drone.animations.state.available or ()))
+        vehicle.select(FlightMode.HOLD, self)
+        self._is_active = True
+
+    def _require_hovering(self) -> None:
+        """Refuse a panorama while something else uses the aircraft or the camera.
+
+        Checked again after each wait: newer flight commands cancel the action, but the pilot and the drone itself send
+        none.
+        """
+        drone, vehicle = self.host.drone, self.host.vehicle
         require_free(vehicle, texts.PANORAMA)
         if not vehicle.in_air:
             raise Refused(texts.PANORAMA, texts.NOT_IN_AIR)
@@ -96,14 +115,3 @@ class PanoramaService(Service):
             raise Refused(texts.PANORAMA, texts.PANORAMA_MOVING)
         require_storage(drone, texts.PANORAMA)
         require_idle(drone, texts.PANORAMA)
-        id = drone.camera.active_id
-        camera = drone.camera[id]
-        if camera.mode is not CameraMode.PHOTO and await drone.camera.set_mode(CameraMode.PHOTO, id) is not (
-            CameraMode.PHOTO
-        ):
-            raise Refused(texts.PANORAMA, texts.CAMERA_MODE_KEPT)
-        await vehicle.take_over()
-        kind = panorama_type(wide, high, drone.animations.state.available or ())
-        await drone.animations.photo_panorama(kind)
-        vehicle.select(FlightMode.HOLD, self)
-        self._is_active = True

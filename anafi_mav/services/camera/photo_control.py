@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+from dataclasses import dataclass
 
 from msgspec.structs import replace
 
@@ -22,21 +23,30 @@ from anafi_mav.vehicle.base.severity import Severity
 SERIES = (PhotoMode.TIME_LAPSE, PhotoMode.GPS_LAPSE)
 
 
+@dataclass
+class PhotoSeries:
+    """A series that a command began, or begins."""
+
+    limit: int | None
+    """Pictures after which it is ended."""
+    restore: PhotoSettings | None
+    """Photo settings to restore at its end."""
+    has_begun: bool = False
+    """The drone has reported its begin; an end before that is another photo's."""
+
+
 class PhotoControl:
     """The photos of one drone."""
 
     def __init__(self, host: Host) -> None:
         self.host = host
         self._commands = asyncio.Lock()
-        self._limit: int | None = None
-        """Pictures after which the series under way is ended."""
-        self._restore: PhotoSettings | None = None
-        """Photo settings to restore after the series under way."""
+        self._series: PhotoSeries | None = None
 
     def link_up(self) -> None:
         """Forget the series of an earlier connection."""
         self._commands = asyncio.Lock()
-        self._limit = self._restore = None
+        self._series = None
 
     @property
     def camera(self) -> CameraState:
@@ -51,25 +61,35 @@ class PhotoControl:
 
     def receive(self, update: CaptureUpdate, taken: int) -> None:
         """Handle an event about a photo; `taken`: pictures of the series so far."""
-        if update.progress is CaptureProgress.TAKEN and self._limit is not None and taken >= self._limit:
-            self._limit = None
+        series = self._series
+        if series is None or update.is_refused:
+            return
+        if update.progress in (CaptureProgress.STARTED, CaptureProgress.TAKEN):
+            series.has_begun = True
+        if update.progress is CaptureProgress.TAKEN and series.limit is not None and taken >= series.limit:
+            series.limit = None
             self.host.spawn(self._end_series())
         saved = update.progress is CaptureProgress.SAVED and not self.host.drone.camera[update.camera].taking
-        if saved or update.progress in (CaptureProgress.ENDED, CaptureProgress.FAILED):
-            self._limit = None
-            if self._restore is not None:
-                restore, self._restore = self._restore, None
-                self.host.spawn(self._restore_photo(restore, update.camera))
+        ended = saved or update.progress is CaptureProgress.ENDED
+        if (ended and series.has_begun) or update.progress is CaptureProgress.FAILED:
+            self._series = None
+            if series.restore is not None:
+                self.host.spawn(self._restore_photo(series.restore, update.camera))
 
     # Commands.
 
     async def take(self) -> None:
-        """Take a photo as the camera is set; return when it has begun."""
+        """Take a photo as the camera is set; return when it has begun.
+
+        Of a series it is the first picture.
+        """
         async with self._commands:
             self._require_photo()
             if self.is_series:
                 require_free(self.host.vehicle, texts.PHOTO)
-            await self._shoot()
+                await self._shoot_series(PhotoSeries(1, None))
+            else:
+                await self._shoot()
 
     async def begin_series(self, mode: PhotoMode, interval: float | None, limit: int | None) -> None:
         """Begin a series; the settings are restored at its end.
@@ -84,14 +104,7 @@ class PhotoControl:
             is_set = before is not None and before.mode is mode and interval in (None, before.interval)
             if not is_set:
                 await self._set_series(mode, interval)
-            try:
-                await self._shoot()
-            except AnafiMavError:
-                if not is_set and before is not None:
-                    await self._restore_photo(before, self.host.drone.camera.active_id)
-                raise
-            self._limit = limit
-            self._restore = None if is_set else before
+            await self._shoot_series(PhotoSeries(limit, None if is_set else before))
 
     async def follow_distance(self, distance: float) -> None:
         """Take a photo each `distance` m, in place of a series under way."""
@@ -140,6 +153,18 @@ class PhotoControl:
 
     async def _shoot(self) -> None:
         await self.host.drone.camera.take_photo(self.host.drone.camera.active_id, until_saved=False)
+
+    async def _shoot_series(self, series: PhotoSeries) -> None:
+        """Begin it; its pictures, and its end, may be reported before this returns."""
+        self._series = series
+        try:
+            await self._shoot()
+        except AnafiMavError:
+            if self._series is series:
+                self._series = None
+                if series.restore is not None:
+                    await self._restore_photo(series.restore, self.host.drone.camera.active_id)
+            raise
 
     async def _set_series(self, mode: PhotoMode, interval: float | None) -> None:
         camera = self.host.drone.camera

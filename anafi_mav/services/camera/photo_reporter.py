@@ -115,7 +115,8 @@ class PhotoReporter:
         shots = self._shots.receive(update, now)
         if update.progress is CaptureProgress.FAILED and shots:
             self.host.text(Severity.WARNING, texts.PHOTO_NOT_STORED.fill(reason=update.reason))
-        self._report(shots, update.media, is_last=update.is_last)
+        media = update.media if update.media == self._shots.media else ""  # else of an earlier photo, again
+        self._report(shots, media, is_last=update.is_last)
 
     def reset(self) -> None:
         """Begin the index again: the storage was formatted."""

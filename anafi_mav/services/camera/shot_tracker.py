@@ -60,6 +60,10 @@ class ShotTracker:
         """Pictures of the capture."""
         self._reported = 0
         self._ended: float | None = None
+        self.media = ""
+        """Media id of the capture; empty until it is reported."""
+        self._media_before = ""
+        """Media id of the capture before, which may be reported again."""
 
     @property
     def pending(self) -> tuple[float, ...]:
@@ -83,7 +87,7 @@ class ShotTracker:
             case CaptureProgress.SAVED:
                 return self._save(update, now)
             case CaptureProgress.FAILED:
-                return self._fail(now)
+                return [] if update.is_refused else self._fail(now)
             case CaptureProgress.ENDED:
                 if self._is_open:
                     self._is_open, self._ended = False, now
@@ -110,7 +114,18 @@ class ShotTracker:
         self.capture += 1
         self._is_open, self._since, self._ended = True, now, None
         self._shots, self._taken, self._reported = [], 0, 0
+        self.media, self._media_before = "", self.media or self._media_before
         return lost
+
+    def _open_unreported(self, update: CaptureUpdate, now: float) -> None:
+        """Begin the capture of a media whose other reports were lost, but for those of its pictures."""
+        was_open, shots = self._is_open, self._shots
+        self._is_open, self._shots = False, []
+        self._open(now)
+        self._shots = shots or ([now] if was_open else [])
+        self._taken = len(self._shots)
+        if was_open and update.count is not None:
+            self._taken = update.count  # it may continue the count of the media before
 
     def _more(self, count: int) -> int:
         """Return how many pictures a count adds; none for one that is older than the last."""
@@ -126,11 +141,16 @@ class ShotTracker:
             self._since = now
 
     def _save(self, update: CaptureUpdate, now: float) -> list[CapturedShot]:
-        is_known = self._is_open or self._shots or self._ended is not None
-        if not is_known and self._taken:
+        if update.media and update.media == self._media_before:
             return []  # the same report again
-        if not is_known:
+        is_known = self._is_open or bool(self._shots) or self._ended is not None
+        if update.media and self.media not in ("", update.media):
+            self._open_unreported(update, now)
+        elif not is_known:
+            if self._taken and (not update.media or update.media == self.media):
+                return []  # the same report again
             self._open(now)
+        self.media = update.media or self.media
         if update.count is not None:
             self._take(self._more(update.count), now)
         elif not self._taken:

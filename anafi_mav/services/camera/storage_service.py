@@ -17,7 +17,7 @@ from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.camera.camera_messages import MEBIBYTE
-from anafi_mav.services.camera.camera_targets import PASSING, require_idle, storage_problem
+from anafi_mav.services.camera.camera_targets import PASSING, media_storage, require_idle, storage_problem
 from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect
 from anafi_mav.services.service import Answer, Host, Request, Service
 from anafi_mav.texts import Reason
@@ -116,7 +116,8 @@ class StorageService(Service):
 
     def _content(self, id: int) -> tuple[object, ...]:
         state = self._state(id)
-        return (status(state), state.capacity, state.available, state.name, len(self._ids))
+        is_used = id == media_storage(self.host.drone)
+        return (status(state), state.capacity, state.available, state.name, len(self._ids), is_used)
 
     def _message(self, id: int) -> dialect.MAVLink_message:
         state = self._state(id)
@@ -126,7 +127,7 @@ class StorageService(Service):
         free = math.nan if state.available is None else state.available / MEBIBYTE
         removable = state.removable is not False
         usage = dialect.STORAGE_USAGE_FLAG_PHOTO | dialect.STORAGE_USAGE_FLAG_VIDEO
-        if id == self.host.drone.storage.main:
+        if id == media_storage(self.host.drone):
             usage |= dialect.STORAGE_USAGE_FLAG_SET
         return dialect.MAVLink_storage_information_message(
             self.host.times().boot_ms,

@@ -7,16 +7,16 @@ Rules: conformance R5-R10, C2, MAVLink command.md.
 from __future__ import annotations
 
 import asyncio
-import itertools
 import logging
 from collections.abc import Callable, Coroutine, Hashable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from anafi_mav.clock import Alarm
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.command.running_actions import RunningAction, RunningActions
 from anafi_mav.services.command_targets import UnsupportedFrame
 from anafi_mav.services.commands import (
     LATE_PROGRESS_AFTER,
@@ -58,30 +58,19 @@ _RESULT_BY_ERROR: tuple[tuple[type[AnafiMavError], int], ...] = (
 )
 
 
-@dataclass
-class _Running:
-    """A running action that changes the vehicle's state."""
-
-    client: Hashable
-    answer: tuple[Inbound, Execution] | None
-    """Client and command to acknowledge; None for messages without acknowledgement."""
-    is_order: bool = True
-    """A client has commanded it; neither the gateway began it, nor a stream of setpoints."""
-    group: ActionGroup = ActionGroup.FLIGHT
-    replaced_by_order: bool = False
-    """A newer order has ended it."""
-
-
 class CommandService(Service):
     """COMMAND_LONG, COMMAND_INT and COMMAND_CANCEL of one component."""
 
-    def __init__(self, host: Host) -> None:
+    def __init__(self, host: Host, running: RunningActions) -> None:
+        """`running`: those of all components of the system."""
         super().__init__(host)
         self._history = CommandHistory()
+        self._all = running
+        running.histories.append(self._history)
         self._queries: Mapping[int, Query] = {}
         self._actions: Mapping[int, Action] = {}
-        self._running: dict[asyncio.Task[None], _Running] = {}
-        """Oldest first."""
+        self._running: dict[asyncio.Task[None], RunningAction] = {}
+        """Those of this component, oldest first."""
 
     def take_tables(self, queries: Mapping[int, Query], actions: Mapping[int, Action]) -> None:
         """Register the commands of all services.
@@ -148,31 +137,21 @@ class CommandService(Service):
         group: ActionGroup = ActionGroup.FLIGHT,
     ) -> asyncio.Task[None]:
         """Run an action of a message that has no acknowledgement; its refusal is sent as a text."""
-        self._history.forget(client, group)  # this client used other means than its newest command
-        return self._spawn(self._explained(work), _Running(client, None, is_order, group))
+        self._all.forget(client, group)  # this client used other means than its newest command
+        return self._spawn(self._explained(work), RunningAction(client, None, is_order, group))
 
     @property
     def replaced_by_order(self) -> bool:
         """True in an action that a newer order of a client has ended."""
-        task = asyncio.current_task()
-        running = None if task is None else self._running.get(task)
+        running = self._all.current
         return running is not None and running.replaced_by_order
 
     def end_others(self, group: ActionGroup = ActionGroup.FLIGHT) -> list[asyncio.Task[None]]:
-        """Cancel all older running actions of a group; their senders get CANCELLED.
+        """Cancel all older running actions of a group, of every component.
 
-        A newer action than the calling one continues: it will replace this one.
+        Their senders get CANCELLED.
         """
-        current = asyncio.current_task()
-        older = itertools.takewhile(lambda task: task is not current, self._running)
-        others = [task for task in older if self._running[task].group is group]
-        running = None if current is None else self._running.get(current)
-        for task in others:
-            if running is not None and running.is_order:
-                self._running[task].replaced_by_order = True
-            task.cancel()
-        self._history.supersede(None if running is None else running.client, group)
-        return others
+        return self._all.end_others(group)
 
     def _receive(self, inbound: Inbound, decode: _Decode) -> None:
         id = inbound.message.command
@@ -203,7 +182,7 @@ class CommandService(Service):
                 self._acknowledge(inbound, command.id, repeated)
             return
         execution = self._history.begin(command.client, command)
-        running = _Running(command.client, (inbound, execution), group=command.definition.group)
+        running = RunningAction(command.client, (inbound, execution), group=command.definition.group)
         self._spawn(self._execute(inbound, execution), running)
 
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:
@@ -240,13 +219,14 @@ class CommandService(Service):
             execution.result, execution.ended = result, self.host.clock.monotonic()
             self._acknowledge(inbound, execution.command.id, result)
 
-    def _spawn(self, work: Coroutine[Any, Any, None], running: _Running) -> asyncio.Task[None]:
+    def _spawn(self, work: Coroutine[Any, Any, None], running: RunningAction) -> asyncio.Task[None]:
         task = self.host.spawn(work)
-        self._running[task] = running
+        self._running[task] = self._all.tasks[task] = running
         task.add_done_callback(self._done)
         return task
 
     def _done(self, task: asyncio.Task[None]) -> None:
+        self._all.tasks.pop(task, None)
         running = self._running.pop(task, None)
         if running is not None and running.answer is not None:
             # It has answered by itself, unless it was cancelled before it began.

@@ -208,8 +208,8 @@ class VideoStreamService(Service):
             return 0
         video, frame = drone.video.state, drone.video.state.frame
         if frame is not None and frame.metadata.hfov is not None:
-            return round(frame.metadata.hfov * units.DEG_PER_RAD)
+            return units.saturate(frame.metadata.hfov * units.DEG_PER_RAD, 16, signed=False)
         if video.shown is not None and video.shown.fov_deg is not None:
-            return round(video.shown.fov_deg[0])
+            return units.saturate(video.shown.fov_deg[0], 16, signed=False)
         view = drone.camera[0].hfov_deg if stream.kind is StreamKind.VISIBLE else None
-        return 0 if view is None else round(view)
+        return 0 if view is None else units.saturate(view, 16, signed=False)

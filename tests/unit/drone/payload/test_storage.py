@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 
 import pytest
+from msgspec.structs import replace
 from support.scripted_device import STATES, ScriptedDevice
 from support.simulated import connected
 
@@ -15,7 +16,9 @@ from anafi_mav.arsdk.messages import user_storage_v2 as v2
 from anafi_mav.arsdk.messages.proto import storage as v3
 from anafi_mav.arsdk.messages.user_storage import Feature, FormattingType, FsState, PhyState
 from anafi_mav.drone import Drone
-from anafi_mav.drone.payload.storage import StorageState
+from anafi_mav.drone.expectation import Commander
+from anafi_mav.drone.payload.camera_enums import StoragePolicy
+from anafi_mav.drone.payload.storage import Storage, StorageState
 from anafi_mav.errors import CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
 
 TELLS = 1 << Feature.FORMAT_RESULT_EVT_SUPPORTED
@@ -99,6 +102,34 @@ async def test_internal_memory_and_card(device: ScriptedDevice) -> None:
     with pytest.raises(NotSupported, match="storage 1"):
         await drone.storage.start_monitoring(id=1)
     await drone.close()
+
+
+@pytest.mark.parametrize(
+    ("policy", "with_card", "without", "removed", "full"),
+    [
+        (None, 1, 0, 0, 1),
+        (StoragePolicy.PRIORITY_REMOVABLE, 1, 0, 0, 1),
+        (StoragePolicy.REMOVABLE, 1, 1, None, 1),
+        (StoragePolicy.PRIORITY_INTERNAL, 0, 0, 0, 1),
+        (StoragePolicy.INTERNAL, 0, 0, 0, 0),
+    ],
+)
+def test_storage_for_media_follows_policy_and_presence(
+    policy: StoragePolicy | None, with_card: int, without: int, removed: int | None, full: int
+) -> None:
+    """`full`: the internal storage is."""
+    storage = Storage(Commander())
+    internal = StorageState(removable=False, physical=PhyState.AVAILABLE, available=1000)
+    card = StorageState(removable=True, physical=PhyState.AVAILABLE, file_system=FsState.FORMATTING)
+    for state, expected in (
+        ({0: internal, 1: card}, with_card),
+        ({0: internal, 1: replace(card, physical=PhyState.UNDETECTED)}, without),
+        ({0: internal}, removed),
+        ({0: replace(internal, available=0), 1: card}, full),
+        ({}, 0),
+    ):
+        storage.state = state
+        assert storage.for_media(policy) == expected
 
 
 async def test_the_protobuf_service(device: ScriptedDevice) -> None:

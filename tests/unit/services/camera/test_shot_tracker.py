@@ -60,6 +60,53 @@ def test_end_before_saved_loses_nothing() -> None:
     assert tracker.expire(1.3 + LOST, is_series=False) == []
 
 
+def saved(media: str, count: int | None = None, *, is_last: bool = False) -> CaptureUpdate:
+    return CaptureUpdate(0, SAVED, media, count=count, is_last=is_last)
+
+
+def test_refused_second_photo_loses_nothing() -> None:
+    tracker = ShotTracker()
+    refused = CaptureUpdate(0, FAILED, reason="error bad state", is_refused=True)
+    feed(tracker, (1.0, STARTED, None))
+    assert tracker.receive(refused, 1.1) == []
+    feed(tracker, (1.2, TAKEN, 1))
+    assert tracker.receive(refused, 1.3) == []
+    assert tracker.receive(saved("a", 1), 1.6) == [CapturedShot(1, 1, 1.2, True)]
+
+
+def test_repeated_media_is_no_picture_of_the_next_photo() -> None:
+    tracker = ShotTracker()
+    feed(tracker, (1.0, STARTED, None), (1.2, TAKEN, None))
+    assert tracker.receive(saved("a", is_last=True), 1.6) == [CapturedShot(1, 1, 1.2, True)]
+    assert tracker.receive(saved("a", is_last=True), 1.7) == []
+    feed(tracker, (2.0, STARTED, None), (2.2, TAKEN, None))
+    assert tracker.receive(saved("a", is_last=True), 2.3) == []
+    assert tracker.receive(saved("b", is_last=True), 2.6) == [CapturedShot(2, 1, 2.2, True)]
+
+
+@pytest.mark.parametrize(("count", "is_last", "ended"), [(1, False, True), (1, False, False), (None, True, False)])
+def test_media_without_other_reports_is_a_picture(count: int | None, is_last: bool, ended: bool) -> None:
+    """`ended`: the end of the photo before was reported."""
+    tracker = ShotTracker()
+    feed(tracker, (1.0, STARTED, None), (1.2, TAKEN, count))
+    tracker.receive(saved("a", count, is_last=is_last), 1.6)
+    if ended:
+        feed(tracker, (1.7, ENDED, None))
+    assert tracker.receive(saved("b", count, is_last=is_last), 5.0) == [CapturedShot(2, 1, 5.0, True)]
+    assert tracker.receive(saved("c", count, is_last=is_last), 90.0) == [CapturedShot(3, 1, 90.0, True)]
+    assert tracker.receive(saved("b", count, is_last=is_last), 91.0) == []
+
+
+def test_pictures_of_a_series_are_one_media() -> None:
+    tracker = ShotTracker()
+    feed(tracker, (0.0, STARTED, None), (1.0, TAKEN, 1))
+    assert tracker.receive(saved("a", 1), 1.3) == [CapturedShot(1, 1, 1.0, True)]
+    feed(tracker, (2.0, TAKEN, 2))
+    assert tracker.receive(saved("a", 2), 2.3) == [CapturedShot(1, 2, 2.0, True)]
+    feed(tracker, (2.4, ENDED, None))
+    assert tracker.receive(saved("a", 2), 2.5) == []
+
+
 def test_picture_that_is_never_saved_is_lost() -> None:
     tracker = ShotTracker()
     feed(tracker, (1.0, STARTED, None), (1.2, TAKEN, None), (1.3, ENDED, None))

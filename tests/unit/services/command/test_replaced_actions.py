@@ -9,13 +9,14 @@ from typing import Any
 import pytest
 
 from anafi_mav.services.command.command_service import CommandService
+from anafi_mav.services.command.running_actions import RunningActions
 from anafi_mav.services.commands import ActionGroup
 
 
 @pytest.mark.parametrize("newer", ["order", "stream", "gateway"])
 async def test_replaced_action_reads_if_a_command_ended_it(newer: str) -> None:
     host: Any = SimpleNamespace(spawn=asyncio.ensure_future)
-    service = CommandService(host)
+    service = CommandService(host, RunningActions())
     began, learned = asyncio.Event(), []
 
     async def old() -> None:
@@ -41,7 +42,7 @@ async def test_replaced_action_reads_if_a_command_ended_it(newer: str) -> None:
 
 async def test_action_ends_older_ones_of_its_resource_alone() -> None:
     host: Any = SimpleNamespace(spawn=asyncio.ensure_future)
-    service = CommandService(host)
+    service = CommandService(host, RunningActions())
 
     async def endless() -> None:
         await asyncio.Event().wait()
@@ -59,3 +60,22 @@ async def test_action_ends_older_ones_of_its_resource_alone() -> None:
     await service.run("three", newer(ActionGroup.FLIGHT))
     assert [task.cancelled() for task in (photo, zoom, flight)] == [True, False, True]
     zoom.cancel()
+
+
+async def test_action_ends_older_ones_of_other_components_alone() -> None:
+    host: Any = SimpleNamespace(spawn=asyncio.ensure_future)
+    running = RunningActions()
+    autopilot, camera = CommandService(host, running), CommandService(host, running)
+
+    async def endless() -> None:
+        await asyncio.Event().wait()
+
+    async def panorama() -> None:
+        await asyncio.wait(camera.end_others())
+
+    older = autopilot.run("one", endless())
+    turns = camera.run("two", panorama())
+    newer = autopilot.run("three", endless())
+    await turns
+    assert [task.cancelled() for task in (older, newer)] == [True, False]
+    newer.cancel()
