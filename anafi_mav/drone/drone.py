@@ -47,6 +47,7 @@ from anafi_mav.drone.payload.storage import Storage
 from anafi_mav.drone.payload.thermal import Thermal
 from anafi_mav.drone.piloting.moves import Move
 from anafi_mav.drone.piloting.piloting import Piloting
+from anafi_mav.drone.piloting.state import MOTORS_OFF
 from anafi_mav.drone.rest import HTTP_PORT, Rest
 from anafi_mav.drone.status.alerts import Alerts, Blocker, spoken, takeoff_blockers
 from anafi_mav.drone.status.battery import Battery
@@ -137,7 +138,7 @@ class Drone:
         self.gps = Gps()
         self.home = Home(self._commander)
         self.link = Link()
-        self.media = Media(self._commander, self._rest)
+        self.media = Media(self._commander, self._rest, lambda: self.piloting.state.flying not in MOTORS_OFF)
         self.poi = Poi(self._commander)
         self.product = Product()
         self.sound = Sound(self._commander)

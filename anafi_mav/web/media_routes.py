@@ -9,6 +9,7 @@ Files are deleted for programs of this computer only, never for a browser, not e
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import logging
 from collections.abc import Awaitable, Callable
@@ -19,8 +20,9 @@ from aiohttp import web
 from msgspec.structs import replace
 
 from anafi_mav.drone import Drone
-from anafi_mav.drone.payload.media import API, MediaItem, Resource
+from anafi_mav.drone.payload.media import API, Listing, MediaItem, Resource
 from anafi_mav.drone.payload.media_file import content_type
+from anafi_mav.drone.payload.media_index import SORTED_IN_LOOP
 from anafi_mav.drone.rest import NOT_INDEXED, NOT_INDEXED_YET, NotFound
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, NotSupported
 from anafi_mav.web.server import HttpServer, is_loopback
@@ -40,6 +42,8 @@ class MediaRoutes:
     def __init__(self, server: HttpServer, find: Callable[[int], Drone | None]) -> None:
         """`find` returns the drone with a system id, connected or not."""
         self._find = find
+        self._encoded: dict[str, tuple[Listing, list[bytes]]] = {}
+        """The last list of each drone, and its media as JSON, oldest first."""
         base = "/drone/{sysid:[0-9]{1,3}}"
         server.add_get(f"{base}{API}/medias", self._answering(self._list))
         server.add_get(f"{base}{API}/md5/{{name}}", self._answering(self._md5))
@@ -67,11 +71,16 @@ class MediaRoutes:
         return respond
 
     async def _list(self, request: web.Request, drone: Drone) -> web.Response:
-        listing = await drone.media.listing()
-        items = [_with_our_paths(item) for item in listing.items]
-        if request.query.get("sort_order") == "newest":
-            items.reverse()
-        return web.Response(body=msgspec.json.encode(items), content_type="application/json")
+        listing, sysid = await drone.media.listing(), request.match_info["sysid"]
+        kept = self._encoded.get(sysid)
+        if kept is None or kept[0] is not listing:
+            if len(listing.items) < SORTED_IN_LOOP:
+                kept = listing, _encoded(listing)
+            else:
+                kept = listing, await asyncio.to_thread(_encoded, listing)
+            self._encoded[sysid] = kept
+        items = reversed(kept[1]) if request.query.get("sort_order") == "newest" else kept[1]
+        return web.Response(body=b"[" + b",".join(items) + b"]", content_type="application/json")
 
     async def _md5(self, request: web.Request, drone: Drone) -> web.Response:
         resource = await _resource(request, drone)
@@ -143,6 +152,11 @@ async def _resource(request: web.Request, drone: Drone) -> Resource:
     if resource is None:
         raise web.HTTPNotFound(text='{"error": "no such file"}', content_type="application/json")
     return resource
+
+
+def _encoded(listing: Listing) -> list[bytes]:
+    """Return each media as JSON; one by one, so that a thread does it beside the event loop."""
+    return [msgspec.json.encode(_with_our_paths(item)) for item in listing.items]
 
 
 def _with_our_paths(item: MediaItem) -> MediaItem:

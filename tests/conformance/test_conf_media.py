@@ -224,3 +224,25 @@ async def test_drone_without_a_web_server_has_no_media() -> None:
         assert (await camera(w).ask(LIST, b"/media", timeout=15.0)).error == FAIL
         text = await w.client.wait("STATUSTEXT", since=mark)
         assert text.text.startswith("Media unavailable: ")
+
+
+@pytest.mark.parametrize("opcode", [READ, CRC])
+async def test_silent_web_server_fails_the_request(opcode: int) -> None:
+    async with world(web=True) as w:
+        video, ftp = add_video(w.drone, VIDEO), camera(w)
+        path = f"/media/{DAY}/{video.id}".encode()
+        await ftp.ask(OPEN, path)
+        assert w.drone.web is not None
+        w.drone.web.mute = True
+        data = path if opcode == CRC else b""
+        size = len(path) if opcode == CRC else 9
+        assert (await ftp.ask(opcode, data, size=size, offset=0, timeout=30.0)).error == FAIL
+
+
+async def test_request_for_a_file_that_never_arrives_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("anafi_mav.services.ftp.ftp_service.WAIT_TIMEOUT", 3.0)
+    async with world(web=True) as w:
+        add_photo(w.drone)
+        assert w.drone.web is not None
+        w.drone.web.mute = True
+        assert (await camera(w).ask(LIST, b"/media", timeout=8.0)).error == FAIL

@@ -26,6 +26,7 @@ from anafi_mav.config import MediaConfig
 from anafi_mav.drone.payload.camera_enums import CameraMode
 from anafi_mav.drone.payload.media import MediaClient
 from anafi_mav.drone.payload.media_copy import copy
+from anafi_mav.drone.payload.media_index import SORTED_IN_LOOP
 from anafi_mav.drone.rest import Rest
 from anafi_mav.errors import AnafiMavError, CommandRejected, ConfigError
 from anafi_mav.sim.world.quirks import Quirk
@@ -103,6 +104,29 @@ async def test_file_over_4_gib_is_read_over_http() -> None:
         for first in (2**32 - 3, video.size - 9):
             status, body, _ = await ask(w, "GET", f"/data/media/{video.id}", Range=f"bytes={first}-{first + 8}")
             assert (status, body) == (206, b"".join(video.parts(first, first + 9)))
+
+
+async def test_file_without_a_byte_is_an_empty_answer(folder: Path) -> None:
+    async with world(web=True) as w:
+        photo = add_photo(w.drone)
+        object.__setattr__(photo, "size", 0)
+        for headers in ({}, {"Range": "bytes=5-"}):
+            assert (await ask(w, "GET", f"/data/media/{photo.id}", **headers))[:2] == (200, b"")
+        assert "content-length" not in (await ask(w, "HEAD", f"/data/media/{photo.id}"))[2]
+        assert await download_media(arguments(w, "download", str(folder))) == 1
+        assert names(folder) == []
+
+
+async def test_long_list_over_http_follows_the_card() -> None:
+    async with world(web=True) as w:
+        ids = [add_photo(w.drone).id for _ in range(SORTED_IN_LOOP)]
+        for query in ("", "?sort_order=newest"):
+            listed = json.loads((await ask(w, "GET", f"/api/v1/media/medias{query}"))[1])
+            assert [media["resources"][0]["resource_id"] for media in listed] == ids
+            ids.reverse()
+        w.drone.firmware.payload.media.remove(listed[0]["media_id"])
+        await asyncio.sleep(0.1)  # until the gateway has received it
+        assert len(json.loads((await ask(w, "GET", "/api/v1/media/medias"))[1])) == SORTED_IN_LOOP - 1
 
 
 async def test_delete_over_http_is_for_programs_of_this_computer() -> None:

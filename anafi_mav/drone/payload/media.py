@@ -253,10 +253,11 @@ class Media(Commanding[MediaState]):
         ),
     }
 
-    def __init__(self, commander: Commander, rest: Rest) -> None:
+    def __init__(self, commander: Commander, rest: Rest, is_flying: Callable[[], bool]) -> None:
+        """While `is_flying`, files are read at `FLIGHT_RATE`: the radio carries the controls."""
         super().__init__(commander)
         self._client = MediaClient(rest)
-        self._reader = MediaReader(self._client)
+        self._reader = MediaReader(self._client, is_flying)
         self._index = MediaIndex(self._client)
 
     # -- what there is

@@ -26,6 +26,10 @@ LISTEN_TIMEOUT = 1.0
 """s that the first list waits for the websocket. Olympe gives it 0.5 s, five times."""
 
 
+SORTED_IN_LOOP = 200
+"""Media that are sorted in the event loop, some 100 KB of a list; more in a thread: the loop controls drones."""
+
+
 class HasFiles(Protocol):
     """The part of a media that is needed here."""
 
@@ -124,7 +128,10 @@ class MediaIndex:
             waiting.cancel()
         changes = self._changes
         items = tuple(await self._client.list(newest_first=False))
-        listing = Listing(items, by_day([file for item in items for file in item.resources]))
+        if len(items) < SORTED_IN_LOOP:
+            listing = _listing(items)
+        else:
+            listing = await asyncio.to_thread(_listing, items)
         if self._changes == changes:  # else it may be older than the change
             self._kept = (listing, counters, asyncio.get_running_loop().time())
         return listing
@@ -141,6 +148,10 @@ class MediaIndex:
             log.debug("no notifications of the media store: %s", error)
         finally:
             self._open = False
+
+
+def _listing(items: tuple[Any, ...]) -> Listing:
+    return Listing(items, by_day([file for item in items for file in item.resources]))
 
 
 def by_day(files: Sequence[Resource]) -> dict[str, dict[str, Resource]]:

@@ -2,14 +2,15 @@
 
 A read is one HTTP answer. It begins where a reader wants it (RFC 9110 §14, Range) and stays a few pieces ahead of its
 readers. There are at most `READS` of them; a reader of a third file ends the one that has no waiting reader, and later
-continues it by another Range. A web server without ranges sends the file from its beginning, which is skipped.
+continues it by another Range. In flight all of them together have `FLIGHT_RATE`. A web server without ranges sends the
+file from its beginning, which is skipped.
 """
 
 from __future__ import annotations
 
 import asyncio
 from collections import OrderedDict
-from collections.abc import AsyncGenerator, AsyncIterator, Hashable
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Hashable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
 from typing import Protocol
 
@@ -27,6 +28,9 @@ READS = 2
 
 AHEAD = 3
 """Pieces that a read is ahead of its readers."""
+
+FLIGHT_RATE = 250_000.0
+"""Bytes of files in a second while the drone flies, of all readers: less than half of its live video's 5 Mbit/s."""
 
 IDLE = 5.0
 """s without a reader after which a read ends."""
@@ -46,8 +50,11 @@ class OpensFiles(Protocol):
 class MediaReader:
     """The reads of one drone's files."""
 
-    def __init__(self, client: OpensFiles) -> None:
+    def __init__(self, client: OpensFiles, is_flying: Callable[[], bool] = lambda: False) -> None:
         self._client = client
+        self._is_flying = is_flying
+        self._paced_until = 0.0
+        """Loop time before which no further bytes are due in flight."""
         self._reads: list[_Read] = []
         """The one that was used last is last."""
         self._pieces: OrderedDict[Hashable, bytes] = OrderedDict()
@@ -79,6 +86,7 @@ class MediaReader:
             async with self._client.open(resource, offset) as (_, chunks):
                 async for chunk in chunks:
                     yield chunk
+                    await self.pace(len(chunk))
             return
         while offset < resource.size:
             part = await self.read(resource, offset, min(PIECE - offset % PIECE, resource.size - offset))
@@ -154,6 +162,13 @@ class MediaReader:
 
     # What a read reports.
 
+    async def pace(self, size: int) -> None:
+        """Wait as long as `size` bytes may take; on the ground not at all."""
+        if self._is_flying():
+            now = asyncio.get_running_loop().time()
+            self._paced_until = max(self._paced_until, now) + size / FLIGHT_RATE
+            await asyncio.sleep(self._paced_until - now)
+
     def open(self, resource: Resource, offset: int) -> OpenedFile:
         """Open a file for a read."""
         return self._client.open(resource, offset)
@@ -225,6 +240,7 @@ class _Read:
                     del buffer[:expected]
                     if self.next * PIECE >= size:
                         return
+                    await self._owner.pace(expected)
                     while self.next > self._wanted + AHEAD:
                         self._more.clear()
                         try:

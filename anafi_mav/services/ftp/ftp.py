@@ -218,6 +218,11 @@ class Wait:
     abandon: Callable[[], object] = lambda: None
     """Called when the answer is no longer wanted; set by the caller that awaits."""
 
+    @property
+    def is_checksum(self) -> bool:
+        """True when a whole file must be read."""
+        return self.requests[0].opcode == Opcode.CALC_FILE_CRC32
+
 
 @dataclass
 class _Client:

@@ -5,6 +5,7 @@ The protocol is `ftp`; the files belong to the services that make them, except g
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from functools import partial
@@ -28,6 +29,12 @@ logger = logging.getLogger(__name__)
 
 EXPIRE_EVERY = 1.0
 """s between looks for unused sessions."""
+
+WAIT_TIMEOUT = 60.0
+"""s that a request waits for a file. The drone's web server ends a silent read after 10 s, not one that drips."""
+
+CHECKSUM_TIMEOUT = 1800.0
+"""s that a checksum waits for a whole file: 4 GiB at 2.4 MB/s."""
 
 BURST_PACE = 12_000.0
 """Parts of a burst in a second where the line is fast: 2.8 MB/s."""
@@ -105,7 +112,10 @@ class FtpService(Service):
         """Answer when the file that the request waits for has arrived."""
         value: object
         try:
-            value = await wait.value
+            value = await asyncio.wait_for(wait.value, CHECKSUM_TIMEOUT if wait.is_checksum else WAIT_TIMEOUT)
+        except asyncio.TimeoutError:
+            logger.warning("%s: a file of the drone does not arrive", self.host.drone.name)
+            value = FileRefused(FileError.FAIL)
         except FileRefused as refusal:
             value = refusal
         except Exception:

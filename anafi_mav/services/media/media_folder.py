@@ -35,11 +35,22 @@ class MediaFolder:
     def __init__(self, drone: Drone) -> None:
         self._drone = drone
         self._checksums: OrderedDict[Resource, int] = OrderedDict()
+        self._listed: tuple[Listing, dict[str, Sequence[Entry]]] | None = None
+        """The last list, and the entries of its directories that a client has requested."""
         self._summing = asyncio.Lock()
         """A checksum reads a whole file: one at a time."""
 
     def list(self, path: str) -> Sequence[Entry] | Awaitable[Sequence[Entry]]:
-        return when_listed(self._drone, lambda listing: entries(listing, path, lambda file: file_entry(file)))
+        return when_listed(self._drone, lambda listing: self._entries(listing, path))
+
+    def _entries(self, listing: Listing, path: str) -> Sequence[Entry]:
+        """Return the entries of a directory; a client requests them page by page, so they are kept."""
+        if self._listed is None or self._listed[0] is not listing:
+            self._listed = (listing, {})
+        directories = self._listed[1]
+        if path not in directories:
+            directories[path] = entries(listing, path, file_entry)
+        return directories[path]
 
     def open(self, path: str) -> FileSource | Awaitable[FileSource]:
         def opened(listing: Listing) -> FileSource:

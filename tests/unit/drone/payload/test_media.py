@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import json
+import threading
 from collections.abc import AsyncIterator
-from contextlib import aclosing, asynccontextmanager
+from contextlib import AbstractAsyncContextManager, aclosing, asynccontextmanager
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,7 @@ from anafi_mav.drone import Drone
 from anafi_mav.drone.payload.camera_enums import CameraMode, PhotoFile, PhotoMode
 from anafi_mav.drone.payload.camera_state import PhotoSettings
 from anafi_mav.drone.payload.media import MediaItem, Notification, Resource
+from anafi_mav.drone.payload.media_index import SORTED_IN_LOOP, MediaIndex
 from anafi_mav.drone.rest import Rest
 from anafi_mav.errors import CommandRejected, LinkLost, NotSupported, RemoteProtocolError
 
@@ -165,7 +167,7 @@ async def test_media_that_are_not_readable_are_left_out() -> None:
 
 async def test_files_that_cannot_be_shown_are_left_out(caplog: pytest.LogCaptureFixture) -> None:
     good = {"resource_id": "1.JPG", "size": 9}
-    bad = [{"resource_id": id} for id in ("a/b", "a\tb", "a\0", "x" * 231, "..")]
+    bad: list[dict[str, object]] = [{"resource_id": id} for id in ("a/b", "a\tb", "a\0", "x" * 231, "..")]
     bad += [{"resource_id": "2.JPG", "size": size} for size in (-1, 1 << 63)]
     many = [{"media_id": str(n), "resources": [good, *bad]} for n in range(500)]  # decoded in a thread
     async with serving(medias=told(many)) as (drone, _):
@@ -175,6 +177,27 @@ async def test_files_that_cannot_be_shown_are_left_out(caplog: pytest.LogCapture
         assert [record.message for record in caplog.records if "left out" in record.message] == [
             "3500 media or files of the drone are not readable and left out"
         ]
+
+
+async def test_long_list_is_sorted_in_a_thread() -> None:
+    threads = set()
+
+    class Item:
+        @property
+        def resources(self) -> tuple[Resource, ...]:
+            threads.add(threading.get_ident())
+            return (Resource("1.JPG"),)
+
+    class Client:
+        async def list(self, *, newest_first: bool = True) -> list[Item]:
+            return [Item()] * SORTED_IN_LOOP
+
+        def listen(self) -> AbstractAsyncContextManager[AsyncIterator[object]]:
+            raise LinkLost("no notifications")
+
+    listing = await MediaIndex(Client()).get(None)
+    assert listing.file("1.JPG") == Resource("1.JPG")
+    assert threading.get_ident() not in threads
 
 
 async def test_missing_md5_differs_from_failed_md5_request() -> None:

@@ -222,3 +222,17 @@ async def test_answer_that_times_out_fails_its_reader(server: Server) -> None:
     with pytest.raises(CommandTimeout):
         await MediaReader(silent).read(wanted, 0, 10)
     assert len(silent.opened) == 1
+
+
+async def test_reads_in_flight_share_a_rate(server: Server) -> None:
+    wanted = [server.add(name, 4 * PIECE) for name in "ab"]
+    flying = True
+    reader, loop = MediaReader(server, lambda: flying), asyncio.get_running_loop()
+    begun = loop.time()
+    parts = await asyncio.gather(*(reader.read(one, 0, 4 * PIECE) for one in wanted))
+    assert parts == [server.files[name] for name in "ab"]
+    # Each file's last piece is not waited for, and the other's waits need not be over.
+    assert loop.time() - begun >= 5 * PIECE / media_reader.FLIGHT_RATE - 0.01
+    flying, landed = False, loop.time()
+    await reader.read(server.add("c", 4 * PIECE), 0, 4 * PIECE)
+    assert loop.time() - landed < PIECE / media_reader.FLIGHT_RATE
