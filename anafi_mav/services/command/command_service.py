@@ -186,6 +186,9 @@ class CommandService(Service):
             if not (quiet and repeated == dialect.MAV_RESULT_IN_PROGRESS):
                 self._acknowledge(inbound, command.id, repeated)
             return
+        if self._all.is_full(command.group):
+            self._acknowledge(inbound, command.id, dialect.MAV_RESULT_TEMPORARILY_REJECTED)
+            return
         execution = self._history.begin(command.client, command) if flies else self.host.payload_history.begin(command)
         running = RunningAction(command.client, (inbound, execution), group=command.group)
         self._spawn(self._execute(inbound, execution), running)

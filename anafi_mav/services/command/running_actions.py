@@ -14,6 +14,9 @@ from dataclasses import dataclass
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import ActionGroup, CommandHistory, Execution
 
+MAX_WAITING = 32
+"""Actions of one group that run one after another: a drone that answers none of them takes seconds for each."""
+
 
 @dataclass
 class RunningAction:
@@ -42,6 +45,10 @@ class RunningActions:
         """The action that calls; None outside of them."""
         task = asyncio.current_task()
         return None if task is None else self.tasks.get(task)
+
+    def is_full(self, group: ActionGroup) -> bool:
+        """Return True when a group whose actions run in order takes no further one."""
+        return group.in_order and sum(one.group is group for one in self.tasks.values()) >= MAX_WAITING
 
     def end_others(self, group: ActionGroup) -> list[asyncio.Task[None]]:
         """Cancel all actions of a group that are older than the calling one.

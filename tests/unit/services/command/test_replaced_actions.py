@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from anafi_mav.services.command.command_service import CommandService
-from anafi_mav.services.command.running_actions import RunningActions
+from anafi_mav.services.command.running_actions import MAX_WAITING, RunningAction, RunningActions
 from anafi_mav.services.commands import ActionGroup
 
 
@@ -79,3 +79,15 @@ async def test_action_ends_older_ones_of_other_components_alone() -> None:
     await turns
     assert [task.cancelled() for task in (older, newer)] == [True, False]
     newer.cancel()
+
+
+def test_actions_that_run_in_order_are_bounded_by_group() -> None:
+    running = RunningActions()
+    for group in (ActionGroup.CAMERA, ActionGroup.FLIGHT):
+        for number in range(MAX_WAITING):
+            assert not running.is_full(group)
+            task: Any = (group, number)
+            running.tasks[task] = RunningAction("client", None, group=group)
+    assert running.is_full(ActionGroup.CAMERA)
+    assert not running.is_full(ActionGroup.PHOTO)
+    assert not running.is_full(ActionGroup.FLIGHT)  # newer flight commands replace older ones
