@@ -216,6 +216,16 @@ async def test_mount_place_replaces_a_goto_as_a_region_does() -> None:
             "CancelMoveTo",
             "StartPilotedPOIV2",
         ]
+        # A region that still ends a goto is withdrawn by "none".
+        goto["z"] = 12.0  # not the earlier one sent again
+        assert (await w.client.command(dialect.MAV_CMD_DO_REPOSITION, -1, 1, 0, NAN, **goto)).result == ACCEPTED
+        mark, count = other.mark(), len(pois(w))
+        other.send_command(ROI, x=EAST[0], y=EAST[1], z=HOME[2])
+        other.send_command(NO_ROI)
+        assert await answer(other, ROI, mark) == REJECTED
+        assert await answer(other, NO_ROI, mark) == ACCEPTED
+        await next_truth(w)
+        assert len(pois(w)) == count
 
 
 async def test_region_is_refused_while_a_mission_is_flown() -> None:

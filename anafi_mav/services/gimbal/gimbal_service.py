@@ -335,9 +335,9 @@ class GimbalService(Service):
 
     async def _look(self, command: Command, where: GeoPoint, ato: float) -> None:
         self._require_control(command.client)
-        self._roi.require_possible()
+        region = self._roi.prepare()
         await self._motion.rest()
-        await self._roi.look_at(where, ato)
+        await self._roi.look_at(region, where, ato)
 
     async def _look_at_system(self, command: Command) -> None:
         """Run MAV_CMD_DO_SET_ROI_SYSID: param1 system, param2 gimbal device."""
@@ -346,10 +346,10 @@ class GimbalService(Service):
 
     async def _look_at_number(self, command: Command, system: float) -> None:
         self._require_control(command.client)
-        self._roi.require_possible()
         self._roi.position_of(system)
+        region = self._roi.prepare()
         await self._motion.rest()
-        await self._roi.look_at_system(system)
+        await self._roi.look_at_system(region, system)
 
     async def _look_anywhere(self, command: Command) -> None:
         """Run MAV_CMD_DO_SET_ROI_NONE: param1 gimbal device."""
@@ -497,12 +497,12 @@ class GimbalService(Service):
                 if not self._control.allows(client):
                     raise Refused(texts.ROI, self._objection(client))
                 if not self._roi.is_locked_on(where, ato):
-                    self._roi.require_possible()
+                    region = self._roi.prepare()
                     vehicle = self.host.vehicle
                     if not self._roi.is_active and (vehicle.mode not in HOVERING or vehicle.overridable):
                         raise Refused(texts.ROI, texts.DRONE_FLIES)
                     await self._motion.rest()
-                    await self._roi.look_at(where, ato)
+                    await self._roi.look_at(region, where, ato)
         except AnafiMavError as error:
             self.host.warn_throttled(error.text if isinstance(error, Refused) else texts.from_below(error))
         finally:

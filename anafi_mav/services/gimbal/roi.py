@@ -77,7 +77,9 @@ class RegionOfInterest:
     def __init__(self, host: Host) -> None:
         self._host = host
         self._region: Region | None = None
-        """The region in force, or about to be; None as soon as its end is commanded."""
+        """The region in force; None as soon as its end is commanded."""
+        self._prepared: Region | None = None
+        """The newest region that is about to begin, while earlier movements end."""
         host.vehicle.helms = (*host.vehicle.helms, self)
         self._systems: dict[int, SystemPosition] = {}
         self._system: int | None = None
@@ -109,8 +111,11 @@ class RegionOfInterest:
         """True while a region is in force or begins, and its end is not commanded."""
         return self._region is not None
 
-    def require_possible(self) -> None:
-        """Raise `Refused` when no region can begin: landing, return, mission, ground."""
+    def prepare(self) -> Region:
+        """Return an attempt for `look_at`; a newer one, or `stop`, withdraws it.
+
+        Raises `Refused` when no region can begin: landing, return, mission, ground.
+        """
         vehicle = self._host.vehicle
         if (descent := vehicle.descent) is not None:
             raise Refused(texts.ROI, descent)
@@ -118,23 +123,30 @@ class RegionOfInterest:
             raise Refused(texts.ROI, texts.GIMBAL_OF_MISSION)
         if not vehicle.in_air:
             raise Refused(texts.ROI, texts.NOT_IN_AIR)
+        self._prepared = Region(PoiMode.LOCKED_GIMBAL)
+        return self._prepared
 
-    async def look_at(self, where: GeoPoint, ato: float) -> None:
+    async def look_at(self, region: Region, where: GeoPoint, ato: float) -> None:
         """Look at a place (height: m above take-off), with the gimbal locked on it.
 
         It replaces what flies the drone, as every flight command. A region in force moves to the new place.
         """
         check_on_earth(where, texts.ROI)
-        self.require_possible()
+        self._require_prepared(region)
         is_locked = self.is_locked_on(where, ato)
         self.forget_system()
         if is_locked:
             return
         if self._region is None:
             await self._take_over()
-        region = self._region = Region(PoiMode.LOCKED_GIMBAL)  # no await from the checks to the start
+            self._require_prepared(region)
+        self._region, self._prepared = region, None  # no await from the checks to the start
         await self._start(region, where, ato)
         region.is_confirmed = True
+
+    def _require_prepared(self, region: Region) -> None:
+        if self._prepared is not region:
+            raise Refused(texts.ROI, texts.MISSION_DISPLACED)
 
     async def _take_over(self) -> None:
         """End what flies the drone. Raises `Refused` when it does not hover then."""
@@ -153,16 +165,16 @@ class RegionOfInterest:
             raise Refused(texts.ROI, texts.ROI_NO_SYSTEM.fill(system=system))
         return seen
 
-    async def look_at_system(self, system: float) -> None:
+    async def look_at_system(self, region: Region, system: float) -> None:
         """Look at another system, and follow it as far as it reports its position."""
         seen = self.position_of(system)
-        await self.look_at(seen.place, amsl_to_ato(self._host.vehicle, seen.amsl))
+        await self.look_at(region, seen.place, amsl_to_ato(self._host.vehicle, seen.amsl))
         if self._region is not None:
             self._system, self._looked, self._is_lost = int(system), seen, False
 
     async def stop(self) -> None:
         """Look at nothing in particular."""
-        self._region = None
+        self._region = self._prepared = None
         self.forget_system()
         await self._host.drone.poi.stop()
 
@@ -177,7 +189,8 @@ class RegionOfInterest:
         region = self._region
         if not self.holds_gimbal:
             return
-        if region is None:
+        vehicle = self._host.vehicle
+        if region is None or vehicle.descent is not None or not vehicle.in_air:
             await self._released()
             return
         if region.freeing is None:
@@ -240,7 +253,7 @@ class RegionOfInterest:
 
     def link_down(self) -> None:
         """Forget the region and the systems: the drone is disconnected."""
-        self._region = None
+        self._region = self._prepared = None
         self.forget_system()
         self._systems.clear()
 
