@@ -524,6 +524,24 @@ MAV_CMD_STORAGE_FORMAT needs the number where there are two storages. It is refu
 while photos are taken, and UNSUPPORTED for a storage that the drone cannot format. It cannot be cancelled.
 IN_PROGRESS is sent meanwhile; MAVSDK's `format_storage` takes the first one for the end, so watch the storage.
 
+## Repeated commands
+
+A client that receives no acknowledgement sends the command again. Mode, source, zoom to a share or at a rate,
+recording, photos by distance, reset and stops are then carried out again, so ACCEPTED always means that it is so now.
+What counts is not done twice:
+
+| command | the same from the same client |
+|---|---|
+| photo with a sequence number | answered again for 3.5 s after the last time |
+| photo without one, step of zoom | a new one, unless `confirmation` is above 0; then answered again for 3.5 s |
+| format | answered again for 3.5 s, a new one after a photo or recording |
+| panorama | answered again for 3.5 s while it is being taken |
+
+Between two equal ones, another command for photos makes the second photo a new one if it has no sequence number; a
+zoom does so for a step. It does not matter which client sent it, or to which component.
+
+MAVSDK repeats every 0.5 s with `confirmation` 0, and numbers its photos. QGroundControl sends these commands once.
+
 ## Missions
 
 While items to come of the flown mission need the camera, stopping a recording or series, mode, zoom, source and

@@ -64,6 +64,15 @@ class ActionGroup(enum.Enum):
     STORAGE = "the storage of photos and videos"
     STREAM = "the live video"
 
+    @property
+    def in_order(self) -> bool:
+        """Actions run one after another, in the order in which they arrived.
+
+        Each then finds the state that the one before has confirmed. Those of other groups are replaced by newer
+        ones instead, or the drone itself refuses a second one.
+        """
+        return self in (ActionGroup.PHOTO, ActionGroup.RECORDING, ActionGroup.CAMERA, ActionGroup.STREAM)
+
 
 class Effect(enum.Enum):
     """Kind of change that a command requests.
@@ -79,6 +88,8 @@ class Effect(enum.Enum):
     LAPSING = "a mode that ends without another command: asked for after its end, it begins again, or is refused"
     EACH = "counts each time: after its end it is executed again, unless its confirmation says that it is repeated"
     TARGET = "a target that may be set twice: carried out each time it arrives, and never cancelled"
+    NUMBERED = "counts, and its sender numbers it: the same number is no new one, whatever was commanded since"
+    ONCE = "counts: answered, not repeated, until another action of its group began or what it did no longer holds"
     IRREVOCABLE = "cannot be cancelled: the drone does it whatever is sent then, so CANCELLED would be a lie"
 
     @property
@@ -95,6 +106,11 @@ class Effect(enum.Enum):
     def is_revocable(self) -> bool:
         """COMMAND_CANCEL may end it. Not a stop, which another client must not withdraw."""
         return self in (Effect.CHANGE, Effect.LAPSING)
+
+    @property
+    def is_of_payload(self) -> bool:
+        """One of those that `PayloadHistory` knows: its remembered answer cannot have become untrue."""
+        return self in (Effect.STOP, Effect.TARGET, Effect.EACH, Effect.NUMBERED, Effect.ONCE)
 
 
 EFFECT_OF_MODE = {
@@ -152,9 +168,12 @@ class Definition:
     mode: Callable[[Command], FlightMode | None] | None = None
     """The mode that it names, None for one that we do not have. Only for commands that name modes."""
     progress: ProgressPolicy = ProgressPolicy.PROMPT
-    group: ActionGroup = ActionGroup.FLIGHT
+    group: ActionGroup | Callable[[Command], ActionGroup] = ActionGroup.FLIGHT
+    """One for all, or by the command's parameters."""
     offered: Callable[[Flavour], bool] = lambda flavour: True
     """Return True for flavours whose clients have the command."""
+    still_holds: Callable[[], bool] = lambda: True
+    """Return False once what the action did has ended or changed: the same command is then a new one."""
 
     def check(self, id: int) -> None:
         """Raise `ValueError` when this contradicts MAVLink's definition of the MAV_CMD, or itself."""
@@ -164,6 +183,9 @@ class Definition:
             raise ValueError(f"MAV_CMD {id}: its z cannot be a height, it has no location")
         if (self.effect is effect_of_mode) != (self.mode is not None):
             raise ValueError(f"MAV_CMD {id}: it must have both mode and `effect_of_mode`, or none of them")
+        may_fly = self.group is ActionGroup.FLIGHT or not isinstance(self.group, ActionGroup)
+        if not may_fly and isinstance(self.effect, Effect) and not self.effect.is_of_payload:
+            raise ValueError(f"MAV_CMD {id}: its group has no {self.effect.name}: say if it counts or sets a target")
 
 
 @dataclass(frozen=True)
@@ -205,6 +227,8 @@ class Command:
     """Above 0 in a COMMAND_LONG that is sent again because no answer was received."""
     counted: bool = True
     """Its effect is HOLD, and its client sent no other such command in the 5 s before."""
+    component: int = dialect.MAV_COMP_ID_AUTOPILOT1
+    """The component that carries it out."""
 
     @property
     def right(self) -> Right:
@@ -216,6 +240,12 @@ class Command:
         """Effect that it requests."""
         effect = self.definition.effect
         return effect if isinstance(effect, Effect) else effect(self)
+
+    @property
+    def group(self) -> ActionGroup:
+        """Group of actions that it may replace."""
+        group = self.definition.group
+        return group if isinstance(group, ActionGroup) else group(self)
 
     @property
     def mode(self) -> FlightMode | None:
@@ -292,10 +322,27 @@ class Execution:
     ended: float = math.inf
     superseded: bool = False
     """Another client's action has replaced it since."""
+    overtaken: bool = False
+    """Another action of its group has begun since. Only `PayloadHistory` notes it."""
+
+    @property
+    def succeeded(self) -> bool:
+        """It was carried out, at least for a while."""
+        return self.result in (dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_CANCELLED)
+
+    @property
+    def still_holds(self) -> bool:
+        """False when it was accepted and what it did has ended or changed since."""
+        return self.result != dialect.MAV_RESULT_ACCEPTED or self.command.definition.still_holds()
+
+
+def is_in_window(execution: Execution, now: float) -> bool:
+    """Return True while an ended action is remembered."""
+    return now - execution.ended < (RESEND_WINDOW if execution.succeeded else REFUSAL_WINDOW)
 
 
 class CommandHistory:
-    """Distinguishes a new action from the retransmission of one.
+    """Distinguishes a new action of the flight from the retransmission of one.
 
     For each client and group only the newest action counts: arm, disarm, arm within two seconds are three actions,
     although the third equals the first.
@@ -319,7 +366,7 @@ class CommandHistory:
         and modes that have ended by themselves (`mode` is the vehicle's). A command that another client has replaced
         is neither executed against that client nor confirmed: it is answered with CANCELLED.
         """
-        newest = self._newest.get((client, command.definition.group))
+        newest = self._newest.get((client, command.group))
         if newest is None or not newest.command.same_as(command):
             return None
         if newest.result == dialect.MAV_RESULT_IN_PROGRESS:
@@ -330,17 +377,16 @@ class CommandHistory:
         landing_ended = effect is Effect.LAND and newest.superseded and landing_ended_at >= newest.ended
         if effect.is_repeatable and not landing_ended:
             return None
-        succeeded = newest.result in (dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_CANCELLED)
-        if now - newest.ended >= (RESEND_WINDOW if succeeded else REFUSAL_WINDOW):
+        if not is_in_window(newest, now):
             return None
         if newest.superseded:
             return dialect.MAV_RESULT_CANCELLED
         ended = effect is Effect.LAPSING and mode is not None and mode is not command.mode
-        return None if effect is Effect.RETURN or ended else newest.result
+        return None if effect is Effect.RETURN or ended or not newest.still_holds else newest.result
 
     def begin(self, client: Hashable, command: Command) -> Execution:
         """Note that an action begins; this client's next one of its group is compared with it."""
-        key = (client, command.definition.group)
+        key = (client, command.group)
         self._newest.pop(key, None)  # so that the dictionary is in the order of use
         execution = self._newest[key] = Execution(client, command)
         if len(self._newest) > MAX_CLIENTS:

@@ -1,8 +1,8 @@
 """One component of a MAVLink system: its own services, commands, streams and files.
 
-A component answers with its own component id, and has its own command history: what a client sends to the camera
-neither repeats nor replaces a command to the autopilot. Everything that exists once in a system (drone, vehicle,
-clock, memory, channels, texts) is the system's.
+A component answers with its own component id, and has its own history of flight commands. The history of commands to
+camera and gimbal is the system's: one component may end what another began. So is everything else that exists once
+in a system: drone, vehicle, clock, memory, channels, texts.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.ftp.ftp_service import FtpService
 from anafi_mav.services.gateway_uris import GatewayUris
 from anafi_mav.services.memory import Memory
+from anafi_mav.services.payload_history import PayloadHistory
 from anafi_mav.services.pose import UNKNOWN_POSE, VehiclePose
 from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.stream import Times
@@ -64,6 +65,7 @@ class ComponentSystem(Protocol):
     uris: GatewayUris
     has_picture_pose: bool
     """True when the configuration allows pose from the live video."""
+    payload_history: PayloadHistory
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -109,6 +111,7 @@ class Component:
         self.download_folder = system.download_folder
         self.uris = system.uris
         self.has_picture_pose = system.has_picture_pose
+        self.payload_history = system.payload_history
         self.definition = DefinitionLink()
         self._system = system
         # The system's part of `Host`, without a method here for each.

@@ -22,6 +22,7 @@ from anafi_mav.services.files import Folder, ServedFile
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.gateway_uris import GatewayUris
 from anafi_mav.services.memory import Memory
+from anafi_mav.services.payload_history import PayloadHistory
 from anafi_mav.services.pose import UNKNOWN_POSE, VehiclePose
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.texts import OperatorText
@@ -57,6 +58,8 @@ class Host(Protocol):
     """What the gateway serves beside MAVLink."""
     has_picture_pose: bool
     """True when the configuration allows pose from the live video."""
+    payload_history: PayloadHistory
+    """Newest actions of camera and gimbal, of all components."""
     definition: DefinitionLink
     """Camera definition of the component."""
     camera_flags: int

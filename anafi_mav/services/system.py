@@ -57,6 +57,7 @@ from anafi_mav.services.monitor.roll_sign_service import RollSignService
 from anafi_mav.services.monitor.takeoff_point_service import TakeoffPointService
 from anafi_mav.services.monitor.warning_service import WarningService
 from anafi_mav.services.parameter.parameter_service import ParameterService
+from anafi_mav.services.payload_history import PayloadHistory
 from anafi_mav.services.plan.fence_service import FenceService
 from anafi_mav.services.plan.mission_service import MissionService
 from anafi_mav.services.plan.plan_service import PlanService
@@ -183,6 +184,7 @@ class System:
         """
         self.sysid = sysid
         self.has_picture_pose = has_picture_pose
+        self.payload_history = PayloadHistory()
         self.drone = drone
         self.clock = clock
         self.memory = Memory(state)

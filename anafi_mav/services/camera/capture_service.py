@@ -203,7 +203,7 @@ class CaptureService(Service):
         return {
             dialect.MAV_CMD_IMAGE_START_CAPTURE: _action(self._start_capture, _effect_of_capture, ActionGroup.PHOTO),
             dialect.MAV_CMD_IMAGE_STOP_CAPTURE: _action(self._stop_capture, Effect.STOP, ActionGroup.PHOTO),
-            dialect.MAV_CMD_VIDEO_START_CAPTURE: _action(self._start_video, Effect.IRREVOCABLE, ActionGroup.RECORDING),
+            dialect.MAV_CMD_VIDEO_START_CAPTURE: _action(self._start_video, Effect.TARGET, ActionGroup.RECORDING),
             dialect.MAV_CMD_VIDEO_STOP_CAPTURE: _action(self._stop_video, Effect.STOP, ActionGroup.RECORDING),
         }
 
@@ -215,7 +215,7 @@ class CaptureService(Service):
             ),
             dialect.MAV_CMD_IMAGE_STOP_CAPTURE: _action(self._stop_capture, Effect.STOP, ActionGroup.PHOTO),
             dialect.MAV_CMD_VIDEO_START_CAPTURE: _action(
-                self._start_video_in_any_mode, Effect.IRREVOCABLE, ActionGroup.RECORDING
+                self._start_video_in_any_mode, Effect.TARGET, ActionGroup.RECORDING
             ),
             dialect.MAV_CMD_VIDEO_STOP_CAPTURE: _action(self._stop_video, Effect.STOP, ActionGroup.RECORDING),
         }
@@ -365,12 +365,12 @@ def _number(value: float) -> float:
 
 def _effect_of_capture(command: Command) -> Effect:
     """A sequence number makes a command unique; one without counts each time it is sent."""
-    return Effect.IRREVOCABLE if command.params[3] >= 1.0 else Effect.EACH
+    return Effect.NUMBERED if command.params[3] >= 1.0 else Effect.EACH
 
 
 def _effect_of_distance(command: Command) -> Effect:
-    return Effect.STOP if _number(command.params[0]) == 0.0 else Effect.IRREVOCABLE
+    return Effect.STOP if _number(command.params[0]) == 0.0 else Effect.TARGET
 
 
 def _effect_of_recording(command: Command) -> Effect:
-    return Effect.STOP if _number(command.params[3]) == 0.0 else Effect.IRREVOCABLE
+    return Effect.STOP if _number(command.params[3]) == 0.0 else Effect.TARGET

@@ -53,6 +53,7 @@ class PanoramaService(Service):
         return {
             dialect.MAV_CMD_PANORAMA_CREATE: Action(
                 self._create,
+                still_holds=lambda: self._is_active and self.host.drone.animations.state.is_running,
                 location=False,
                 altitude=Altitude.UNUSED,
                 effect=Effect.IRREVOCABLE,

@@ -11,7 +11,9 @@ import math
 from collections.abc import Mapping
 
 from anafi_mav import texts
+from anafi_mav.drone import events
 from anafi_mav.drone.events import FormattingType, FsState, PhyState, StorageFeature
+from anafi_mav.drone.payload.camera import BEGUN, Camera
 from anafi_mav.drone.payload.storage import StorageState
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
@@ -23,6 +25,7 @@ from anafi_mav.services.service import Answer, Host, Request, Service
 from anafi_mav.texts import Reason
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
 from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
 
 logger = logging.getLogger(__name__)
 
@@ -67,6 +70,8 @@ class StorageService(Service):
         """The drone's numbers of all storages that it has reported since the connection."""
         self._sent: dict[int, tuple[object, ...]] = {}
         """Content of the last STORAGE_INFORMATION to all, by the drone's number."""
+        self._is_empty = False
+        """A storage has been formatted, and nothing has been taken or recorded since."""
         self._problems: dict[int, Reason | None] = {}
         """Reason why nothing can be stored, as last reported in a text."""
 
@@ -179,10 +184,21 @@ class StorageService(Service):
                 self._format,
                 location=False,
                 altitude=Altitude.UNUSED,
-                effect=Effect.IRREVOCABLE,
+                effect=Effect.ONCE,
                 group=ActionGroup.STORAGE,
+                still_holds=lambda: self._is_empty,
             )
         }
+
+    def subscriptions(self) -> Subscriptions:
+        return dict.fromkeys((*Camera.PHOTO_EVENTS, *Camera.RECORDING_EVENTS), self._on_capture)
+
+    def _on_capture(self, message: events.Message, now: float) -> None:
+        """Note a photo or recording that has begun: a format command from now on is a new one."""
+        is_photo = isinstance(message, Camera.PHOTO_EVENTS)
+        update = Camera.photo_update(message) if is_photo else Camera.recording_update(message)
+        if update is not None and update.progress in BEGUN:
+            self._is_empty = False
 
     async def _format(self, command: Command) -> None:
         """MAV_CMD_STORAGE_FORMAT: param1 storage, param2 1. Returns when the drone has formatted it."""
@@ -206,3 +222,4 @@ class StorageService(Service):
         require_idle(drone, texts.FORMAT)
         quick = state.formats is None or FormattingType.QUICK in state.formats
         await drone.storage.format(FormattingType.QUICK if quick else FormattingType.FULL, id=id)
+        self._is_empty = True

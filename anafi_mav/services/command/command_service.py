@@ -120,6 +120,7 @@ class CommandService(Service):
             if running.answer is not None:
                 self._finish(*running.answer, dialect.MAV_RESULT_FAILED)
         self._history.forget()
+        self.host.payload_history.forget()
 
     async def end_all(self) -> None:
         """Cancel all running actions, and wait for their end."""
@@ -173,16 +174,20 @@ class CommandService(Service):
         now, mode = self.host.clock.monotonic(), self.host.vehicle.mode
         # Before it is known whether it is a retransmission: a program that repeats its Hold is to be noticed.
         counted = command.effect is not Effect.HOLD or self.host.vehicle.holds.arrive(command.client, now)
-        command = replace(command, at=now, counted=counted)
-        ended_at = self.host.vehicle.landing_ended_at
-        repeated = self._history.retransmission(command.client, command, now, mode, ended_at)
+        command = replace(command, at=now, counted=counted, component=self.host.compid)
+        flies = command.group is ActionGroup.FLIGHT
+        if flies:
+            ended_at = self.host.vehicle.landing_ended_at
+            repeated = self._history.retransmission(command.client, command, now, mode, ended_at)
+        else:
+            repeated = self.host.payload_history.retransmission(command, now)
         if repeated is not None:
             quiet = command.progress in (ProgressPolicy.LATE, None)  # IN_PROGRESS is sent later, or not at all
             if not (quiet and repeated == dialect.MAV_RESULT_IN_PROGRESS):
                 self._acknowledge(inbound, command.id, repeated)
             return
-        execution = self._history.begin(command.client, command)
-        running = RunningAction(command.client, (inbound, execution), group=command.definition.group)
+        execution = self._history.begin(command.client, command) if flies else self.host.payload_history.begin(command)
+        running = RunningAction(command.client, (inbound, execution), group=command.group)
         self._spawn(self._execute(inbound, execution), running)
 
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:
@@ -200,7 +205,8 @@ class CommandService(Service):
             progress.set_in(LATE_PROGRESS_AFTER if policy is ProgressPolicy.LATE else PROGRESS_AFTER)
         result = dialect.MAV_RESULT_FAILED
         try:
-            await self._actions[command.id].handler(command)
+            async with self.host.payload_history.turn(command.group):
+                await self._actions[command.id].handler(command)
             result = dialect.MAV_RESULT_ACCEPTED
         except AnafiMavError as error:
             result = self._explain(error)

@@ -61,7 +61,7 @@ class VideoStreamService(Service):
                 self._start,
                 location=False,
                 altitude=Altitude.UNUSED,
-                effect=Effect.CHANGE,
+                effect=Effect.TARGET,
                 group=ActionGroup.STREAM,
             ),
             dialect.MAV_CMD_VIDEO_STOP_STREAMING: Action(

@@ -15,7 +15,16 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Node
 from anafi_mav.services import commands, system
 from anafi_mav.services.command_targets import height
-from anafi_mav.services.commands import Action, Altitude, Command, Definition, Effect, ProgressPolicy, effect_of_mode
+from anafi_mav.services.commands import (
+    Action,
+    ActionGroup,
+    Altitude,
+    Command,
+    Definition,
+    Effect,
+    ProgressPolicy,
+    effect_of_mode,
+)
 from anafi_mav.services.flavours import ARDUPILOT, PX4, STANDARD, Flavour
 from anafi_mav.services.service import Service
 from anafi_mav.services.system import System
@@ -27,7 +36,7 @@ BY_PARAMETER = "by its parameters"
 
 ROWS: dict[str, tuple[bool, Altitude, object, ProgressPolicy]] = {
     "COMPONENT_ARM_DISARM": (False, Altitude.UNUSED, BY_PARAMETER, ProgressPolicy.PROMPT),
-    "VIDEO_START_STREAMING": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "VIDEO_START_STREAMING": (False, Altitude.UNUSED, Effect.TARGET, ProgressPolicy.PROMPT),
     "VIDEO_STOP_STREAMING": (False, Altitude.UNUSED, Effect.STOP, ProgressPolicy.PROMPT),
     "CONDITION_YAW": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
     "DO_ACCEPT_MAG_CAL": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
@@ -62,12 +71,12 @@ ROWS: dict[str, tuple[bool, Altitude, object, ProgressPolicy]] = {
     "IMAGE_START_CAPTURE": (False, Altitude.UNUSED, BY_PARAMETER, ProgressPolicy.PROMPT),
     "IMAGE_STOP_CAPTURE": (False, Altitude.UNUSED, Effect.STOP, ProgressPolicy.PROMPT),
     "PANORAMA_CREATE": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),
-    "RESET_CAMERA_SETTINGS": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),
-    "SET_CAMERA_MODE": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),
-    "SET_CAMERA_SOURCE": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),
+    "RESET_CAMERA_SETTINGS": (False, Altitude.UNUSED, Effect.TARGET, ProgressPolicy.PROMPT),
+    "SET_CAMERA_MODE": (False, Altitude.UNUSED, Effect.TARGET, ProgressPolicy.PROMPT),
+    "SET_CAMERA_SOURCE": (False, Altitude.UNUSED, Effect.TARGET, ProgressPolicy.PROMPT),
     "SET_CAMERA_ZOOM": (False, Altitude.UNUSED, BY_PARAMETER, ProgressPolicy.PROMPT),
-    "STORAGE_FORMAT": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),
-    "VIDEO_START_CAPTURE": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),
+    "STORAGE_FORMAT": (False, Altitude.UNUSED, Effect.ONCE, ProgressPolicy.PROMPT),
+    "VIDEO_START_CAPTURE": (False, Altitude.UNUSED, Effect.TARGET, ProgressPolicy.PROMPT),
     "VIDEO_STOP_CAPTURE": (False, Altitude.UNUSED, Effect.STOP, ProgressPolicy.PROMPT),
     "PREFLIGHT_REBOOT_SHUTDOWN": (False, Altitude.UNUSED, Effect.IRREVOCABLE, ProgressPolicy.FINAL_ONLY),
 }
@@ -98,6 +107,64 @@ def test_command_rows_of_a_system_equal_the_list(rows: Mapping[str, Action]) -> 
         for name, row in rows.items()
     }
     assert said == ROWS
+
+
+PAYLOAD = (Effect.STOP, Effect.TARGET, Effect.EACH, Effect.NUMBERED, Effect.ONCE)
+
+PAYLOAD_ROWS: dict[str, tuple[ActionGroup, dict[tuple[float, ...], Effect]]] = {
+    "DO_CONTROL_VIDEO": (
+        ActionGroup.RECORDING,
+        {(-1, 0, 0, 1): Effect.TARGET, (-1, 0, 0, 0): Effect.STOP, (): Effect.STOP},
+    ),
+    "DO_DIGICAM_CONTROL": (ActionGroup.PHOTO, {(): Effect.EACH}),
+    "DO_GIMBAL_MANAGER_CONFIGURE": (ActionGroup.GIMBAL, {(): Effect.TARGET}),
+    "DO_GIMBAL_MANAGER_PITCHYAW": (ActionGroup.GIMBAL, {(): Effect.TARGET}),
+    "DO_MOUNT_CONFIGURE": (ActionGroup.GIMBAL, {(): Effect.TARGET}),
+    "DO_MOUNT_CONTROL": (ActionGroup.GIMBAL, {(): Effect.TARGET}),
+    "DO_SET_CAM_TRIGG_DIST": (
+        ActionGroup.PHOTO,
+        {(5,): Effect.TARGET, (0,): Effect.STOP, (): Effect.STOP},
+    ),
+    "IMAGE_START_CAPTURE": (
+        ActionGroup.PHOTO,
+        {(0, 0, 1, 7): Effect.NUMBERED, (0, 0, 1, 0): Effect.EACH, (0, 2, 0): Effect.EACH},
+    ),
+    "IMAGE_STOP_CAPTURE": (ActionGroup.PHOTO, {(): Effect.STOP}),
+    "PANORAMA_CREATE": (ActionGroup.FLIGHT, {(): Effect.IRREVOCABLE}),
+    "RESET_CAMERA_SETTINGS": (ActionGroup.CAMERA, {(): Effect.TARGET}),
+    "SET_CAMERA_MODE": (ActionGroup.CAMERA, {(): Effect.TARGET}),
+    "SET_CAMERA_SOURCE": (ActionGroup.STREAM, {(): Effect.TARGET}),
+    "SET_CAMERA_ZOOM": (
+        ActionGroup.ZOOM,
+        {(0, 1): Effect.EACH, (1, 1): Effect.TARGET, (2, 50): Effect.TARGET, (): Effect.TARGET},
+    ),
+    "STORAGE_FORMAT": (ActionGroup.STORAGE, {(): Effect.ONCE}),
+    "VIDEO_START_CAPTURE": (ActionGroup.RECORDING, {(): Effect.TARGET}),
+    "VIDEO_START_STREAMING": (ActionGroup.STREAM, {(): Effect.TARGET}),
+    "VIDEO_STOP_CAPTURE": (ActionGroup.RECORDING, {(): Effect.STOP}),
+    "VIDEO_STOP_STREAMING": (ActionGroup.STREAM, {(): Effect.STOP}),
+}
+"""Rows that do not concern the flight, and those of the camera component: group, and effect by parameters."""
+
+
+async def test_payload_rows_of_both_components_equal_the_list() -> None:
+    autopilot, camera = (await make_system()).components
+    tables = [service.actions() for component in (autopilot, camera) for service in component.services]
+    tables += [service.autopilot_actions() for service in camera.services]
+    of_camera = {id for service in camera.services for id in service.actions()}
+    found: set[str] = set()
+    for id, row in ((id, row) for table in tables for id, row in table.items()):
+        name = dialect.enums["MAV_CMD"][id].name.removeprefix("MAV_CMD_")
+        if row.group is ActionGroup.FLIGHT and id not in of_camera:
+            continue
+        found.add(name)
+        group, effects = PAYLOAD_ROWS[name]
+        for params, effect in effects.items():
+            sent: Any = (*params, *[NAN] * (4 - len(params)))
+            command = Command(id, row, sent, NAN, NAN, NAN, None)
+            assert (command.group, command.effect) == (group, effect), (name, params)
+            assert group is ActionGroup.FLIGHT or effect in PAYLOAD
+    assert found == {*PAYLOAD_ROWS}
 
 
 @pytest.mark.parametrize(
@@ -148,6 +215,8 @@ def test_every_mode_has_an_effect() -> None:
         (Effect.LAPSING, False, True),
         (Effect.IRREVOCABLE, False, False),
         (Effect.TARGET, False, False),
+        (Effect.NUMBERED, False, False),
+        (Effect.ONCE, False, False),
     ],
 )
 def test_effect_decides_repetition_and_cancellation(effect: Effect, stops: bool, revocable: bool) -> None:
@@ -202,6 +271,11 @@ class _Refused(Service):
             dialect.MAV_CMD_DO_SET_SERVO,
             Action(_nothing, location=False, altitude=Altitude.UNUSED, effect=effect_of_mode),
             "MAV_CMD 183: it must have both mode and `effect_of_mode`, or none of them",
+        ),
+        (
+            dialect.MAV_CMD_SET_CAMERA_FOCUS,
+            Action(_nothing, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE, group=ActionGroup.CAMERA),
+            "MAV_CMD 532: its group has no CHANGE: say if it counts or sets a target",
         ),
         (dialect.MAV_CMD_DO_ORBIT, PLAIN, r"two services claim \[34\]"),
         (dialect.MAV_CMD_REQUEST_MESSAGE, PLAIN, r"\[512\] are both queries and actions"),
