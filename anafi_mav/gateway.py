@@ -260,12 +260,15 @@ class Gateway:
         self._state_problem = ""
         """Why the state folder cannot be used; empty while it can."""
         http = config.http_server
-        self.web = None if http is None else HttpServer(http.host, http.port)
+        self.web = (
+            None if http is None else HttpServer(http.host, http.port, public_host=video.public_host if video else None)
+        )
         """The web server; None when it is configured off. Routes are added before `open`."""
+        self._live: LiveVideo | None = None
         if self.web is not None:
             LivePage(self.web, self._entries)
             if self.relay is not None:
-                LiveVideo(self.web, self.relay.source)
+                self._live = LiveVideo(self.web, self.relay.source)
             MediaRoutes(self.web, self._drone)
             DefinitionRoutes(self.web, self._definition)
 
@@ -296,7 +299,11 @@ class Gateway:
                 await self.relay.start()
             if self.web is not None:
                 await self.web.start()
+            if self._live is not None:
+                await self._live.load()
         except BaseException:
+            if self.web is not None:
+                await self.web.close()
             if self.relay is not None:
                 await self.relay.close()
             await self._node.close()

@@ -22,10 +22,10 @@ from anafi_mav.config import Config, DroneConfig, SimConfig, from_mapping, load,
 from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import Gateway, state_in_use
 from anafi_mav.mavlink.endpoint import is_open_to_network, parse_endpoint
+from anafi_mav.relay.uri_host import is_loopback
 from anafi_mav.services.flavours import FLAVOURS
 from anafi_mav.sim.world import quirks
 from anafi_mav.state_lock import read_holder, state_folder
-from anafi_mav.web.server import is_loopback
 
 READY_LIMIT = 15.0
 """s after which "ready" is said though a drone has not answered: its connection takes 3 s at most, its settings and

@@ -1,4 +1,4 @@
-"""The host in the URI of a stream, as one client can reach it. No I/O."""
+"""The host in the URI of a stream or a file, as one client can reach it. No I/O."""
 
 from __future__ import annotations
 

@@ -52,6 +52,19 @@ class LiveVideo:
         """Number of sessions."""
         return len(self._sessions)
 
+    @staticmethod
+    async def load() -> None:
+        """Import aiortc, where it is installed, before the drones are connected.
+
+        The libraries of PyAV stop the event loop for 0.1 s when they are loaded, on a small computer for longer.
+        """
+        try:
+            await _load()
+        except ImportError:
+            pass
+        except Exception:
+            log.warning("aiortc cannot be imported", exc_info=True)
+
     async def close(self) -> None:
         """End all sessions. Idempotent."""
         await asyncio.gather(*(session.close() for session in tuple(self._sessions.values())))

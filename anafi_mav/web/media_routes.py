@@ -25,7 +25,8 @@ from anafi_mav.drone.payload.media_file import content_type
 from anafi_mav.drone.payload.media_index import SORTED_IN_LOOP
 from anafi_mav.drone.rest import NOT_INDEXED, NOT_INDEXED_YET, NotFound
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, NotSupported
-from anafi_mav.web.server import HttpServer, is_loopback
+from anafi_mav.relay.uri_host import is_loopback
+from anafi_mav.web.server import HttpServer
 
 log = logging.getLogger("anafi_mav.web")
 

@@ -36,6 +36,7 @@ from aiohttp.typedefs import Handler
 from aiohttp.web_protocol import RequestHandler
 
 from anafi_mav.errors import ConfigError, LocalProtocolError
+from anafi_mav.relay.uri_host import EVERY_ADDRESS, is_loopback, uri_host
 
 log = logging.getLogger("anafi_mav.web")
 
@@ -104,10 +105,18 @@ class _Refusing(asyncio.Protocol):
 class HttpServer:
     """Routes, and the socket that serves them. `start` once, `close` once (twice does no harm)."""
 
-    def __init__(self, host: str = LOOPBACK_HOST, port: int | None = None, *, names: Collection[str] = ()) -> None:
+    def __init__(
+        self,
+        host: str = LOOPBACK_HOST,
+        port: int | None = None,
+        *,
+        names: Collection[str] = (),
+        public_host: str | None = None,
+    ) -> None:
         """`port` 0 is a free one; None is `DEFAULT_PORT`, or a free one where that is taken.
 
-        `names` are host names of this gateway besides its own, as users write them in a URL.
+        `names` are host names of this gateway besides its own, as users write them in a URL. `public_host` stands in
+        every URI of a server that is open to the network, as in the video server's.
         """
         self.host = host
         self.port = 0
@@ -116,6 +125,9 @@ class HttpServer:
         """Connections closed because there were too many."""
         own = socket.gethostname().lower()
         self._names = {"localhost", own, f"{own}.local", host.lower(), *(name.lower() for name in names)}
+        if public_host is not None:
+            self._names.add(public_host.lower())
+        self._public_host = public_host
         self._wanted_port = port
         self._app = web.Application(client_max_size=MAX_BODY, middlewares=[self._guard])
         self._app.on_response_prepare.append(_add_headers)
@@ -224,16 +236,8 @@ class HttpServer:
             raise LocalProtocolError(f"expected a path from the root, got {path!r}")
         if not self.port:
             return None
-        host = self._host_for(local_host)
+        host = uri_host(self.host, local_host, self._public_host if self.is_open_to_network else None)
         return None if host is None else f"http://{host}:{self.port}{path}"
-
-    def _host_for(self, local_host: str | None) -> str | None:
-        if is_loopback(self.host):
-            return self.host if local_host is not None and is_loopback(local_host) else None
-        if self.host == "0.0.0.0":
-            return local_host
-        # A name was configured; another address of this computer leads nowhere.
-        return local_host if local_host is not None and not _is_address(local_host) else self.host
 
     @property
     def is_open_to_network(self) -> bool:
@@ -242,7 +246,7 @@ class HttpServer:
 
     def describe(self) -> str:
         """One line for people: the URL on this computer."""
-        return f"http://{LOOPBACK_HOST if self.host == '0.0.0.0' else self.host}:{self.port}/"
+        return f"http://{LOOPBACK_HOST if self.host == EVERY_ADDRESS else self.host}:{self.port}/"
 
     # -- connections
 
@@ -342,8 +346,3 @@ def _is_address(host: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def is_loopback(host: str) -> bool:
-    """True for an address, or the name, that never leaves this computer."""
-    return host.lower() == "localhost" or (_is_address(host) and ipaddress.ip_address(host).is_loopback)

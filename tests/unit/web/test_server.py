@@ -243,6 +243,17 @@ async def test_url_has_the_address_that_the_client_reaches(
         assert server.url_for(local_host, "/a") == expected
 
 
+@pytest.mark.parametrize(("bound", "host"), [("0.0.0.0", "Drones.Example"), ("127.0.0.1", "127.0.0.1")])
+async def test_public_host_replaces_the_host_of_an_open_server(bound: str, host: str) -> None:
+    server = HttpServer(bound, 0, public_host="Drones.Example")
+    server.add_page("/", name)
+    await server.start()
+    assert server.url_for("127.0.0.1", "/a") == f"http://{host}:{server.port}/a"
+    request = b"GET / HTTP/1.1\r\nHost: drones.example\r\nConnection: close\r\n\r\n"
+    assert (await raw(server, request)).startswith(b"HTTP/1.1 200 ")
+    await server.close()
+
+
 async def test_url_without_open_server_is_none() -> None:
     server = HttpServer("0.0.0.0", 0)
     assert server.url_for("127.0.0.1", "/") is None
