@@ -266,6 +266,23 @@ async def own_socket(drone: SimulatedDrone, client: Client) -> Callable[[bytes],
     return seen[0]
 
 
+async def test_serial_line_that_was_full_is_served_without_errors(caplog: pytest.LogCaptureFixture) -> None:
+    host = loopback()
+    async with (
+        pseudo_terminal() as (master, name),
+        flown(loopback(), f"tcpin://{host}:5760", f"serial://{name}:57600") as (g, _),
+    ):
+        client = await Client().connect(5760, host)
+        while not g.counters()["dropped_frames"]:  # no one reads
+            await client.heartbeat(lambda beat: True)
+        line = SerialClient(master, 250)
+        for _ in range(3):
+            await line.heartbeat(lambda beat: True)
+        await line.close()
+        await client.close()
+    assert [record.getMessage() for record in caplog.records if record.levelname == "ERROR"] == []
+
+
 async def test_garbage_on_every_mavlink_port() -> None:
     host, stranger = loopback(), loopback()
     peer = await UdpClient(254).open(host)
