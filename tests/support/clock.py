@@ -12,7 +12,8 @@ How long one turn of callbacks computed at most, which every timer has to wait f
 of ours blocks a loop in other ways for ruff.
 
 As soon as somebody else is there, a child process, work in a thread or a timer of the kernel's, the clock runs like
-theirs.
+theirs; with a thread only while the loop waits: a thread has no timers, and a busy machine must not look like a host
+that stalled.
 """
 
 from __future__ import annotations
@@ -125,7 +126,10 @@ class Selector(selectors.DefaultSelector):
             _ahead = now() - _real()
             _began = None
         if not alone:
-            return super().select(timeout)
+            ready = super().select(timeout)
+            if self._only_threads():
+                _began = now(), _real(), threading.get_ident()
+            return ready
         here = now()
         ready = self._look()
         if not ready and timeout is not None:
@@ -138,6 +142,10 @@ class Selector(selectors.DefaultSelector):
         """Whether nobody but the loop itself can bring anything about."""
         self.processes = [process for process in self.processes if process.get_returncode() is None]
         return not (self.in_threads or self.others or self.processes) and childless()
+
+    def _only_threads(self) -> bool:
+        """Whether the loop waits for threads of this process alone, which have no clock of their own."""
+        return bool(self.in_threads) and not (self.others or self.processes) and childless()
 
     def _look(self) -> Any:
         """What is ready by itself."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 import time
 
 from support.clock import everybodys
@@ -33,3 +34,19 @@ async def test_stopped_watch_finds_nothing_old() -> None:
         await asyncio.sleep(0)  # the clock of callbacks that began before goes slower
         time.sleep(1.2 * STALL)  # noqa: ASYNC251
         assert not watch.old
+
+
+async def test_slow_callback_beside_a_thread_is_no_stall_of_the_host() -> None:
+    """The clock of tests: a busy machine with work in a thread must not look like a host that stalled."""
+    stalls: list[float] = []
+    watch, written = StallWatch(stalls.append), threading.Event()
+    watch.start()
+    work = asyncio.get_running_loop().run_in_executor(None, written.wait)
+    await asyncio.sleep(0)
+    time.sleep(1.2 * STALL)  # noqa: ASYNC251
+    assert not watch.old
+    await asyncio.sleep(0.2)  # two beats
+    written.set()
+    await work
+    watch.stop()
+    assert stalls == []
