@@ -112,9 +112,15 @@ class Ground:
         self._updated = asyncio.Event()
 
     async def wait_for_update(self, timeout: float) -> None:
-        """Return when something has come, or after so many seconds."""
-        with contextlib.suppress(asyncio.TimeoutError):
-            await asyncio.wait_for(self._updated.wait(), max(timeout, 0.0))
+        """Return when something has come, or after so many seconds.
+
+        Not by asyncio.wait_for, which until Python 3.12 loses a Ctrl-C that comes together with a message.
+        """
+        update = asyncio.ensure_future(self._updated.wait())
+        try:
+            await asyncio.wait({update}, timeout=max(timeout, 0.0))
+        finally:
+            update.cancel()
 
     # Who is there.
 

@@ -15,6 +15,8 @@ import pytest
 from support.product import Process, program
 from support.world import loopback
 
+from anafi_mav.cli.ground import Ground
+
 MISSIONS = Path(__file__).parents[3] / "missions"
 
 DRIVER = r"""
@@ -155,3 +157,23 @@ async def test_ignored_ctrl_c_stays_ignored() -> None:
             await asyncio.wait_for(accepted.wait(), 30.0)
             assert await interrupted(p) == 1
         assert p.complaints == [f"anafi-mav: no answer from {address} within 3 s"]
+
+
+class UpdatedGround(Ground):
+    """A ground that hears something when the test says so."""
+
+    def update(self) -> None:
+        self._tell()
+
+
+async def test_ctrl_c_together_with_a_message_is_not_lost() -> None:
+    """asyncio.wait_for returns then, until Python 3.12, and the command would go on."""
+    ground = UpdatedGround("udpin://127.0.0.1:0")
+    waiting = asyncio.create_task(ground.wait_for_update(10.0))
+    await asyncio.sleep(0)
+    await asyncio.sleep(0)
+    ground.update()
+    await asyncio.sleep(0)
+    waiting.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await waiting
