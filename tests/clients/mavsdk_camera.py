@@ -24,7 +24,7 @@ async def main(url: str) -> None:
         await camera.set_mode(id, Mode.PHOTO)
         await until(camera.subscribe_mode(), lambda update: update.mode == Mode.PHOTO)
         captured = asyncio.ensure_future(until(camera.subscribe_capture_info()))
-        await asyncio.sleep(0.1)
+        await asyncio.sleep(0.1)  # MAVSDK reports no event when a subscription has begun
         await camera.take_photo(id)
         photo = await captured
         say("photo", photo.index, photo.is_success, photo.file_url)

@@ -73,9 +73,9 @@ async def test_media_over_http_has_the_drones_paths_and_ranges(quirks: tuple[Qui
         photo, video = add_photo(w.drone), add_video(w.drone, VIDEO)
         content, path = video.content(), f"/data/media/{video.id}"
         status, body, _ = await ask(w, "GET", "/api/v1/media/medias")
-        told = json.loads(body)
-        assert (status, [media["resources"][0]["resource_id"] for media in told]) == (200, [photo.id, video.id])
-        assert told[1]["resources"][0]["url"] == path
+        record = json.loads(body)
+        assert (status, [media["resources"][0]["resource_id"] for media in record]) == (200, [photo.id, video.id])
+        assert record[1]["resources"][0]["url"] == path
         assert (await ask(w, "GET", path))[:2] == (200, content)
         head = await ask(w, "HEAD", path)
         assert (head[0], head[1], head[2]["content-length"]) == (200, b"", str(len(content)))
@@ -251,17 +251,17 @@ async def test_photo_of_a_flight_is_copied_after_landing(folder: Path) -> None:
         photo = w.drone.firmware.payload.media.resource(path.name)
         assert photo is not None
         assert path.read_bytes() == photo.content()
-        told: dict[str, Any] = json.loads(path.with_name(f"{path.name}.json").read_text())
-        assert told["media_id"] == media_id
+        record: dict[str, Any] = json.loads(path.with_name(f"{path.name}.json").read_text())
+        assert record["media_id"] == media_id
         scene = photo.scene
-        assert told["place"]["latitude"] == pytest.approx(scene.latitude, abs=1e-6)
-        assert told["place"]["longitude"] == pytest.approx(scene.longitude, abs=1e-6)
-        assert told["place"]["altitude_amsl"] == pytest.approx(scene.altitude, abs=0.01)
+        assert record["place"]["latitude"] == pytest.approx(scene.latitude, abs=1e-6)
+        assert record["place"]["longitude"] == pytest.approx(scene.longitude, abs=1e-6)
+        assert record["place"]["altitude_amsl"] == pytest.approx(scene.altitude, abs=0.01)
         assert scene.altitude == pytest.approx(w.drone.spec.home[2] + 5.0, abs=1.0)
-        attitude = told["camera_attitude"]
+        attitude = record["camera_attitude"]
         assert attitude["yaw"] == pytest.approx((scene.heading + 180.0) % 360.0 - 180.0, abs=1e-3)
         assert (attitude["pitch"], attitude["roll"]) == pytest.approx((scene.pitch, scene.roll), abs=1e-3)
-        assert told["time"] is not None
+        assert record["time"] is not None
 
 
 async def test_copying_after_landing_ends_with_a_takeoff(folder: Path) -> None:

@@ -57,10 +57,10 @@ async def test_copy_has_a_sidecar_and_is_made_once(tmp_path: Path) -> None:
     assert path == tmp_path / DAY / "100000010001.JPG"
     assert path.read_bytes() == PHOTO
     assert names(tmp_path) == [f"{DAY}/100000010001.JPG", f"{DAY}/100000010001.JPG.json"]
-    told = json.loads(sidecar_of(path).read_text())
-    assert (told["md5"], told["size"]) == (hashlib.md5(PHOTO).hexdigest(), len(PHOTO))
-    assert told["md5_of_drone"] == told["md5"]
-    assert told["time"] == "2026-11-22T10:11:12+01:00"
+    record = json.loads(sidecar_of(path).read_text())
+    assert (record["md5"], record["size"]) == (hashlib.md5(PHOTO).hexdigest(), len(PHOTO))
+    assert record["md5_of_drone"] == record["md5"]
+    assert record["time"] == "2026-11-22T10:11:12+01:00"
     assert await copy(source, resource(), tmp_path) is None
     assert source.md5_requests == 1  # the second time the sidecar was enough
     sidecar_of(path).unlink()  # the copy was ended before it was written
@@ -159,18 +159,18 @@ XMP = (
 
 
 def test_sidecar_takes_the_pose_of_the_photo() -> None:
-    told = sidecar("a.JPG", resource(), "0" * 32, read_xmp(XMP))
-    assert told["camera_attitude"] == {"roll": -1.5, "pitch": -10.25, "yaw": 30.0}
+    record = sidecar("a.JPG", resource(), "0" * 32, read_xmp(XMP))
+    assert record["camera_attitude"] == {"roll": -1.5, "pitch": -10.25, "yaw": 30.0}
     # 52.734 / 60 = 0.8789; 22.062 / 60 = 0.3677
-    assert told["place"]["latitude"] == pytest.approx(48.8789)
-    assert told["place"]["longitude"] == pytest.approx(-2.3677)
-    assert (told["place"]["altitude_amsl"], told["place"]["source"]) == (85.5, "photo")
+    assert record["place"]["latitude"] == pytest.approx(48.8789)
+    assert record["place"]["longitude"] == pytest.approx(-2.3677)
+    assert (record["place"]["altitude_amsl"], record["place"]["source"]) == (85.5, "photo")
 
 
 def test_sidecar_prefers_the_place_that_the_drone_reports() -> None:
     reported = Resource("a.JPG", gps=Place(48.0, 2.0, 90.0))
-    told = sidecar("a.JPG", reported, "0" * 32, read_xmp(XMP))
-    assert told["place"] == {"latitude": 48.0, "longitude": 2.0, "altitude_amsl": 90.0, "source": "drone"}
+    record = sidecar("a.JPG", reported, "0" * 32, read_xmp(XMP))
+    assert record["place"] == {"latitude": 48.0, "longitude": 2.0, "altitude_amsl": 90.0, "source": "drone"}
 
 
 @pytest.mark.parametrize(
@@ -186,13 +186,13 @@ def test_sidecar_prefers_the_place_that_the_drone_reports() -> None:
     ],
 )
 def test_sidecar_of_unreadable_data_is_unknown(data: bytes) -> None:
-    told = sidecar("a.JPG", Resource("a.JPG", datetime="yesterday"), "0" * 32, read_xmp(data))
-    assert told["camera_attitude"] is None
-    assert told["time"] is None
-    assert json.dumps(told, allow_nan=False)
+    record = sidecar("a.JPG", Resource("a.JPG", datetime="yesterday"), "0" * 32, read_xmp(data))
+    assert record["camera_attitude"] is None
+    assert record["time"] is None
+    assert json.dumps(record, allow_nan=False)
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="a pipe stands for the slow disk")
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no os.mkfifo for the slow disk")
 async def test_cancelled_download_to_blocked_disk_ends_at_once(tmp_path: Path) -> None:
     """A part that is a pipe takes 64 KiB and then no byte, like a disk that sleeps."""
     content = bytes(3 << 20)
@@ -233,8 +233,8 @@ class Unknowing(Source):
 async def test_copy_that_was_not_compared_says_so(tmp_path: Path) -> None:
     path = await copy(Unknowing(), resource(), tmp_path)
     assert path is not None
-    told = json.loads(sidecar_of(path).read_text())
-    assert (told["md5"], told["md5_of_drone"]) == (hashlib.md5(PHOTO).hexdigest(), None)
+    record = json.loads(sidecar_of(path).read_text())
+    assert (record["md5"], record["md5_of_drone"]) == (hashlib.md5(PHOTO).hexdigest(), None)
     assert await copy(Unknowing(), resource(), tmp_path) is None
     sidecar_of(path).unlink()  # now it may be any file of this size
     again = await copy(Unknowing(), resource(), tmp_path)

@@ -40,7 +40,6 @@ def test_definition_is_read_by_ground_stations_rules(model: str) -> None:
 
 @pytest.mark.parametrize("model", MODEL_KEYS)
 def test_definition_is_read_by_mavproxy(model: str) -> None:
-    pytest.importorskip("MAVProxy")
     from MAVProxy.modules.mavproxy_camera.definition import CameraDefinition
 
     made = definition_file(catalogue(model), "ANAFI")
