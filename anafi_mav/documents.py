@@ -17,6 +17,11 @@ MAX_LINE = 300
 """Characters of a parser's sentence that are passed on."""
 
 
+def expected(what: str) -> dict[str, Any]:
+    """Return the `extra` of a key: the required value, as it reads after the word "expected"."""
+    return {"expected": what}
+
+
 def read(path: Path) -> object:
     """The document in the file at `path`, as plain values. Raises `ConfigError`."""
     try:

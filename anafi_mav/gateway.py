@@ -26,23 +26,32 @@ from anafi_mav.drone import Drone, events
 from anafi_mav.drone.contention import Contention
 from anafi_mav.drone.rest import HTTP_PORT
 from anafi_mav.errors import AnafiMavError, ConfigError, HandshakeRefused
+from anafi_mav.gateway_status import ReportedDrone, StatusReport
 from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.key_ring import KeyRing, folder_of
 from anafi_mav.mavlink.node import Node
+from anafi_mav.recording.recorder import Recorder
 from anafi_mav.relay.server import RelayServer
 from anafi_mav.relay.source import DroneSource
 from anafi_mav.services.flavours import FLAVOURS
 from anafi_mav.services.gateway_uris import GatewayUris
+from anafi_mav.services.ground_station.signing_setup import SigningSetup
 from anafi_mav.services.system import System
+from anafi_mav.services.system_position import SystemPosition
 from anafi_mav.state_lock import FILE, NO_LOCKS, HeldDrone, Holder, StateLock, state_folder
+from anafi_mav.status_record import GatewayStatus
 from anafi_mav.subject import DRONE
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.flying import ON_GROUND
 from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.failsafe_settings import FailsafeLimits
+from anafi_mav.web.access_token import load_token
 from anafi_mav.web.definition_routes import DefinitionRoutes
 from anafi_mav.web.live_page import DroneEntry, LivePage
 from anafi_mav.web.live_video import LiveVideo
 from anafi_mav.web.media_routes import MediaRoutes
 from anafi_mav.web.server import HttpServer
+from anafi_mav.web.status_routes import StatusRoutes
 
 logger = logging.getLogger(__name__)
 
@@ -97,6 +106,8 @@ class _Supervised:
         self.first_attempt = asyncio.Event()
         self.problem = ""
         """Why the last attempt to connect failed; empty while connected."""
+        self.connections = 0
+        """Handshakes that led to a connection, and silent sessions that went on."""
         self.task: asyncio.Task[None] | None = None
         self._is_closing = False
         """True while the drone's connection is closed, which must not be interrupted."""
@@ -135,6 +146,7 @@ class _Supervised:
         while True:
             try:
                 await self.drone.connect()
+                self.connections += 1
                 self._contention.connected(airborne=self.drone.piloting.state.flying not in ON_GROUND)
                 if self.problem:  # it was reported at this level
                     logger.warning("%s: connected", self.config.name)
@@ -206,6 +218,12 @@ class _Supervised:
         serial = self.drone.identity.serial if self.system.active else ""
         return HeldDrone(self.config.name, self.config.address, self.config.interface, serial)
 
+    def reported(self) -> ReportedDrone:
+        """Return the drone as the status record needs it."""
+        assert self.config.address is not None
+        where = (self.config.name, self.config.sysid, self.config.address, self.config.interface)
+        return ReportedDrone(*where, self.problem, self.connections, self.drone, self.system)
+
     def entry(self, *, has_video: bool) -> DroneEntry:
         """Return the drone as the page for browsers lists it."""
         connected = self.system.active
@@ -246,7 +264,16 @@ class Gateway:
                 raise ConfigError(f"drones[{index}].address", "the gateway connects to addresses; expected one")
         self.config = config
         self._clock: Clock = clock or SystemClock()
-        self._node = Node(on_channel=self._on_channel, clock=self._clock, flavours=tuple(FLAVOURS))
+        state = state_folder(config.state)
+        self._keys = KeyRing(None if state is None else folder_of(state), self._clock)
+        signing = SigningSetup(self._keys, lambda: self._node.channels, lambda: self.systems)
+        self._node = Node(
+            on_channel=self._on_channel,
+            clock=self._clock,
+            flavours=tuple(FLAVOURS),
+            keys=self._keys,
+            on_setup_signing=signing.receive,
+        )
         video = config.video_server
         self.relay = (
             None
@@ -271,6 +298,9 @@ class Gateway:
                 self._live = LiveVideo(self.web, self.relay.source)
             MediaRoutes(self.web, self._drone)
             DefinitionRoutes(self.web, self._definition)
+            StatusRoutes(self.web, self.status)
+        self._report = StatusReport(self._node, self._clock)
+        self._recorder: Recorder | None = None
 
     async def __aenter__(self) -> Self:
         await self.start()
@@ -294,10 +324,13 @@ class Gateway:
             return
         self._lock_state()
         try:
+            self._recorder = self._start_recording()
             await self._node.start(self.config.endpoints)
             if self.relay is not None:
                 await self.relay.start()
             if self.web is not None:
+                if self.web.is_open_to_network:
+                    self.web.token = load_token(self._state)
                 await self.web.start()
             if self._live is not None:
                 await self._live.load()
@@ -306,9 +339,25 @@ class Gateway:
                 await self.web.close()
             if self.relay is not None:
                 await self.relay.close()
+            if self._recorder is not None:
+                await self._recorder.close()
             await self._node.close()
             self._unlock_state()
             raise
+
+    def _start_recording(self) -> Recorder | None:
+        """Begin to record, where that is configured. Raises `ConfigError`."""
+        recording = self.config.recording
+        if recording.folder is None:
+            return None
+        try:
+            folder = Path(recording.folder).expanduser()
+            recorder = Recorder(self._node, self._clock, folder, recording.max_megabytes * 1_000_000)
+            recorder.start()
+        except (OSError, RuntimeError) as error:  # RuntimeError: no such home
+            problem = f"expected a folder that can be written: {getattr(error, 'strerror', None) or error}"
+            raise ConfigError("recording.folder", problem) from error
+        return recorder
 
     def _lock_state(self) -> None:
         """Lock the state folder: two gateways would take each other's drones and overwrite plans."""
@@ -336,12 +385,17 @@ class Gateway:
 
     def _write_lock(self) -> None:
         if self._lock is not None:
-            self._lock.write([supervised.held() for supervised in self._supervised])
+            web = "" if self.web is None else self.web.describe()
+            self._lock.write([supervised.held() for supervised in self._supervised], web)
 
     def state_problems(self) -> list[str]:
         """Return a line for each problem with reading or storing state; empty without problems."""
-        problems = [self._state_problem] if self._state_problem else []
+        problems = [problem for problem in (self._state_problem, self._keys.problem) if problem]
         return problems + [s.system.memory.problem for s in self._supervised if s.system.memory.problem]
+
+    def _recording_problems(self) -> list[str]:
+        problem = "" if self._recorder is None else self._recorder.files.problem
+        return [f"recording has gaps: {problem}"] if problem else []
 
     async def start(self) -> None:
         """Open every endpoint, then begin to connect to every drone.
@@ -349,6 +403,7 @@ class Gateway:
         Raises `ConfigError`; nothing is left open.
         """
         await self.open()
+        self._report.start()
         started = self._clock.monotonic()
         for config in self.config.drones:
             assert config.address is not None
@@ -372,13 +427,21 @@ class Gateway:
                 download_folder=download_folder(self.config.media),
                 uris=self._uris(),
                 has_picture_pose=self.config.pose == "video",
+                failsafe_limits=FailsafeLimits(self.config.warnings.return_height, self.config.warnings.radio_range),
+                position_of=self._position_of,
             )
             if self.relay is not None:
                 self.relay.add(DroneSource(config.sysid, config.name, drone))
+            if self._recorder is not None:
+                self._recorder.add(drone)
             supervised = _Supervised(config, drone, system, self._write_lock)
             supervised.task = asyncio.get_running_loop().create_task(supervised.run())
             self._supervised.append(supervised)
         self._write_lock()
+
+    def _position_of(self, sysid: int) -> SystemPosition | None:
+        found = (supervised.system for supervised in self._supervised if supervised.config.sysid == sysid)
+        return next((system.position for system in found), None)
 
     def _uris(self) -> GatewayUris:
         """Return the addresses of the servers, which are open."""
@@ -408,6 +471,7 @@ class Gateway:
         Clients are not heard any more, or one of them would fly on what has just been stopped.
         """
         self._node.stop_delivering()
+        self._report.stop()
         # The drones first: nothing that a viewer, a browser or a video server does may delay their hover.
         await asyncio.gather(*(self._leave(s) for s in self._supervised))
         self._supervised.clear()
@@ -415,6 +479,8 @@ class Gateway:
             await _guarded("the video server", self.relay.close())
         if self.web is not None:
             await _guarded("the web server", self.web.close())
+        if self._recorder is not None:
+            await _guarded("the recording", self._recorder.close())
         await self._node.close()
         self._unlock_state()
 
@@ -445,9 +511,11 @@ class Gateway:
     def lines(self) -> list[str]:
         """One line per drone and per endpoint, one for the video and one for the web server."""
         lines = [s.line() for s in self._supervised]
-        lines += [f"endpoint {endpoint.describe()}" for endpoint in self._node.endpoints]
+        lines += [f"endpoint {endpoint.describe()}{endpoint.signing_note}" for endpoint in self._node.endpoints]
         if self.relay is not None:
             lines.append(f"video {self.relay.describe()}")
+        if self._recorder is not None:
+            lines.append(f"recording {self._recorder.files.path}")
         return lines if self.web is None else [*lines, f"web page {self.web.describe()}"]
 
     def counters(self) -> Counter[str]:
@@ -456,6 +524,16 @@ class Gateway:
         for s in self._supervised:
             result.update({f"{s.config.name}.{name}": count for name, count in s.drone.counters.items()})
         return result
+
+    def status(self) -> GatewayStatus:
+        """Return the record that page, metrics and `anafi-mav status` show."""
+        return self._report.gateway(
+            [supervised.reported() for supervised in self._supervised],
+            problems=[*self.state_problems(), *self._recording_problems()],
+            counters=self.counters(),
+            relay=self.relay,
+            web=self.web,
+        )
 
     def drones_in_air(self) -> list[str]:
         """For each flying drone one sentence on what it will do by itself when the gateway ends."""

@@ -3,10 +3,11 @@
 The file `gateway.lock` says which process holds the folder and which drones it connects to: one line of JSON,
 
     {"version": 1, "pid": 4711, "drones": [{"name": "alpha", "address": "192.168.42.1", "interface": null,
-     "serial": "PI040416DA9H839157"}]}
+     "serial": "PI040416DA9H839157"}], "web": "http://127.0.0.1:8088/"}
 
-`serial` is empty while that drone is not connected. What counts is the operating system's lock on the file, which ends
-with its process however that ends; the content of a file that nothing locks is of the past.
+`web` is where `anafi-mav status` asks. `serial` is empty while that drone is not connected. What counts is the
+operating system's lock on the file, which ends with its process however that ends; the content of a file that nothing
+locks is of the past.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import errno
 import logging
 import os
 import sys
+import tempfile
 import time
 from collections.abc import Iterable
 from pathlib import Path
@@ -72,6 +74,8 @@ class Holder(msgspec.Struct, frozen=True):
     version: int
     pid: Annotated[int, Meta(ge=0)]
     drones: tuple[HeldDrone, ...] = ()
+    web: str = ""
+    """URL of its web server on this computer; empty: none."""
 
     def find(self, address: str, interface: str | None = None, serial: str = "") -> HeldDrone | None:
         """Return its drone at this address or with this serial number.
@@ -116,11 +120,11 @@ class StateLock:
             if file >= 0:
                 os.close(file)
 
-    def write(self, drones: Iterable[HeldDrone]) -> None:
+    def write(self, drones: Iterable[HeldDrone], web: str = "") -> None:
         """Replace what the file says. A full disk is no reason to end a flight."""
         if self._file is None:
             return
-        line = msgspec.json.encode(Holder(VERSION, os.getpid(), tuple(drones))) + b"\n"
+        line = msgspec.json.encode(Holder(VERSION, os.getpid(), tuple(drones), web)) + b"\n"
         with contextlib.suppress(OSError):
             os.lseek(self._file, 0, os.SEEK_SET)
             os.write(self._file, line)  # readers take the first line: what follows it for an instant is old
@@ -160,6 +164,31 @@ def _read(file: int) -> Holder:
             return msgspec.json.decode(line, type=Holder)
         time.sleep(TRY_EVERY)
     return Holder(VERSION, 0)
+
+
+def replace_file(path: Path, data: bytes) -> None:
+    """Replace a file of the state folder, so that it survives a power cut at any moment.
+
+    Only this user can read it. Raises `OSError`.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        Path(name).replace(path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            Path(name).unlink()
+        raise
+    with contextlib.suppress(OSError):  # not every system can do this, and the file itself is complete
+        folder = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
 
 
 if sys.platform == "win32":

@@ -8,6 +8,7 @@ Texts from below (the reason of a drone's verb, of the operating system) are val
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TypeVar
 
 STATUSTEXT_BYTES = 50
 """Of one message (MAVLink common.xml STATUSTEXT)."""
@@ -16,10 +17,21 @@ REASON_BYTES = 32
 """Of a reason with its longest values: it fits behind `Setpoint refused: `."""
 
 
+_Text = TypeVar("_Text", bound="OperatorText")
+
+
 class OperatorText(str):
     """A finished text."""
 
-    __slots__ = ()
+    __slots__ = ("pattern",)
+
+    pattern: str
+    """The text with its fields unfilled: equal in texts that differ in their values alone."""
+
+    def __new__(cls: type[_Text], text: object, pattern: str | None = None) -> _Text:
+        self = super().__new__(cls, text)
+        self.pattern = str(text) if pattern is None else pattern
+        return self
 
 
 class Subject(OperatorText):
@@ -51,7 +63,7 @@ class Template:
 
     def fill(self, **values: object) -> OperatorText:
         """Return the text with these values."""
-        return self.kind(self.pattern.format(**values))
+        return self.kind(self.pattern.format(**values), self.pattern)
 
 
 class ReasonTemplate(Template):
@@ -92,7 +104,7 @@ def from_below(text: object) -> OperatorText:
 
 def joined(reasons: Iterable[OperatorText]) -> OperatorText:
     """Return several reasons as one."""
-    return Reason("; ".join(reasons))
+    return PROBLEMS.fill(problems="; ".join(reasons))
 
 
 # == Refusals ==
@@ -101,6 +113,7 @@ REFUSED = Template("{what} refused: {reason}", what="Setpoint", reason="r" * REA
 PREARM = Template("PreArm: {reason}", reason="r" * REASON_BYTES)
 NOT_ABORTED = Template("{what} not aborted: {reason}", what="Landing", reason="already landed")
 NOT_CANCELLED = Template("{what} not cancelled: {reason}", what="Return", reason="it has started")
+PROBLEMS = ReasonTemplate("{problems}", problems=BELOW)
 FAILED = Template("{what} failed: {reason}", what="Setpoint", reason="r" * REASON_BYTES)
 
 # == Subjects of refusals ==
@@ -183,6 +196,7 @@ RETURNS_BY_ITSELF = Reason("drone is returning by itself")
 MOTOR_DOWN = Reason("drone returns, motor down")
 ALREADY_LANDED = Reason("already landed")
 PILOT = Reason("Skycontroller pilot in control")
+PILOT_SWITCH = Reason("pilot flies, ANF_SC_OFFBOARD 0")
 STICKS_FOLLOW_CAMERA = Reason("sticks relative to camera")
 ROLL_INVERTED = Reason("roll sign inverted")
 MOTORS_STOPPING = Reason("motor cut in progress")
@@ -203,19 +217,39 @@ FENCE_NO_FIX = Reason("no GPS fix inside a fence")
 BEYOND_ZONE = ReasonTemplate("{distance:.0f} m beyond {zone}", distance=999, zone="inclusion 120-123")
 WAY_LEAVES_ZONE = ReasonTemplate("path crosses {zone}", zone="inclusion 120-123")
 
+# == Signing ==
+
+SIGNING = Subject("Signing")
+SYSTEM_ARMED = ReasonTemplate("system {system} is armed", system=250)
+SYSTEM_UNKNOWN = ReasonTemplate("state of system {system} is unknown", system=250)
+ACCESS_TOO_LOW = ReasonTemplate("access of endpoint is {access}", access="observe")
+REMOTE_AND_UNSIGNED = Reason("endpoint is not on loopback")
+NO_KEY_FOLDER = Reason("gateway has no state folder")
+KEY_UNWRITABLE = Reason("key file cannot be written")
+SIGNING_KEY_CHANGED = Template("Signing key changed by system {system}", system=255)
+SIGNING_SWITCHED_OFF = Template("Signing switched off by system {system}", system=255)
+SIGNING_ON = OperatorText("Signing on: key in use")
+SIGNING_OFF = OperatorText("Signing off")
+
 # == Reasons: clients ==
 
 PAUSED_BY_CLIENT = Reason("paused by a client")
 AGAIN_WITHIN = ReasonTemplate("again within {seconds:g} s", seconds=99)
 OTHER_PROGRAM = Reason("another program flies")
+TOO_MANY_PROGRAMS = Reason("too many programs stream")
 NOT_ARMED_BY_CLIENT = Reason("this client has not armed")
 IN_MODE = ReasonTemplate("mode {mode}, not Guided", mode="Terminated")
+NOT_OFFBOARD = ReasonTemplate("mode {mode}, not Offboard", mode="Terminated")
+NOT_CHOSEN = Reason("mode not chosen by this client")
+NO_CLIMB = Reason("on the ground, no climb")
+WAITED_TOO_LONG = Reason("waited too long")
 NO_SETPOINTS = Reason("no setpoints received")
 SETPOINTS_STOPPED = Reason("setpoints stopped")
 ANOTHER_CLIENT_TRANSFERS = Reason("another client transfers")
 STICKS_DO_NOT_ARM = Reason("arm by command")
 NOTHING_PAUSED = Reason("nothing paused, or replaced")
 OTHER_STICKS = Reason("another joystick flies")
+OTHER_TARGET = Reason("another target is followed")
 GIMBAL_OF_CLIENT = ReasonTemplate("system {system} has control", system=255)
 GIMBAL_OF_MISSION = Reason("mission has control")
 
@@ -247,6 +281,7 @@ NO_PLACE = Reason("no position given")
 ROI_KINDS = Reason("only a location or none")
 NO_SUCH_GIMBAL = ReasonTemplate("no gimbal {number:g}", number=-1.23457e-38)
 NO_GIMBAL = Reason("drone reports no gimbal")
+NO_SUCH_AXIS = Reason("gimbal lacks this axis")
 GIMBAL_CALIBRATES = Reason("gimbal calibration runs")
 NO_RETRACT = Reason("cannot retract")
 TWO_YAW_FRAMES = Reason("both yaw frame flags")
@@ -278,6 +313,7 @@ KILL_FENCE = Reason("needs allow_kill: true")
 # == Takeoff ==
 
 TAKEOFF_CANCELLED = Template("Takeoff cancelled: not armed within {seconds:g} s", seconds=10)
+TASK_ENDED = Template("{what} ended: {reason}", what="Offboard", reason="r" * REASON_BYTES)
 TAKEOFF_FAILED = Template("Takeoff failed: {error}", error=BELOW)
 TAKEOFF_UNFINISHED = ReasonTemplate("takeoff not over after {seconds:.0f} s", seconds=99)
 TAKEOFF_TOO_LOW = Reason("takeoff ended below its height")
@@ -354,11 +390,9 @@ ROLL_SIGN_VERIFIED = OperatorText("Roll sign verified")
 
 # == Follow ==
 
-FOLLOW_ENDED = Template("Follow ended: {reason}", reason="r" * REASON_BYTES)
 TARGET_LOST = Reason("target lost")
 NO_TARGET = Reason("no target received")
 TARGET_IGNORED = Template("Target ignored: {reason}", reason="r" * REASON_BYTES)
-TARGET_NOT_FOLLOWED = Template("Target not followed: {reason}", reason="r" * 29)
 TARGET_FAR = ReasonTemplate("{distance:.0f} m away", distance=99999999)
 TARGET_NO_POSITION = Reason("no position")
 TARGET_NO_VELOCITY = Reason("velocity is not a number")
@@ -383,7 +417,6 @@ CHANNEL_RANGE = ReasonTemplate("not {shortest}-{longest} us", shortest=800, long
 SETPOINT_DROPPED = Template("Setpoint dropped: {reason}", reason="r" * REASON_BYTES)
 MOVE_CANCELLED = Reason("move cancelled elsewhere")
 MOVE_FAILED = Reason("drone aborted the move")
-OFFBOARD_ENDED = Template("Offboard ended: {reason}", reason="r" * REASON_BYTES)
 NOT_ITS_TAKEOFF = Reason("takeoff of another client")
 GROUND_SETPOINTS_STOPPED = OperatorText("Setpoints stopped on the ground: disarming")
 OFFBOARD_STOPPED_ON_GROUND = OperatorText("Offboard setpoints stopped: on the ground")
@@ -409,7 +442,6 @@ TURNS_TOO_FAST = ReasonTemplate("{rate:.0f} rad/s is too fast", rate=99999999)
 
 # == Orbit ==
 
-ORBIT_ENDED = Template("Orbit ended: {reason}", reason="r" * REASON_BYTES)
 ORBIT_DONE = Reason("angle flown, hovering")
 MAX_TILT = Reason("MaxTilt")
 UNVERIFIED_ROLL = Reason("unverified roll")
@@ -576,6 +608,7 @@ RESTART_FAILED = OperatorText("Restart failed: drone is still connected")
 MEDIA_NOT_INDEXED = OperatorText("Media unavailable: drone indexes its storage")
 MEDIA_UNAVAILABLE = Template("Media unavailable: {error}", error=BELOW)
 FILE_TOO_LARGE = OperatorText("File too large for FTP: use media download")
+FILE_OF_UNKNOWN_SIZE = OperatorText("File size unknown: use media download")
 FILE_DAMAGED = OperatorText("File damaged: MD5 is not the drone's")
 MEDIA_COPIED = Template("Media copied: {count} file(s)", count=99999)
 MEDIA_NOT_COPIED = Template("Media not copied: {error}", error=BELOW)
@@ -590,6 +623,9 @@ STATION_LOST_STATE = Template("No ground station for {seconds:g} s: {state}", se
 STATION_LOST_FAILED = Template("Station loss: {action} failed: {error}", action="return", error=BELOW)
 SKYCONTROLLER_IN_CONTROL = OperatorText("Skycontroller in control until a client flies")
 SKYCONTROLLER_WARNS_ONLY = OperatorText("Until then station loss and fence only warn")
+SWITCH_PILOT = OperatorText("Aircraft: pilot only (ANF_SC_OFFBOARD 0)")
+SWITCH_PROGRAM = OperatorText("Aircraft: programs (ANF_SC_OFFBOARD 1)")
+SWITCH_AUTOMATIC = OperatorText("Aircraft: pilot or program (ANF_SC_OFFBOARD 2)")
 PILOT_HAS_CONTROL = Template("Skycontroller pilot has control: {reason}", reason="moved")
 BANNER = Template("anafi-mav {version}", version="10.10.10")
 BANNER_FLAVOUR = Template("{title} (anafi-mav {version})", title="ArduCopter V4.5.7", version="10.10.10")
@@ -678,8 +714,18 @@ ALARM = Template("Alarm: {alarm}", alarm="magneto pertubation")
 SENSOR_FAILED = Template("Sensor failed: {sensor}", sensor="vertical camera")
 CALIBRATE_MAGNETOMETER = OperatorText("Magnetometer calibration required")
 MOTORS_CUT = OperatorText("Motors cut")
+NO_HOME = OperatorText("No home: drone cannot return")
+RETURN_OFF = OperatorText("Return at low battery is off (ANF_RTH_AUTO)")
+RETURN_LOW = Template("Return height low: {height:g} m < {limit:g} m", height=99.5, limit=999.5)
+RETURN_AT_ONCE = OperatorText("Return delay 0 s: each link loss is a return")
+HOME_FAR = Template("Set home {distance:.0f} m away > max. {limit:g} m", distance=99999999, limit=4000)
+GEOFENCE_OFF = Template("Geofence off: max. {distance:g} m > radio {limit:g} m", distance=4000, limit=4000)
 POSITION_LOST = Template("Position unknown: no GPS location for {seconds:g} s", seconds=3)
 POSITION_FOUND = OperatorText("Position known again")
+
+# == Endpoints ==
+
+ACCESS_DENIED = Template("Message refused: access of endpoint is {access}", access="observe")
 
 # == Link to the drone ==
 

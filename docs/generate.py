@@ -74,16 +74,95 @@ ENDPOINTS = """
 | `tcpout://HOST:PORT` | connects to HOST:PORT by TCP |
 | `serial:///dev/ttyUSB0:57600` | a serial line, here with 57600 baud |
 
-Each may end in `?flavour=px4` (the default), `?flavour=ardupilot` or `?flavour=standard`: the autopilot that the
-endpoint shows its clients.
+An endpoint has the options of [this table](#endpoints). They have two forms with the same meaning, in a URL and as
+keys. In a URL they follow `?`, are joined by `&`, and a list is joined by commas. In a shell, put the URL in quotes:
+
+```yaml
+endpoints:
+  - udpout://127.0.0.1:14550
+  - udpin://0.0.0.0:14551?access=observe&systems=1,3-5&max_clients=4
+  - {url: "udpin://0.0.0.0:14552", access: observe, systems: [1, 3-5], max_clients: 4}
+  - {url: "serial:///dev/ttyUSB0:57600", bytes_per_second: 2000}
+```
+
+`udpin` and `tcpin` listen on HOST alone: give a loopback address unless the network may connect. A program that reaches
+an endpoint without [`signing`](security.md) can do what its `access` permits.
+
+### Access
+
+| `access` | its clients may | and may not |
+|---|---|---|
+| `observe` | see telemetry, parameters, plans, files, logs; set the rates of their own streams | change anything |
+| `control` | also fly, stop, steer gimbal and cameras, change camera settings and plans | maintain the drone |
+| `all` | also maintain: write parameters, restart, calibrate, format, delete files, use the shell | – |
+
+- A message beyond the access has no effect. A command is answered with DENIED, a parameter with PARAM_ERROR and its
+  value, a plan with MISSION_ACK DENIED, a file request with FILE_PROTECTED; a text names the access. `refused_access`
+  of the gateway's counters has their number, in total and by message.
+- It is not forwarded to other systems either. Of an observer's messages only a station's heartbeat and what is for one
+  system are forwarded, and nothing in the name of a drone of the gateway, or of a system that is heard on an endpoint
+  with more access (`refused_observer`): give observers system ids of their own.
+- The heartbeat of an observer does not count as a ground station's: with `ANF_GCS_LOSS` set, the drone acts on the loss
+  of the last station that may control it.
+- A pose at more than ten times a second opens the live video for an observer too, as it does for every client.
+- Several clients of one endpoint have the same access. Give observers an endpoint of their own.
+
+`systems` limits an endpoint to some drones: the others are invisible there, and a message to them has no effect
+(`refused_systems`). `allow_messages` and `block_messages` filter what is streamed. A client that requests the rate of a
+filtered message gets DENIED. Answers are not filtered.
+
+### Forged addresses
+
+The sender's address of a datagram can be forged, so that the answer floods another computer. A client of `udpin` beyond
+loopback is therefore served in full only after its third datagram within 10 s:
+
+| it has sent | it gets, and at most ten times its bytes (with IP and UDP headers) |
+|---|---|
+| a frame to all systems, as HEARTBEAT | heartbeats, in turn over the systems; each further frame renews them |
+| a frame to one system | the answer |
+| the third datagram with a valid frame within 10 s | everything, without a limit |
+
+A station with a heartbeat a second is served after 2 s. A forger needs three datagrams for each address. TCP, `udpout`
+and loopback are not limited. A command has its effect with the first datagram: this limits what is sent, not who may
+fly. Addresses without proof have `max_clients` places of their own, in which a new one replaces the one that has been
+silent for longest, at once.
+
+### Byte budget
+
+`bytes_per_second` is for radios and mobile networks. It counts bytes of MAVLink frames, for each client by itself.
+
+- Answers leave first, in turn with the newest heartbeat of each component. A stream waits until half a second's bytes
+  wait; then its oldest message is dropped and counted (`dropped_frames`).
+- All streams of a client are slowed down by one factor until they take 80 % of the budget, or less while answers fill
+  the rest. MAV_CMD_GET_MESSAGE_INTERVAL returns the interval in effect.
+- Below 5000 bytes/s, messages that repeat others are left out: ATTITUDE_QUATERNION, LOCAL_POSITION_NED, ALTITUDE and
+  MOUNT_ORIENTATION. A client can request them. One drone takes 2000 bytes/s with them and 1350 without.
+- A list of parameters takes half of the budget.
+
+A serial line of 57600 baud or less is taken for a SiK radio and has 2000 bytes/s. For a cable set
+`bytes_per_second: 5760`. A faster line has what its baud rate carries.
+
+### Datagrams
 
 A datagram of `udpout` and `udpin` carries one MAVLink frame: some programs (gomavlib since 3.3.2, and so mavp2p) read
-only the first frame of a datagram. `?frames=many` puts up to 512 bytes of frames into one. It is for a large fleet and
-for a client that reads them all, as QGroundControl, MAVSDK, pymavlink and mavlink-router do. Two options are joined by
-`&`, as in `udpout://127.0.0.1:14550?flavour=ardupilot&frames=many` (in a shell, put the URL in quotes).
+only the first frame of a datagram. `frames: many` puts several into one, up to `datagram_bytes`. It is for a large
+fleet and for a client that reads them all:
 
-`udpin` and `tcpin` listen on HOST alone: give a loopback address unless the network may connect. MAVLink has no
-password: a program that reaches an endpoint can fly the drones.
+| client | reads up to |
+|---|---|
+| gomavlib before 3.3.2 | 512 bytes |
+| mavlink-router | 1120 bytes |
+| MAVSDK, QGroundControl, pymavlink | 1400 bytes and more |
+
+### Broadcast
+
+No endpoint sends to a broadcast address: each station in the network would get the telemetry and could fly, and a
+Wi-Fi sends broadcasts at its lowest rate. `udpout` to such an address is refused at the start. Instead:
+
+| station | endpoint |
+|---|---|
+| only listens, as QGroundControl at port 14550 | one `udpout` for each station |
+| connects or sends first | one `udpin` for all of them |
 """
 
 
@@ -652,18 +731,21 @@ def states() -> str:
     from anafi_mav.services.ftp import ftp
     from anafi_mav.services.plan import plan_transfer
     from anafi_mav.sim.autopilot import machine
-    from anafi_mav.vehicle import follow, manual_flight
+    from anafi_mav.vehicle import flight_policy, follow, manual_flight
+    from anafi_mav.vehicle.base import control_machine
     from anafi_mav.vehicle.fence import fence_watch
-    from anafi_mav.vehicle.mission import progress
+    from anafi_mav.vehicle.mission import machine as mission_machine
     from anafi_mav.vehicle.offboard import stream
 
     tables: list[tuple[str, Any]] = [
         ("Transfer of a mission, a fence or rally points", plan_transfer),
-        ("A mission", progress),
+        ("Control: the active flight task", control_machine),
+        ("The flight of a mission", mission_machine),
         ("The fence: zones, floor and ceiling each", fence_watch),
         ("Setpoints of a program", stream),
         ("Sticks of a ground station", manual_flight),
         ("Following a target", follow),
+        ("The switch between the Skycontroller's pilot and programs", flight_policy),
         ("A session of MAVLink FTP", ftp),
         ("The simulated drone's flight", machine),
     ]
@@ -674,7 +756,8 @@ def states() -> str:
         for state, row in table.items():
             by_target: dict[Any, list[str]] = {}
             for event, target in row.items():
-                by_target.setdefault(target, []).append(event.name)
+                for one in target if isinstance(target, tuple) else (target,):
+                    by_target.setdefault(one, []).append(event.name)
             for target, events in by_target.items():
                 parts.append(f"    {state.name} --> {target.name}: {', '.join(events)}\n")
         parts.append("```\n\n| | |\n|---|---|\n")
@@ -795,7 +878,8 @@ every text that the gateway sends as STATUSTEXT, and the reasons in it. What to 
 about one is in [troubleshooting](troubleshooting.md).
 
 - `{name}` stands for a value. `{reason}` is one of the reasons below, or what a lower layer reports.
-- A refusal is `{what} refused: {reason}`, a WARNING to every client. A refused motor cut is CRITICAL.
+- A refusal is `{what} refused: {reason}`, a WARNING to every client. A refused motor cut is CRITICAL. Refusals of
+  streamed inputs are sent to their sender alone ([dropped-inputs](dropped-inputs.md)).
 - A text that names a file or quotes an explanation may be longer than 50 bytes. It then takes several messages.
 - Without a severity, a text is a part of another one, or its severity depends on the situation.
 """
@@ -834,11 +918,55 @@ def operator_texts() -> str:
     return page
 
 
+DROPPED_INPUTS = """\
+# Inputs that are not flown
+
+<!-- Made by docs/generate.py from anafi_mav/services/dropped_inputs.py. -->
+
+For programmers who stream setpoints, sticks, targets or gimbal rates. After reading you know each reason for which such
+an input is not flown, and its text. A command is answered by its COMMAND_ACK instead.
+
+- Only the channel of the sender receives the text. The gateway's terminal shows it with the sender's system id.
+- One text for each reason and episode, at most one in {every:g} s for each sender and reason. An episode ends when an
+  input of the same stream is flown, or when none has been dropped for this reason for {gap:g} s.
+- A NOTICE is sent after {grace:g} s, all others are WARNINGs and are sent at once.
+- The gateway remembers {senders} senders.
+
+Not reported are:
+
+- centred sticks, zero rates of a gimbal, and a throttle that rests where it was in the first message;
+- setpoints without motion from a client of PX4 that has not chosen Offboard;
+- targets while the mode is not Follow: their message names no drone;
+- an input that a newer one of the same sender has replaced, and a setpoint that waits for the end of a take-off.
+"""
+
+
+def dropped_inputs() -> str:
+    """The page of all causes for which an input is not flown."""
+    from anafi_mav import texts
+    from anafi_mav.services import dropped_inputs as table
+
+    parts = [
+        DROPPED_INPUTS.format(
+            every=table.REPORT_EVERY, gap=table.EPISODE_GAP, grace=table.MODE_GRACE, senders=table.MAX_SENDERS
+        )
+    ]
+    for stream in table.InputStream:
+        parts.append(f"\n## {stream.value}\n\n| text | severity |\n|---|---|\n")
+        for cause in table.CAUSES:
+            if cause.stream is stream:
+                reason = "{reason of the drone}" if cause.reason is None else cause.reason.pattern
+                text = re.sub(r"(\{[\w ]+)[^}]*\}", r"\1}", cause.text(texts.from_below(reason)))
+                parts.append(f"| `{text}` | {cause.severity.name} |\n")
+    return "".join(parts)
+
+
 PAGES: dict[str, Callable[[], str]] = {
     "camera.md": camera,
     "camera-settings.md": camera_settings,
     "configuration.md": configuration,
     "dialect.md": dialect,
+    "dropped-inputs.md": dropped_inputs,
     "parameters.md": parameters,
     "plan-translation.md": plan_translation,
     "python-api-reference.md": python_api,

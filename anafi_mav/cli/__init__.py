@@ -25,7 +25,10 @@ COMMANDS = {
     "discover": "look for drones and Skycontrollers on every network interface; prints a configuration",
     "plan": "check, convert, show and draw flight plans; upload, download and fly them",
     "media": "list, download and delete the photos and videos of a drone",
+    "status": "show the drones, clients, rates and refused commands of a running gateway",
+    "replay": "play a recorded session, or any tlog, to a ground station",
     "info": "connect to one drone and print model, battery, features and limits",
+    "keygen": "make a key for signed endpoints, show it, or return to the one before it",
     "doctor": "examine the way to one drone: what is wrong, and how to mend it",
 }
 """Name of a command, which is the name of its module in this folder, and what it does."""

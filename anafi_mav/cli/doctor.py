@@ -28,6 +28,7 @@ from anafi_mav.drone.drone import CONTROLLER_PORTS
 from anafi_mav.drone.rest import HTTP_PORT
 from anafi_mav.drone.status.product import MODELS
 from anafi_mav.errors import AnafiMavError, ConfigError, LinkLost
+from anafi_mav.vehicle.failsafe_settings import FailsafeLimits, warnings_of
 
 ANSWER_LIMIT = 2.0
 """s for a port to answer, and again for the introduction: an aircraft in range takes some milliseconds."""
@@ -38,7 +39,7 @@ LISTEN = 5.0
 LOWEST_CEILING, SMALLEST_FENCE = 10.0, 30.0
 """m: an aircraft with less than that refuses nearly every flight."""
 
-UNASKED = ("controller", "firmware", "settings")
+UNASKED = ("controller", "firmware", "settings", "failsafes")
 
 
 class Finding(NamedTuple):
@@ -276,7 +277,8 @@ async def with_handshake(place: DroneAddress) -> list[Finding]:
         await asyncio.wait([drone.lost], timeout=LISTEN)
         if drone.lost.done():
             return [_no_connection(f"connected and lost at once: {drone.lost.result()}")]
-        return [ok("controller", "connected, no other controller took it back"), firmware(drone), *settings(drone)]
+        controller = ok("controller", "connected, no other controller took it back")
+        return [controller, firmware(drone), *settings(drone), *failsafes(drone)]
     finally:
         await drone.close()
 
@@ -318,3 +320,15 @@ def settings(drone: Drone) -> Iterator[Finding]:
         fence = f"{distance.current:g} m" if state.geofence and distance is not None else "off"
         top = "not reported" if ceiling is None else f"{ceiling.current:g} m"
         yield ok("settings", f"take-off is possible, highest altitude {top}, geofence {fence}")
+
+
+def failsafes(drone: Drone) -> Iterator[Finding]:
+    """Look for settings that leave a failsafe without effect.
+
+    By the limits of a configuration without `warnings`.
+    """
+    found = warnings_of(drone, FailsafeLimits())
+    for warning in found:
+        yield wrong("failsafes", warning.text, warning.mend)
+    if not found:
+        yield ok("failsafes", "no dangerous setting")

@@ -16,10 +16,12 @@ from typing_extensions import Self
 from anafi_mav.clock import SystemClock
 from anafi_mav.errors import CommandRejected, ConfigError, LinkLost
 from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.key_ring import KeyRing, folder_of
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.mavlink.plan_client import Download, Message, Upload
 from anafi_mav.mavlink.router import EVERY_COMPONENT
 from anafi_mav.services.flavours import FLAVOURS
+from anafi_mav.state_lock import state_folder
 
 SYSID, COMPID = 252, dialect.MAV_COMP_ID_MISSIONPLANNER
 """Ours: beyond the drones of a fleet, and neither QGroundControl's 255 nor MAVSDK's 245."""
@@ -55,7 +57,9 @@ class Ground:
         self._beats: dict[int, Inbound] = {}
         self._updated = asyncio.Event()
         self._clock = SystemClock()
-        self._node = Node(clock=self._clock, flavours=tuple(FLAVOURS))
+        state = state_folder(None)
+        keys = KeyRing(None if state is None else folder_of(state), self._clock, saves=False)
+        self._node = Node(clock=self._clock, flavours=tuple(FLAVOURS), keys=keys)
         self._beating: asyncio.Task[None] | None = None
         self._transfer: Upload | Download | None = None
         self._acks: list[Any] = []

@@ -6,12 +6,19 @@ a refused command ten times a second must not hide other events.
 
 from __future__ import annotations
 
+import json
 import logging
+import logging.handlers
 import re
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from datetime import datetime, timezone
+from pathlib import Path
 from types import TracebackType
 
+from anafi_mav.cli.terminal import complain
+from anafi_mav.errors import ConfigError
 from anafi_mav.printable import printable
 from anafi_mav.subject import DRONE
 
@@ -19,6 +26,12 @@ FORMAT = "%(asctime)s %(levelname)s %(name)s: %(message)s"
 
 REPEAT_EVERY = 5.0
 """s for which a line is not written again."""
+
+TEXT, JSON = FORMATS = ("text", "json")
+
+FILE_BYTES, OLD_FILES = 10_000_000, 5
+"""Bytes of a log file before it is put aside as FILE.1, and files that are put aside: 60 MB in all, which is months of
+warnings, or some hours with -vv."""
 
 MAX_LINES = 200
 """Different lines whose repetition is noticed."""
@@ -75,9 +88,64 @@ class RepeatFilter(logging.Filter):
         return True
 
 
-def set_up(level: int = logging.WARNING) -> None:
-    """Write the log of this process to stderr, from this level on."""
-    handler = logging.StreamHandler()
-    handler.setFormatter(CleanFormatter(FORMAT))
-    handler.addFilter(RepeatFilter())
-    logging.basicConfig(level=level, handlers=[handler])
+class JsonFormatter(logging.Formatter):
+    """Formats a record as one JSON object on one line."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        moment = datetime.fromtimestamp(record.created, timezone.utc)
+        entry = {
+            "time": moment.isoformat(timespec="milliseconds").replace("+00:00", "Z"),
+            "level": record.levelname,
+            "logger": record.name,
+            "drone": DRONE.get(),
+            "message": record.getMessage(),
+        }
+        if record.exc_info:
+            entry["exception"] = self.formatException(record.exc_info)
+        # In ASCII: what a peer sent can then do nothing to a terminal.
+        return json.dumps(entry).replace("\x7f", "\\u007f")
+
+
+class LogOutputs(logging.Handler):
+    """Passes each record to several handlers. What repeats is counted once for all of them."""
+
+    def __init__(self, handlers: Sequence[logging.Handler]) -> None:
+        super().__init__()
+        self._handlers = handlers
+        self.addFilter(RepeatFilter())
+
+    def emit(self, record: logging.LogRecord) -> None:
+        for handler in self._handlers:
+            handler.handle(record)
+
+
+class BoundedLogFile(logging.handlers.RotatingFileHandler):
+    """A log file of bounded size. A full disk is reported once, and ends nothing."""
+
+    def __init__(self, path: Path) -> None:
+        """Open the file for appending. Raises OSError."""
+        super().__init__(path, maxBytes=FILE_BYTES, backupCount=OLD_FILES, encoding="utf-8")
+        self._path = path
+        self._has_failed = False
+
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802
+        if not self._has_failed:
+            self._has_failed = True
+            complain(f"--log-file: {self._path} cannot be written: {sys.exc_info()[1]}")
+
+
+def set_up(level: int = logging.WARNING, *, path: Path | None = None, kind: str = TEXT) -> None:
+    """Write the log of this process to stderr, and to a file as well, from this level on.
+
+    `kind`: of `FORMATS`. Raises `ConfigError` for a file that cannot be written.
+    """
+    handlers: list[logging.Handler] = [logging.StreamHandler()]
+    if path is not None:
+        try:
+            handlers.append(BoundedLogFile(path))
+        except OSError as error:
+            problem = f"expected a file that can be written, got {path}: {error.strerror}"
+            raise ConfigError("--log-file", problem) from error
+    for handler in handlers:
+        handler.setFormatter(JsonFormatter() if kind == JSON else CleanFormatter(FORMAT))
+    logging.basicConfig(level=level, handlers=[LogOutputs(handlers)])

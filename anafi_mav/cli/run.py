@@ -6,6 +6,7 @@ import argparse
 import asyncio
 import contextlib
 import logging
+import os
 import signal
 from collections.abc import Callable, Coroutine, Mapping, Sequence
 from pathlib import Path
@@ -13,15 +14,17 @@ from typing import Any
 
 import msgspec
 
-from anafi_mav.cli import heap, log, options
+from anafi_mav.cli import heap, log, options, run_check
 from anafi_mav.cli.addresses import Ports, Reservations, spot
 from anafi_mav.cli.child import SimulatorProcess
 from anafi_mav.cli.scenarios import load as load_scenario
+from anafi_mav.cli.service_manager import ServiceManager
 from anafi_mav.cli.terminal import complain, say
 from anafi_mav.config import Config, DroneConfig, SimConfig, from_mapping, load, remarks
 from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import Gateway, state_in_use
 from anafi_mav.mavlink.endpoint import is_open_to_network, parse_endpoint
+from anafi_mav.mavlink.key_ring import folder_of, has_key
 from anafi_mav.relay.uri_host import is_loopback
 from anafi_mav.services.flavours import FLAVOURS
 from anafi_mav.sim.world import quirks
@@ -53,6 +56,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--sim-log", type=Path, metavar="FILE", help="what simulated drones go through, one JSON object a line"
     )
     parser.add_argument("-v", "--verbose", action="count", default=0, help="tell more; twice: each message")
+    parser.add_argument("--log-file", type=Path, metavar="FILE", help="write the log to FILE, too; 60 MB at most")
+    parser.add_argument(
+        "--log-format", choices=log.FORMATS, default=log.TEXT, help="of the log: lines for people, or JSON objects"
+    )
+    parser.add_argument(
+        "--check", action="store_true", help="check configuration, keys, ports and folders, and end: exit status 0 or 1"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -60,11 +70,27 @@ def run(arguments: argparse.Namespace) -> int:
 
     Returns 1 when something could not be kept in the state folder. Raises `ConfigError` before anything is started.
     """
-    log.set_up((logging.WARNING, logging.INFO, logging.DEBUG)[min(arguments.verbose, 2)])
+    level = (logging.WARNING, logging.INFO, logging.DEBUG)[min(arguments.verbose, 2)]
+    log.set_up(level, path=arguments.log_file, kind=arguments.log_format)
+    if arguments.check:
+        return _check(arguments)
     try:
         return _serve(arguments)
     except ConfigError as error:
         raise _located(error, arguments) from error
+
+
+def _check(arguments: argparse.Namespace) -> int:
+    """Print a line for each thing that a start needs; 1 when one of them is wrong."""
+    try:
+        config = configuration(arguments.config, arguments.drone, arguments.endpoint, arguments.allow_kill)
+        findings = asyncio.run(run_check.findings(config, place))
+    except ConfigError as error:
+        located = _located(error, arguments)
+        findings = [run_check.wrong("configuration", str(located), "mend it at that key")]
+    for finding in findings:
+        say(str(finding), "red" if finding.wrong else "")
+    return 1 if any(finding.wrong for finding in findings) else 0
 
 
 def _located(error: ConfigError, arguments: argparse.Namespace) -> ConfigError:
@@ -81,16 +107,20 @@ def _serve(arguments: argparse.Namespace) -> int:
     config = configuration(arguments.config, arguments.drone, arguments.endpoint, arguments.allow_kill)
     for remark in remarks(config):
         complain(f"warning: {remark}", "yellow")
-    for index, text in enumerate(config.endpoints):
+    state = state_folder(config.state)
+    for index, entry in enumerate(config.endpoints):
         with contextlib.suppress(ConfigError):  # the gateway says what is wrong with it
-            if is_open_to_network(parse_endpoint(text, tuple(FLAVOURS))):
-                what = (
-                    "is open to the network and MAVLink has no password: any program that reaches it can fly the drones"
-                )
-                complain(f"warning: endpoints[{index}]: {text} {what}", "yellow")
+            url = parse_endpoint(entry, tuple(FLAVOURS))
+            if is_open_to_network(url) and not (state and has_key(folder_of(state), url.key_name)):
+                can = "read the drones' data" if url.options.access == "observe" else "fly the drones"
+                what = f"is open to the network without signing: any program that reaches it can {can}"
+                complain(f"warning: endpoints[{index}]: {url.text} {what}", "yellow")
     http = config.http_server
     if http is not None and not is_loopback(http.host):
-        what = "is open to the network and has no password: any program that reaches it can watch the drones' video"
+        what = (
+            "is open to the network without TLS: a program on the way can read the token of the web page; "
+            "put a reverse proxy with TLS before it"
+        )
         complain(f"warning: http.host: {http.host} {what}", "yellow")
     heap.settle()
     problems = asyncio.run(_run(config, arguments.sim_log.absolute() if arguments.sim_log else None))
@@ -160,6 +190,7 @@ async def _run(config: Config, sim_log: Path | None) -> list[str]:
     if folder is not None and holder is not None:  # before its simulated drones are found in the way
         raise state_in_use(folder, holder)
     async with contextlib.AsyncExitStack() as stack:
+        manager = stack.enter_context(ServiceManager(os.environ))  # signs of life go on while the gateway closes
         gateway_config, fleet = place(config, stack.enter_context(Reservations()))
         gateway = Gateway(gateway_config)
         if not await _unless(interrupts.stop, _start(gateway, fleet, sim_log, stack)):
@@ -168,7 +199,9 @@ async def _run(config: Config, sim_log: Path | None) -> list[str]:
         for line in gateway.lines():
             say(line)
         say("ready, Ctrl-C ends", "green")
+        manager.ready(f"{len(gateway.systems)} drones")
         await interrupts.stop.wait()
+        manager.stopping()
         for sentence in interrupts.unsaid():
             say(sentence, "yellow")
         return gateway.state_problems()

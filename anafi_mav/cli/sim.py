@@ -21,8 +21,8 @@ from anafi_mav.cli.terminal import say
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 from anafi_mav.sim.scenario import Scenario
+from anafi_mav.sim.world import quirks
 from anafi_mav.sim.world.model import MODELS
-from anafi_mav.sim.world.quirks import QUIRKS
 from anafi_mav.sim.world.wind import CALM, WindSpec
 
 MAX_COUNT = 254
@@ -68,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help=f"let the firmware differ, can be repeated: {', '.join(QUIRKS)}",
+        help=f"let the firmware differ, can be repeated: {quirks.EXPECTED}",
     )
     parser.add_argument("--scenario", type=Path, metavar="FILE", help="YAML: what goes wrong, and when")
     parser.add_argument("--log", type=Path, metavar="FILE", help="write what happens to FILE, one JSON object a line")

@@ -13,10 +13,11 @@ import json
 import math
 import sys
 from collections.abc import Callable, Container, Iterator, Sequence
-from typing import TextIO
+from typing import NamedTuple, TextIO
 
 from rich.cells import cell_len
-from rich.console import Console, JustifyMethod
+from rich.console import Console, Group, JustifyMethod
+from rich.live import Live
 from rich.measure import Measurement
 from rich.progress import Progress
 from rich.table import Table
@@ -60,19 +61,38 @@ def _plain(value: object) -> object:
             return value
 
 
+class TableRows(NamedTuple):
+    """A table: the titles of its columns, and its rows."""
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+def is_live() -> bool:
+    """True when stdout is a terminal, on which lines can be replaced."""
+    return sys.stdout.isatty()
+
+
+@contextlib.contextmanager
+def live_tables() -> Iterator[Callable[[Sequence[str], Sequence[TableRows]], None]]:
+    """Lines and tables below them on the terminal, replaced by each call of what it gives."""
+    with Live(console=Console(file=sys.stdout), screen=True, auto_refresh=False) as screen:
+
+        def show(lines: Sequence[str], tables: Sequence[TableRows]) -> None:
+            parts: list[Text | Table] = [Text(printable(line), no_wrap=True) for line in lines]
+            for table in tables:
+                parts += [Text(), _table(table.head, table.rows)]
+            screen.update(Group(*parts), refresh=True)
+
+        yield show
+
+
 def say_table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Container[int] = ()) -> None:
     """Print rows in columns on stdout. `right` are the columns that are aligned to the right.
 
     A terminal gets a head in bold and a last column that is folded inside itself. Elsewhere a row is one line.
     """
-    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="bold")
-    for place, title in enumerate(head):
-        widest = max(cell_len(printable(row[place])) for row in [head, *rows])
-        least = min(widest, _LAST_COLUMN) if place == len(head) - 1 else widest
-        justify: JustifyMethod = "right" if place in right else "left"
-        table.add_column(Text(title), justify=justify, min_width=least, overflow="fold")
-    for row in rows:
-        table.add_row(*(Text(printable(cell)) for cell in row))
+    table = _table(head, rows, right)
     if sys.stdout.isatty():
         console = Console(file=sys.stdout)
         least = Measurement.get(console, console.options, table).minimum
@@ -84,6 +104,18 @@ def say_table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Contain
         page.print(table)
     for line in text.get().splitlines():
         say(line.rstrip())
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Container[int] = ()) -> Table:
+    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="bold")
+    for place, title in enumerate(head):
+        widest = max(cell_len(printable(row[place])) for row in [head, *rows])
+        least = min(widest, _LAST_COLUMN) if place == len(head) - 1 else widest
+        justify: JustifyMethod = "right" if place in right else "left"
+        table.add_column(Text(title), justify=justify, min_width=least, overflow="fold")
+    for row in rows:
+        table.add_row(*(Text(printable(cell)) for cell in row))
+    return table
 
 
 def complain(line: str, style: str = "red") -> None:

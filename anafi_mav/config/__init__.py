@@ -12,5 +12,7 @@ from anafi_mav.config.schema import Config as Config
 from anafi_mav.config.schema import DroneConfig as DroneConfig
 from anafi_mav.config.schema import HttpConfig as HttpConfig
 from anafi_mav.config.schema import MediaConfig as MediaConfig
+from anafi_mav.config.schema import RecordingConfig as RecordingConfig
 from anafi_mav.config.schema import SimConfig as SimConfig
 from anafi_mav.config.schema import VideoConfig as VideoConfig
+from anafi_mav.endpoint_options import EndpointConfig as EndpointConfig

@@ -107,13 +107,18 @@ def _steps(message: str) -> list[str | int]:
     return [name or int(index) for name, index in found]
 
 
-def _inner(node: Any) -> Any:
-    """The type below its annotations and below "or None"."""
+def _inner(node: Any, value: object = None) -> Any:
+    """Return the type below its annotations and below "or None".
+
+    Of several types the one that `value`, a mapping, needs.
+    """
     while isinstance(node, msgspec.inspect.Metadata | msgspec.inspect.UnionType):
         if isinstance(node, msgspec.inspect.Metadata):
             node = node.type
-        else:
-            node = next(kind for kind in node.types if not isinstance(kind, msgspec.inspect.NoneType))
+            continue
+        kinds = [kind for kind in node.types if not isinstance(kind, msgspec.inspect.NoneType)]
+        structs = [kind for kind in kinds if isinstance(_inner(kind), msgspec.inspect.StructType)]
+        node = (structs if structs and isinstance(value, Mapping) else kinds)[0]
     return node
 
 
@@ -133,13 +138,13 @@ def _explain(document: object, steps: list[str | int]) -> ConfigError:
     node: Any = msgspec.inspect.type_info(Config)
     value: Any = document
     for step in steps:
-        kind = _inner(node)
+        kind = _inner(node, value)
         if isinstance(step, int):
             node = kind.item_types[step] if isinstance(kind, msgspec.inspect.TupleType) else kind.item_type
         else:
             node = next(field.type for field in kind.fields if field.name == step)
         value = value[step]
-    kind = _inner(node)
+    kind = _inner(node, value)
     if isinstance(kind, msgspec.inspect.StructType) and isinstance(value, Mapping):
         names = [field.name for field in kind.fields]
         for key in value:
@@ -190,7 +195,11 @@ def _contradictions(config: Config) -> Iterator[tuple[str, str]]:
     drones = {f"drones[{index}]": drone for index, drone in enumerate(config.drones)}
     for key_path, drone in drones.items():
         yield from _of_one_drone(key_path, drone)
-    yield from _twice("an endpoint", {f"endpoints[{index}]": url for index, url in enumerate(config.endpoints)})
+    endpoints = {
+        f"endpoints[{index}]": entry if isinstance(entry, str) else entry.url
+        for index, entry in enumerate(config.endpoints)
+    }
+    yield from _twice("an endpoint", endpoints)
     yield from _twice("a sysid", {f"{key_path}.sysid": drone.sysid for key_path, drone in drones.items()})
     yield from _twice("a name", {f"{key_path}.name": drone.name for key_path, drone in drones.items()})
     simulated = {f"{path}.sim": drone.sim for path, drone in drones.items() if drone.sim is not None}

@@ -8,12 +8,14 @@ messages.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
 
 from anafi_mav import models
+from anafi_mav.documents import expected
+from anafi_mav.endpoint_options import MAX_URL, EndpointConfig
 
 MAX_ENDPOINTS = 32
 """Each endpoint is a socket and gets every message: more than this is a mistake, not a fleet."""
@@ -29,11 +31,6 @@ MAX_PATH = 4096
 
 MAVSDK_SYSID = 245
 """MAVSDK's default system ID of a ground station (MAVSDK mavsdk.h, DEFAULT_SYSTEM_ID_GCS)."""
-
-
-def expected(what: str) -> dict[str, Any]:
-    """The `extra` of a key: what its value must be, as it reads after the word "expected"."""
-    return {"expected": what}
 
 
 def alternatives(values: Sequence[str]) -> str:
@@ -263,9 +260,9 @@ class DroneConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
 
 class HttpConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The gateway's web server: a page for browsers, and files for ground stations.
+    """The gateway's web server: pages for browsers, the status, and files for ground stations.
 
-    It has no password.
+    Open to the network, it needs a token (docs/web.md).
     """
 
     host: Annotated[
@@ -297,6 +294,50 @@ class MediaConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
             description="Folder into which each drone's photos and videos are copied after a landing, as "
             "`<drone>/<day>/<file>` with a JSON file for each. `~` is the user's home. Left out: they are not copied.",
             extra=expected("the path of a folder"),
+        ),
+    ] = None
+
+
+class RecordingConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Recording of sessions: what passes both sides of the gateway (docs/operation.md)."""
+
+    folder: Annotated[
+        Annotated[str, Meta(min_length=1, max_length=MAX_PATH)] | None,
+        Meta(
+            description="Folder in which each run of the gateway records itself, in a folder of its own. It holds "
+            "positions and serial numbers. `~` is the user's home. Default: nothing is recorded.",
+            extra=expected("the path of a folder"),
+        ),
+    ] = None
+    max_megabytes: Annotated[
+        int,
+        Meta(
+            ge=200,
+            le=1_000_000,
+            description="Most megabytes of all sessions in the folder; the oldest files are deleted.",
+            extra=expected("a whole number from 200 to 1000000"),
+        ),
+    ] = 2000
+
+
+class WarningsConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Limits of the texts about dangerous settings of a drone (docs/failsafes.md)."""
+
+    return_height: Annotated[
+        float,
+        Meta(
+            ge=0,
+            le=500,
+            description="A return that climbs to less than this is reported, metres above take-off.",
+            extra=expected("a height from 0 to 500 m"),
+        ),
+    ] = 20.0
+    radio_range: Annotated[
+        Annotated[float, Meta(ge=10, le=100_000)] | None,
+        Meta(
+            description="Range of the radio, metres. A drone without geofence whose MaxDistance is larger is reported. "
+            "Default: 4000 behind a Skycontroller, else 100.",
+            extra=expected("a distance from 10 to 100000 m"),
         ),
     ] = None
 
@@ -344,15 +385,16 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     endpoints: Annotated[
         tuple[
             Annotated[
-                str, Meta(min_length=1, max_length=MAX_TEXT, extra=expected("a URL like udpout://127.0.0.1:14550"))
+                Annotated[str, Meta(min_length=1, max_length=MAX_URL)] | EndpointConfig,
+                Meta(extra=expected("a URL like udpout://127.0.0.1:14550, or a mapping with a url and options")),
             ],
             ...,
         ],
         Meta(
             min_length=1,
             max_length=MAX_ENDPOINTS,
-            description="MAVLink endpoints. Every drone sends and receives on every endpoint. The forms of a URL are "
-            "listed below.",
+            description="MAVLink endpoints: URLs, or mappings with a `url` and options. Every drone sends and receives "
+            "on every endpoint, unless its options limit that. [More below](#endpoint-urls).",
             extra=expected(f"a list of 1 to {MAX_ENDPOINTS} URLs"),
         ),
     ] = ("udpout://127.0.0.1:14550", "udpout://127.0.0.1:14540", "tcpin://127.0.0.1:5760?flavour=ardupilot")
@@ -396,6 +438,17 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             description="Photos and videos of the drones.", extra=expected("a mapping like {download_folder: ~/drone}")
         ),
     ] = MediaConfig()
+    recording: Annotated[
+        RecordingConfig,
+        Meta(description="Recording of sessions.", extra=expected("a mapping like {folder: ~/flights}")),
+    ] = RecordingConfig()
+    warnings: Annotated[
+        WarningsConfig,
+        Meta(
+            description="Limits of the texts about dangerous settings.",
+            extra=expected("a mapping like {return_height: 30}"),
+        ),
+    ] = WarningsConfig()
     http: Annotated[
         HttpConfig | bool,
         Meta(
@@ -428,10 +481,13 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 SECTIONS: dict[str, type[msgspec.Struct]] = {
     "the file": Config,
+    "endpoints[…]": EndpointConfig,
     "drones[…]": DroneConfig,
     "drones[…].sim": SimConfig,
     "drones[…].sim.wind": WindConfig,
     "media": MediaConfig,
+    "recording": RecordingConfig,
+    "warnings": WarningsConfig,
     "http": HttpConfig,
     "video": VideoConfig,
 }

@@ -16,6 +16,7 @@ from functools import partial
 from typing import Any, TypeAlias, TypeVar
 
 from anafi_mav import models
+from anafi_mav.arsdk.codec.secret_fields import without_secrets
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.link.controller import ControllerSession
 from anafi_mav.arsdk.link.handshake import DISCOVERY_PORT
@@ -178,11 +179,12 @@ class Drone:
         for element in self._elements:
             for message, reducer in element.REDUCERS.items():
                 self._routes.setdefault(message, []).append((element, reducer))
-        self._reactions: dict[type[Message], Callable[[Any, float], None]] = {
+        self._reactions: dict[type[Message], Callable[[Any, float], object]] = {
             **self.piloting.reactions(),
             **self.controller.reactions(),
             **self.streams.reactions(),
             common.MavlinkFilePlayingStateChanged: self._plan_says,
+            common.StartingErrorEvent: self._commander.sent.attribute,
             common.Disconnection: self._on_dismissal,
             drone_manager.ConnectionState: self._controller_says,
             device_manager.State: self._controller_says,
@@ -382,6 +384,7 @@ class Drone:
     def _reset(self) -> None:
         for element in self._elements:
             element.reset()
+        self._commander.sent.clear()
         self._complete = self._reports_rth_state = False
         if self._lost.done():
             self._lost = asyncio.get_running_loop().create_future()
@@ -484,8 +487,6 @@ class Drone:
             raise CommandRejected("the magnetometer is being calibrated: somebody turns the drone by hand")
         if isinstance(message, common.MagnetoCalibration) and message.calibrate:
             self._require_standing("calibrated")
-        if _starts_motors(message):
-            self.piloting.take_off_wanted()
         return self.controller.allows(message)
 
     def _require_standing(self, what: str) -> None:
@@ -605,6 +606,20 @@ class Drone:
     def counters(self) -> Counter[str]:
         """Transport counters of the present or last connection."""
         return self._counters
+
+    @property
+    def on_command(self) -> Callable[[Message], None] | None:
+        """Called with each command that is sent; None: nothing is."""
+        return self._commander.on_command
+
+    @on_command.setter
+    def on_command(self, callback: Callable[[Message], None] | None) -> None:
+        self._commander.on_command = callback
+
+    @property
+    def silent_for(self) -> float | None:
+        """Time since the last datagram of the drone, s; None while it is not connected."""
+        return None if self._session is None else max(0.0, loop_time() - self._session.last_received)
 
     @property
     def identity(self) -> Identity:
@@ -765,7 +780,7 @@ class Drone:
             except Exception:
                 log.exception("%s: a subscriber failed on %s", self.name, message.NAME)
         if message_log.isEnabledFor(logging.DEBUG):
-            message_log.debug("%s: %r", self.name, message)
+            message_log.debug("%s: %r", self.name, without_secrets(message))
 
 
 def _ignore(message: Message | UnknownMessage, now: float) -> None:

@@ -12,11 +12,14 @@ import contextlib
 import logging
 import weakref
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
+from anafi_mav.arsdk.codec.secret_fields import without_secrets
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
+from anafi_mav.drone.sent_commands import AUTOMATIC, Event, Phase, SentCommand, SentCommands, Slot
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost
 
+logger = logging.getLogger(__name__)
 message_log = logging.getLogger("anafi_mav.message")
 
 T = TypeVar("T")
@@ -106,8 +109,7 @@ class Expectation(Generic[T]):
         try:
             return await self.future
         except BaseException:
-            if self.token is not None:
-                self._commander.cancel(self.token)
+            self._commander.cancel(self.token)
             raise
         finally:
             self.close()
@@ -138,13 +140,6 @@ class Expectation(Generic[T]):
             self.future.exception()  # nobody may be waiting any more; asyncio would complain
 
 
-class _Beginning(NamedTuple):
-    """Something that is to fly the drone and has not been confirmed."""
-
-    answer: Expectation[Any]
-    undo: Message
-
-
 class Commander:
     """Sender of commands to the drone, and registry of the answers that are awaited."""
 
@@ -152,6 +147,8 @@ class Commander:
         self.name = ""
         """Of the drone, for the log."""
         self._wire: Wire | None = None
+        self.on_command: Callable[[Message], None] | None = None
+        """Called with each command that is sent."""
         self.gate: Callable[[Message], bool] | None = None
         """Asked before each command; False: it is not sent, as if it were lost on the way. May raise."""
         self._open: set[Expectation[Any]] = set()
@@ -164,10 +161,7 @@ class Commander:
         """Tasks that newer commands have replaced: they send nothing but what stops something."""
         self._silenced: weakref.WeakSet[asyncio.Task[Any]] = weakref.WeakSet()
         """Tasks that send nothing at all."""
-        self._beginning: dict[type[Message], _Beginning] = {}
-        """By the kind of command that undoes it."""
-        self._aborted: dict[type[Message], float] = {}
-        """Loop time of the last aborted, unanswered start, by the command class that undoes it."""
+        self.sent = SentCommands()
 
     @property
     def connected(self) -> bool:
@@ -175,8 +169,8 @@ class Commander:
 
     @property
     def begins(self) -> bool:
-        """Something that is to fly the drone waits for its confirmation (see `begin`)."""
-        return bool(self._beginning)
+        """An automatic flight waits for its confirmation."""
+        return bool(self.sent.awaited(*AUTOMATIC))
 
     def require_link(self) -> None:
         """Raise `LinkLost` without a link."""
@@ -198,7 +192,7 @@ class Commander:
                 delivery.set_exception(LinkLost(reason))
                 delivery.exception()  # nobody may be waiting; asyncio would complain
         self._deliveries.clear()
-        self._aborted.clear()
+        self.sent.abandon(loop_time())
 
     def retire(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
         """From now on let these tasks send only commands that stop something.
@@ -232,8 +226,14 @@ class Commander:
         if self.gate is not None and not self.gate(message):
             return BLOCKED
         if message_log.isEnabledFor(logging.DEBUG):
-            message_log.debug("%s: sent %r", self.name, message)
-        return self._wire.send(message)
+            message_log.debug("%s: sent %r", self.name, without_secrets(message))
+        token = self._wire.send(message)
+        if self.on_command is not None:
+            try:
+                self.on_command(message)
+            except Exception:  # what listens must not keep a command from the drone
+                logger.exception("%s: %s not recorded", self.name, type(message).__name__)
+        return token
 
     def deliver(self, message: Message, *, stops: bool = False) -> asyncio.Future[None]:
         """Send an acknowledged command; the future is done when the drone has received it.
@@ -294,6 +294,8 @@ class Commander:
             delivery.exception()  # nobody may be waiting; asyncio would complain
 
     def _delivered(self, token: int, arrived: bool) -> None:
+        if arrived:
+            self.sent.deliver(token)
         delivery = self._deliveries.pop(token, None)
         if delivery is None or delivery.done():
             return
@@ -303,9 +305,9 @@ class Commander:
             delivery.set_exception(CommandTimeout("its receipt", 0.75))  # version 1: five retransmissions of 150 ms
             delivery.exception()
 
-    def cancel(self, token: int) -> None:
-        """Take a command back if it has not been delivered."""
-        if self._wire is not None:
+    def cancel(self, token: int | None) -> None:
+        """Withdraw a command that has not been delivered; None: it was not sent."""
+        if self._wire is not None and token is not None:
             self._wire.cancel(token)
 
     def expect(
@@ -345,73 +347,49 @@ class Commander:
 
     async def begin(
         self,
+        sent: SentCommand,
         command: Message,
         answers: Sequence[type[Message]],
         judge: Callable[[Any], T | AnafiMavError | None],
         timeout: float,
-        undo: Message,
-        *,
-        undo_refused: bool = False,
     ) -> T:
-        """`confirm` for a command that flies the drone until `undo` ends it.
+        """`confirm` for a command that flies the drone until something ends it.
 
-        When this times out or is cancelled, the command is withdrawn and undone; with `undo_refused` also when
-        the drone refused it, for a command that would begin later. Hover and other commands that replace it end it by
-        `abort_pending`, a newer one with the same kind of `undo` replaces it: both raise `CommandRejected` here.
+        When this times out or is cancelled, the command is withdrawn and undone. `abort_pending` ends it, and so does
+        a newer one that replaces it: both raise `CommandRejected` here.
         """
-        answer = self.expect(answers, judge)
+
+        def judged(message: Any) -> T | AnafiMavError | None:
+            verdict = judge(message)
+            if verdict is not None:
+                sent.apply(Event.REFUSED if isinstance(verdict, AnafiMavError) else Event.EXECUTED)
+            return verdict
+
+        answer = self.expect(answers, judged)
+        sent.answer = answer
         self.dispatch(answer, command, timeout)
-        kind = type(undo)
-        older = self._beginning.get(kind)
-        if older is not None:
-            older.answer.fail(CommandRejected("replaced by a newer order"))
-        mine = self._beginning[kind] = _Beginning(answer, undo)
+        for older in self.sent.place(sent, loop_time()):
+            older.answer.fail(CommandRejected("replaced by a newer command"))
         try:
             return await answer.wait()
-        except LinkLost:
+        except BaseException:
+            begins = sent.awaited or sent.phase is Phase.CONFIRMED
+            refused = sent.undo_refused and sent.phase is Phase.REFUSED
+            if (begins or refused) and self.sent.is_newest(sent):  # else it would end the newer one
+                self._withdraw(sent)
             raise
-        except BaseException as error:
-            refused = isinstance(error, CommandRejected)
-            if self._beginning.get(kind) is mine and (undo_refused or not refused):
-                self._abort(mine)
-            raise
-        finally:
-            if self._beginning.get(kind) is mine:
-                del self._beginning[kind]
 
-    def abort_pending(self, why: str, undo: type[Message] | None = None) -> None:
-        """Withdraw and undo the starts that have not been answered.
+    def abort_pending(self, why: str, *slots: Slot) -> None:
+        """Withdraw and undo the unanswered commands of these slots, by default of `AUTOMATIC`."""
+        for sent in self.sent.awaited(*(slots or AUTOMATIC)):
+            sent.answer.fail(CommandRejected(why))
+            self.cancel(sent.answer.token)
+            self._withdraw(sent)
 
-        With `undo` only those that this kind of command undoes, else all.
-        """
-        for kind, beginning in tuple(self._beginning.items()):
-            if undo not in (None, kind) or beginning.answer.future.done():
-                continue  # an answered one has begun, or never will; its verb does not know yet
-            del self._beginning[kind]
-            beginning.answer.fail(CommandRejected(why))
-            if beginning.answer.token is not None:
-                self.cancel(beginning.answer.token)
-            self._abort(beginning)
-
-    def _abort(self, beginning: _Beginning) -> None:
-        self._aborted[type(beginning.undo)] = loop_time()
-        self.send_stop_if_connected(beginning.undo)
-
-    def may_begin(self, undo: type[Message], memory: float) -> bool:
-        """Return True when something that this kind of command undoes can still begin.
-
-        It can while it is on its way, or when it was aborted less than `memory` s ago and the drone may have received
-        it already.
-        """
-        given_up = self._aborted.get(undo)
-        return undo in self._beginning or (given_up is not None and loop_time() - given_up < memory)
-
-    def rule_out(self, undo: type[Message]) -> None:
-        """Note that an aborted start has not begun, and will not.
-
-        The drone has received the command against it and reports nothing.
-        """
-        self._aborted.pop(undo, None)
+    def _withdraw(self, sent: SentCommand) -> None:
+        sent.apply(Event.WITHDRAWN, loop_time())
+        if sent.undo is not None:
+            self.send_stop_if_connected(sent.undo)
 
     def dispatch(self, expectation: Expectation[Any], command: Message, timeout: float, *, stops: bool = False) -> None:
         """Send the command whose answer is expected. `stops`: see `send`."""

@@ -12,15 +12,19 @@ import logging
 import os
 import re
 import socket
+import zlib
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from anafi_mav.clock import Clock
-from anafi_mav.mavlink.channel import QUEUE_BYTES, Channel
+from anafi_mav.clock import Alarm, Clock
+from anafi_mav.endpoint_options import DEFAULTS, MAX_KEY_NAME, EndpointOptions
+from anafi_mav.mavlink.byte_budget import ByteBudget
+from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.frames import ReceivedFrame
+from anafi_mav.mavlink.signing import Signing
 
 logger = logging.getLogger(__name__)
 
@@ -28,11 +32,12 @@ RETRY_FIRST, RETRY_LAST = 0.25, 4.0
 """s between attempts to open what the other side must provide: doubled from the first to the last. A ground station
 that restarts is back at once, one that is away for the night costs four system calls a minute."""
 
-MAX_PEERS = 32
-"""Clients of one listening endpoint. Each costs a frame per message; a field has a handful."""
-
 WRITE_AHEAD = 16 * 1024
 """Bytes that asyncio may hold for a full socket before the channel's own queue, which knows what to drop, begins."""
+
+QUEUE_S, MIN_QUEUE = 0.5, 2048
+"""s of a byte budget that may wait in a channel: streams that left it later would be history. And bytes: a burst of
+answers, however small the budget, not of streams."""
 
 LEAVE_TOGETHER = 4 * 1024
 """Most bytes of a stream that are gathered within one event-loop iteration."""
@@ -55,10 +60,28 @@ class EndpointUrl:
     """Host name or address; the device of a serial line."""
     number: int
     """Port, 0 for any free one; the baud rate of a serial line."""
-    flavour: str | None = None
-    """The autopilot that clients of this endpoint want to see."""
-    frames: str = "one"
-    """MAVLink frames per datagram, "one" or "many". A byte stream has no datagrams."""
+    options: EndpointOptions = DEFAULTS
+
+    @property
+    def is_loopback(self) -> bool:
+        """True when only programs of this computer can be at the other end."""
+        if self.scheme == "serial":
+            return False
+        try:
+            return self.place.rstrip(".").lower() == "localhost" or is_loopback(self.place)
+        except ValueError:
+            return False
+
+    @property
+    def key_name(self) -> str:
+        """Name of the endpoint's signing key.
+
+        Without a configured one it is that of the file that SETUP_SIGNING makes.
+        """
+        if self.options.signing is not None:
+            return self.options.signing
+        name = re.sub(r"[^A-Za-z0-9_.-]+", "-", f"{self.scheme}-{self.place}-{self.number}")
+        return name if len(name) <= MAX_KEY_NAME else f"{name[: MAX_KEY_NAME - 9]}-{zlib.crc32(name.encode()):08x}"
 
 
 class Sink(Protocol):
@@ -68,7 +91,13 @@ class Sink(Protocol):
 
     def closed(self, channel: Channel) -> None: ...
 
+    def proved(self, channel: Channel) -> None:
+        """Serve the peer of this channel, which has proved to be at its address, as every other."""
+
     def received(self, channel: Channel, frames: list[ReceivedFrame]) -> None: ...
+
+    def introduce(self, channel: Channel) -> None:
+        """Send one heartbeat over a channel that is not open."""
 
 
 class Endpoint(ABC):
@@ -78,8 +107,21 @@ class Endpoint(ABC):
         self.parsed = url
         self.counters: Counter[str] = Counter()
         """refused_peers, garbage_bytes and bad_checksums of senders that are no peer, reopened, send_errors."""
+        self.signing: Signing | None = None
+        """Its key, set before `open`; None where there is no place for keys."""
         self._sink = sink
         self._clock = clock
+
+    @property
+    def signing_note(self) -> str:
+        """For the end of a line for people; empty while frames are not signed."""
+        return f", signed with key {self.signing.name}" if self.signing is not None and self.signing.is_on else ""
+
+    def _protect(self, channel: Channel) -> None:
+        """Give a new channel the endpoint's key."""
+        channel.is_local = self.parsed.is_loopback
+        if self.signing is not None:
+            channel.protect(self.signing)
 
     @property
     def url(self) -> str:
@@ -166,6 +208,64 @@ class Outbox:
         self._write(frames[0] if len(frames) == 1 else b"".join(frames))
 
 
+class Shaper:
+    """Writes a channel's frames, and holds the channel back while its byte budget is spent.
+
+    The channel then queues, as for any slow line, and drops streams before answers.
+    """
+
+    def __init__(self, write: Callable[[bytes], None], bytes_per_second: float) -> None:
+        self.channel: Channel | None = None
+        """Set right after the channel is made, which needs `write`."""
+        self._write = write
+        self._budget = ByteBudget(bytes_per_second)
+        self._alarm = Alarm(self._resume)
+
+    def write(self, raw: bytes) -> None:
+        """Write a frame."""
+        self._write(raw)
+        assert self.channel is not None
+        assert self.channel.pace is not None
+        now = asyncio.get_running_loop().time()
+        wait = self._budget.spend(len(raw), now)
+        self.channel.pace.adjust(now)
+        if wait:
+            self.channel.pause(self)
+            self._alarm.set(now + wait)
+
+    def _resume(self) -> None:
+        if self.channel is not None:
+            self.channel.resume(self)
+
+
+def shaped_channel(
+    name: str,
+    write: Callable[[bytes], None],
+    options: EndpointOptions,
+    *,
+    datagrams: bool = False,
+    line: float | None = None,
+) -> Channel:
+    """Return a channel that keeps to the byte budget of its options.
+
+    `line`: bytes/s of the line that it leads to; None where that is not known.
+    """
+    rate = options.bytes_per_second if line is None else min(line, options.bytes_per_second or line)
+    if rate is None:
+        return Channel(name, write, options=options, datagrams=datagrams)
+    shaper = Shaper(write, rate)
+    shaper.channel = Channel(
+        name,
+        shaper.write,
+        options=options,
+        datagrams=datagrams,
+        queue_bytes=max(MIN_QUEUE, round(rate * QUEUE_S)),
+        stream_bytes=round(rate * QUEUE_S),
+        bytes_per_second=rate,
+    )
+    return shaper.channel
+
+
 class StreamPeer(asyncio.Protocol):
     """A byte stream to one peer: glue between an asyncio transport and a channel."""
 
@@ -176,17 +276,14 @@ class StreamPeer(asyncio.Protocol):
         sink: Sink,
         *,
         write_ahead: int = WRITE_AHEAD,
-        queue_bytes: int = QUEUE_BYTES,
-        bytes_per_second: float | None = None,
+        line: float | None = None,
     ) -> None:
         self.lost: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._sink = sink
         self._write_ahead = write_ahead
         self._transport: asyncio.Transport | None = None
         self._outbox = Outbox(self._write, min(LEAVE_TOGETHER, write_ahead))
-        self.channel = Channel(
-            name, self._outbox.add, flavour=url.flavour, queue_bytes=queue_bytes, bytes_per_second=bytes_per_second
-        )
+        self.channel = shaped_channel(name, self._outbox.add, url.options, line=line)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         # Duck-typed by pyserial-asyncio-fast's transport, too.
@@ -197,8 +294,14 @@ class StreamPeer(asyncio.Protocol):
         self._sink.opened(self.channel)
 
     def data_received(self, data: bytes) -> None:
+        frames = self.channel.receive(data)
+        if self.channel.is_proved_by(frames):
+            self.heard()
         with self._outbox:
-            self._sink.received(self.channel, self.channel.receive(data))
+            self._sink.received(self.channel, frames)
+
+    def heard(self) -> None:
+        """Frames have arrived: on a signed endpoint, verified ones."""
 
     def pause_writing(self) -> None:
         self.channel.pause()
@@ -254,6 +357,13 @@ def routed_host(peer: Any) -> str | None:
             return seen_host(probe.getsockname(), peer)
     except OSError:
         return None
+
+
+def is_loopback(host: str) -> bool:
+    """Return True for an address of this computer that no other can send from."""
+    address = ipaddress.ip_address(host.partition("%")[0])
+    mapped = address.ipv4_mapped if isinstance(address, ipaddress.IPv6Address) else None
+    return (mapped or address).is_loopback
 
 
 async def close_peers(peers: Iterable[StreamPeer]) -> None:

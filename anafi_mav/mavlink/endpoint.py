@@ -3,8 +3,8 @@
 Endpoints and the command line's help are made from that table.
 
     udpout://HOST:PORT      udpin://HOST:PORT      tcpin://HOST:PORT      tcpout://HOST:PORT
-    serial://DEVICE:BAUD    each with ?flavour=NAME, one of those that the caller knows
-    The two of UDP also with frames=one or frames=many; two options are joined by &.
+    serial://DEVICE:BAUD    each with ?option=value, those of `endpoint_options` that make sense for it
+    Several options are joined by &, the elements of a list by commas.
 
 The names are MAVSDK's. An endpoint listens on the address in its URL and no other: beyond loopback only if that says
 so.
@@ -12,21 +12,28 @@ so.
 
 from __future__ import annotations
 
-import ipaddress
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from urllib.parse import parse_qsl
 
 from anafi_mav.clock import Clock
+from anafi_mav.endpoint_options import DEFAULTS, EndpointConfig, EndpointOptions, from_texts
 from anafi_mav.errors import ConfigError
+from anafi_mav.mavlink.access import MESSAGE_IDS
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, Sink
 from anafi_mav.mavlink.serial_line import SerialLine
 from anafi_mav.mavlink.tcp import TcpIn, TcpOut
 from anafi_mav.mavlink.udp import UdpIn, UdpOut
 
-FRAMES = ("one", "many")
-"""MAVLink frames per UDP datagram."""
+COMMON = ("flavour", "access", "systems", "allow_messages", "block_messages", "bytes_per_second", "signing")
+"""Options of every endpoint."""
+
+OF_DATAGRAMS = ("frames", "datagram_bytes")
+"""Options of an endpoint that sends datagrams."""
+
+OF_LISTENERS = ("max_clients", "idle_limit", "allowed_peers")
+"""Options of an endpoint that waits for clients."""
 
 MAX_PORT = 65535
 MAX_BAUD = 4_000_000
@@ -44,11 +51,12 @@ class Scheme:
     listens: bool = False
     """It waits for clients at an address of this machine. Port 0, any free one, makes sense."""
     datagrams: bool = False
-    """It sends datagrams, so that `frames` makes sense."""
+    """It sends datagrams."""
 
-    def options(self, flavours: Sequence[str]) -> dict[str, Sequence[str]]:
-        """Option name → its possible values."""
-        return {"flavour": flavours, "frames": FRAMES} if self.datagrams else {"flavour": flavours}
+    @property
+    def options(self) -> tuple[str, ...]:
+        """The names of the options that make sense for it."""
+        return (*COMMON, *(OF_DATAGRAMS if self.datagrams else ()), *(OF_LISTENERS if self.listens else ()))
 
 
 SCHEMES: dict[str, Scheme] = {
@@ -71,30 +79,93 @@ _PLACE = re.compile(
 _LINE = re.compile(r"(?P<device>[^:]+):(?P<number>[0-9]{1,7})")
 
 
-def parse_endpoint(url: str, flavours: Sequence[str] = ()) -> EndpointUrl:
-    """The parts of a URL. Raises `ConfigError`, without a key path, that says what was expected.
+def parse_endpoint(entry: str | EndpointConfig, flavours: Sequence[str] = ()) -> EndpointUrl:
+    """Return the parts of a URL, or of a mapping with one.
 
-    `flavours` are the names of the autopilots that a client can be shown: what they mean is the business of services.
+    Raises `ConfigError` that says what was expected. Its key path is the wrong key of a mapping, and empty for a URL,
+    which is in the text. `flavours` are the names of the autopilots that a client can be shown: what they mean is the
+    business of services.
     """
+    if isinstance(entry, str):
+        url = _parse_url(entry)
+        try:
+            return _checked(url, flavours)
+        except ConfigError as error:
+            raise _of_url(entry, error) from error
+    try:
+        url = _parse_url(entry.url)
+    except ConfigError as error:
+        raise ConfigError("url", error.problem) from error
+    if "?" in entry.url:
+        raise ConfigError("url", f"{entry.url!r}: expected the options as keys beside url, or all of them in one URL")
+    return _checked(replace(url, options=entry.options), flavours)
+
+
+def _parse_url(url: str) -> EndpointUrl:
+    """Return the parts of a URL, with unchecked options."""
     parts = _URL.fullmatch(url)
     scheme = SCHEMES.get(parts["scheme"]) if parts else None
     if parts is None or scheme is None:
         kinds = ", ".join(f"{name}://" for name in SCHEMES)
         raise ConfigError("", f"{url!r}: expected a URL that begins with one of {kinds}")
     name = parts["scheme"]
-    form, known = f"{name}://{scheme.arguments}", scheme.options(flavours)
+    form = f"{name}://{scheme.arguments}"
     if name == "serial":
         place = _LINE.fullmatch(parts["rest"])
         if place is None or not 0 < int(place["number"]) <= MAX_BAUD:
             raise ConfigError("", f"{url!r}: expected {form}, e.g. serial:///dev/ttyUSB0:57600")
-        return EndpointUrl(url, name, place["device"], int(place["number"]), **_options(url, known, parts["query"]))
+        return EndpointUrl(url, name, place["device"], int(place["number"]), _options(url, parts["query"]))
     place = _PLACE.fullmatch(parts["rest"])
     if place is None:
         raise ConfigError("", f"{url!r}: expected {form}, e.g. {name}://127.0.0.1:14550")
     port, lowest = int(place["number"]), 0 if scheme.listens else 1
     if not lowest <= port <= MAX_PORT:
         raise ConfigError("", f"{url!r}: expected a port from {lowest} to {MAX_PORT}")
-    return EndpointUrl(url, name, place["v6"] or place["host"], port, **_options(url, known, parts["query"]))
+    return EndpointUrl(url, name, place["v6"] or place["host"], port, _options(url, parts["query"]))
+
+
+def _options(url: str, query: str | None) -> EndpointOptions:
+    """Return the options after "?". Raises `ConfigError` for an unknown, repeated or wrong one."""
+    if query is None:
+        return DEFAULTS
+    try:
+        pairs = parse_qsl(query, strict_parsing=True, keep_blank_values=True)
+    except ValueError:
+        pairs = []
+    if not pairs or len(dict(pairs)) != len(pairs):
+        raise ConfigError("", f"{url!r}: expected options like ?flavour=px4&access=observe, each once")
+    try:
+        return from_texts(dict(pairs))
+    except ConfigError as error:
+        raise _of_url(url, error) from error
+
+
+def _of_url(url: str, error: ConfigError) -> ConfigError:
+    return ConfigError("", f"{url!r}: {error.key_path}: {error.problem}")
+
+
+def _checked(url: EndpointUrl, flavours: Sequence[str]) -> EndpointUrl:
+    """Return the URL if its options fit it.
+
+    Raises `ConfigError` with the option's name as key path.
+    """
+    options, scheme = url.options, SCHEMES[url.scheme]
+    for name in options.changed():
+        if name not in scheme.options:
+            known = ", ".join(scheme.options)
+            raise ConfigError(name, f"expected none for {url.scheme}://, whose options are {known}")
+    if options.flavour is not None and options.flavour not in flavours:
+        *most, last = flavours or ("",)
+        wanted = f"{', '.join(most)} or {last}" if most else last
+        raise ConfigError("flavour", f"expected {wanted}, got {options.flavour!r}")
+    for name in ("allow_messages", "block_messages"):
+        for message in getattr(options, name):
+            if message not in MESSAGE_IDS:
+                raise ConfigError(name, f"expected the name of a message like ATTITUDE, got {message!r}")
+    options.system_ids, options.networks  # noqa: B018  # raise for what their patterns let through
+    if options.datagram_bytes != DEFAULTS.datagram_bytes and options.frames == "one":
+        raise ConfigError("datagram_bytes", "expected it together with frames many")
+    return url
 
 
 def is_open_to_network(url: EndpointUrl) -> bool:
@@ -102,32 +173,9 @@ def is_open_to_network(url: EndpointUrl) -> bool:
 
     It listens, and on more than this machine's loopback.
     """
-    if not SCHEMES[url.scheme].listens or url.place.rstrip(".").lower() == "localhost":
-        return False
-    try:
-        return not ipaddress.ip_address(url.place.partition("%")[0]).is_loopback
-    except ValueError:
-        return True
+    return SCHEMES[url.scheme].listens and not url.is_loopback
 
 
 def make_endpoint(url: EndpointUrl, sink: Sink, clock: Clock) -> Endpoint:
     """The endpoint of a parsed URL, not open yet."""
     return SCHEMES[url.scheme].factory(url, sink, clock)
-
-
-def _options(url: str, known: Mapping[str, Sequence[str]], query: str | None) -> dict[str, str]:
-    """The options after "?". Raises `ConfigError` for an unknown, repeated or wrong one."""
-    if query is None:
-        return {}
-    try:
-        pairs = parse_qsl(query, strict_parsing=True, keep_blank_values=True)
-    except ValueError:
-        pairs = []
-    options = dict(pairs)
-    if not pairs or len(options) != len(pairs) or not options.keys() <= known.keys():
-        forms = " and ".join(f"{name}={'|'.join(values)}" for name, values in known.items())
-        raise ConfigError("", f"{url!r}: expected no option but ?{forms}, each once")
-    for name, value in options.items():
-        if value not in known[name]:
-            raise ConfigError("", f"{url!r}: expected {name} {' or '.join(known[name])}, got {value!r}")
-    return options

@@ -12,6 +12,7 @@ import re
 import struct
 from collections import Counter
 from collections.abc import Callable
+from enum import Enum
 from operator import attrgetter
 from typing import Any, NamedTuple
 
@@ -29,6 +30,9 @@ CHECKSUM, SIGNATURE = 2, 13
 SIGNED = 0x01
 """The only incompatibility flag there is; a frame with another one must be discarded (serialization.md)."""
 
+FRAME_BYTES = HEADER_2 + CHECKSUM
+"""A version 2 frame has so much more than its payload (MAVLink serialization.md §mavlink2_packet_format)."""
+
 MAX_FRAME = HEADER_2 + 255 + CHECKSUM + SIGNATURE
 """The most that a parser holds back while it waits for what comes next."""
 
@@ -37,9 +41,33 @@ MAX_SOURCES = 256
 
 _BODY = struct.Struct("<BBBBBBHB")
 _CHECKSUM = struct.Struct("<H")
-_crc: Callable[[bytes], int] = fastcrc.crc16.mcrf4xx
+_crc: Callable[..., int] = fastcrc.crc16.mcrf4xx
 _EXTRA = {id: bytes((kind.crc_extra,)) for id, kind in dialect.mavlink_map.items()}
 _NEXT_MAGIC = re.compile(rb"[\xfd\xfe]")
+
+
+class Verdict(Enum):
+    """Result of looking at a frame's signature. The values of refusals are names of counters."""
+
+    UNCHECKED = ""
+    """The endpoint has no key."""
+    VERIFIED = "verified"
+    ALLOWED = "allowed"
+    """Without a valid signature, but accepted: its sender cannot sign."""
+    UNSIGNED = "refused_unsigned"
+    FORGED = "refused_signature"
+    """The signature is of another key, or of another frame."""
+    REPLAYED = "refused_replay"
+    """The signature is right and the timestamp is not newer than one that was accepted."""
+
+    is_refusal: bool
+
+    def __init__(self, counter: str) -> None:
+        self.is_refusal = counter.startswith("refused")
+
+
+Judge = Callable[[bytes, int], Verdict]
+"""Takes a frame with a right checksum and its message id."""
 
 
 class Packed(NamedTuple):
@@ -65,11 +93,28 @@ def pack(message: dialect.MAVLink_message) -> Packed:
     return Packed(kind.id, payload.rstrip(b"\0") or payload[:1])
 
 
-def frame(packed: Packed, seq: int, sysid: int, compid: int) -> bytes:
-    """The version 2 frame of a packed message."""
+def frame(packed: Packed, seq: int, sysid: int, compid: int, flags: int = 0) -> bytes:
+    """The version 2 frame of a packed message.
+
+    With the flag `SIGNED` a signature has to follow.
+    """
     id, payload = packed
-    body = _BODY.pack(len(payload), 0, 0, seq, sysid, compid, id & 0xFFFF, id >> 16) + payload
+    body = _BODY.pack(len(payload), flags, 0, seq, sysid, compid, id & 0xFFFF, id >> 16) + payload
     return b"\xfd" + body + _CHECKSUM.pack(_crc(body + _EXTRA[id]))
+
+
+def with_flags(raw: bytes, flags: int) -> bytes:
+    """Return a version 2 frame without its signature and with these incompatibility flags.
+
+    A CRC is linear, so the checksum changes by that of the changed bit, whatever the message's CRC_EXTRA is: frames
+    with ids that are in none of our definitions are no exception.
+    """
+    end = HEADER_2 + raw[1]
+    if raw[2] == flags:
+        return raw[: end + CHECKSUM]
+    change = bytes((0, raw[2] ^ flags)) + bytes(end - 2)
+    checksum = (raw[end] | raw[end + 1] << 8) ^ _crc(change, 0)
+    return raw[:2] + bytes((flags,)) + raw[3:end] + _CHECKSUM.pack(checksum)
 
 
 _packers: dict[type[dialect.MAVLink_message], Callable[[Any], bytes]] = {}
@@ -174,6 +219,14 @@ class ReceivedFrame(msgspec.Struct, frozen=True):
     sysid: int
     compid: int
     raw: bytes
+    verdict: Verdict = Verdict.UNCHECKED
+    """Of its signature."""
+
+    @property
+    def identity(self) -> bytes:
+        """Return what no router on its way changes: sequence number, sender and message."""
+        raw = self.version_2()
+        return raw[4 : HEADER_2 + raw[1]]
 
     def version_2(self) -> bytes:
         """Return the frame in MAVLink 2, as it is forwarded.
@@ -196,12 +249,16 @@ class Parser:
     that we do not know have no checksum to test; they pass only from a source that has sent a message with a good
     one, and
     only if another start mark, or the end of the datagram, follows.
+
+    Of an endpoint with a key, `judge` decides about each frame with a good checksum; ids that we do not know need a
+    valid signature there. Refused frames are counted, and are no frames for what follows.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, judge: Judge | None = None) -> None:
         self.counters: Counter[str] = Counter()
         """frames, unknown_frames, bad_checksums (start marks with a plausible header that were none), garbage_bytes,
-        lost_frames (by the gaps in their senders' numbers)."""
+        lost_frames (by the gaps in their senders' numbers), and the refusals among `Verdict`."""
+        self._judge = judge
         self._pending = b""
         self._sources: dict[tuple[int, int], int] = {}
         """(system, component) that has sent a good frame -> sequence number of its last one."""
@@ -246,10 +303,15 @@ class Parser:
             if length and end > size:
                 return found, position
             received = self._decode(buffer[position:end]) if length else None
+            if received is not None and received.verdict.is_refusal:
+                self.counters[received.verdict.value] += 1
+                position = end
+                continue
             if received is not None and received.message is None:
-                if end == size and not whole:
+                is_certain = received.verdict is Verdict.VERIFIED
+                if end == size and not whole and not is_certain:
                     return found, position
-                if end < size and buffer[end] not in _MAGICS:
+                if end < size and buffer[end] not in _MAGICS and not is_certain:
                     received = None
                 else:
                     self.counters["unknown_frames"] += 1
@@ -294,11 +356,16 @@ class Parser:
             begin, id = HEADER_2, low | middle << 8 | high << 16
         extra = _EXTRA.get(id)
         if extra is None:
-            return ReceivedFrame(None, id, sysid, compid, raw)
+            verdict = Verdict.UNCHECKED if self._judge is None else self._judge(raw, id)
+            # Without a checksum that can be tested, nothing but a good signature says that this is a frame.
+            return None if verdict.is_refusal else ReceivedFrame(None, id, sysid, compid, raw, verdict)
         end = begin + size
         if _crc(raw[1:end] + extra) != raw[end] | raw[end + 1] << 8:
             self.counters["bad_checksums"] += 1
             return None
+        verdict = Verdict.UNCHECKED if self._judge is None else self._judge(raw, id)
+        if verdict.is_refusal:
+            return ReceivedFrame(None, id, sysid, compid, raw, verdict)
         message = unpack(id, raw[begin:end])
         message._header = dialect.MAVLink_header(id, flags, compatible, size, seq, sysid, compid)
         self.counters["frames"] += 1
@@ -308,7 +375,7 @@ class Parser:
             self.counters["lost_frames"] += gap
         if last is not None or len(self._sources) < MAX_SOURCES:
             self._sources[source] = seq
-        return ReceivedFrame(message, id, sysid, compid, raw)
+        return ReceivedFrame(message, id, sysid, compid, raw, verdict)
 
 
 def _base_length(kind: type[dialect.MAVLink_message]) -> int:

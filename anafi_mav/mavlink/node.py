@@ -12,18 +12,22 @@ import asyncio
 import logging
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import msgspec
 
 from anafi_mav.clock import Clock, SystemClock
+from anafi_mav.endpoint_options import EndpointConfig
 from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.base import Endpoint, reason
+from anafi_mav.mavlink.access import Access, needed_access
+from anafi_mav.mavlink.base import Endpoint, EndpointUrl, reason
 from anafi_mav.mavlink.channel import Channel, total
 from anafi_mav.mavlink.endpoint import make_endpoint, parse_endpoint
-from anafi_mav.mavlink.frames import ReceivedFrame, pack
-from anafi_mav.mavlink.router import Router
+from anafi_mav.mavlink.frames import Packed, ReceivedFrame, pack
+from anafi_mav.mavlink.key_ring import KeyRing
+from anafi_mav.mavlink.router import Route, Router, targets
+from anafi_mav.mavlink.signing import Signing
 from anafi_mav.mavlink.stall import StallWatch
 
 logger = logging.getLogger(__name__)
@@ -44,10 +48,25 @@ class Inbound(msgspec.Struct, frozen=True):
     """Component id of the sender."""
     now: float
     """When it arrived, by the clock's monotonic time."""
+    is_permitted: bool = True
+    """False when it needs more than the access of its channel: it must have no effect."""
 
 
 Receiver = Callable[[Inbound], None]
 """Takes the messages for one of our hosts."""
+
+
+class FrameTap(Protocol):
+    """Sees what passes a node beside its channels: for a recording."""
+
+    def sent(self, packed: Packed, sysid: int, compid: int) -> None: ...
+
+    def received(self, frame: ReceivedFrame) -> None: ...
+
+
+def _log_change(change: str, channel: Channel) -> None:
+    """Log that a channel opened or closed. One per made-up address would fill the log."""
+    logger.log(logging.INFO if channel.proof is None else logging.DEBUG, "%s: %s", channel.name, change)
 
 
 class Node:
@@ -59,37 +78,54 @@ class Node:
         on_channel: Callable[[Channel, bool], None] | None = None,
         clock: Clock | None = None,
         flavours: Sequence[str] = (),
+        keys: KeyRing | None = None,
+        on_setup_signing: Receiver | None = None,
     ) -> None:
-        """`flavours` are those that the URL of an endpoint may name."""
+        """`flavours` are those that the URL of an endpoint may name.
+
+        `keys`: the signing keys; None: no endpoint signs. `on_setup_signing` receives SETUP_SIGNING in place of the
+        host that it is for: the key in it belongs to the endpoint. None: it is dropped.
+        """
         self.on_channel = on_channel
         """Called with True when a channel opened and with False when it closed."""
         self.channels: list[Channel] = []
         """The channels that are open now. A new list whenever they change: safe to iterate over while sending."""
         self.endpoints: list[Endpoint] = []
         """In the order of the URLs."""
+        self.tap: FrameTap | None = None
+        """Sees messages to single channels, and received frames."""
         self._clock = clock or SystemClock()
         self._telemetry: set[int] = set()
         self._router: Router[Channel, Receiver] = Router()
         self._delivers = True
         self._flavours = flavours
+        self._keys = keys
+        self._on_setup_signing = on_setup_signing
+        self._heartbeats: dict[tuple[int, int], Packed] = {}
+        """The newest of each of our components; without those of autopilots, which depend on the flavour."""
         self._closed_counters: Counter[str] = Counter()
         self._stalls: StallWatch | None = None
 
-    async def start(self, urls: Sequence[str]) -> None:
-        """Open an endpoint for each URL.
+    async def start(self, entries: Sequence[str | EndpointConfig]) -> None:
+        """Open an endpoint for each URL, or mapping with one.
 
         Raises `ConfigError` with key path "endpoints[i]"; nothing is left open.
         """
         self._stalls = StallWatch(self._stalled)
         self._stalls.start()
         parsed = []
-        for index, text in enumerate(urls):
+        for index, entry in enumerate(entries):
             try:
-                parsed.append(parse_endpoint(text, self._flavours))
+                parsed.append(parse_endpoint(entry, self._flavours))
             except ConfigError as error:
-                raise ConfigError(f"endpoints[{index}]", error.problem) from error
+                key = f".{error.key_path}" if error.key_path else ""
+                raise ConfigError(f"endpoints[{index}]{key}", error.problem) from error
+        signings = [self._signing(index, url) for index, url in enumerate(parsed)]
+        if self._keys is not None:
+            await self._keys.start()
         for index, url in enumerate(parsed):
             endpoint = make_endpoint(url, self, self._clock)
+            endpoint.signing = signings[index]
             try:
                 await endpoint.open()
             except OSError as error:
@@ -107,6 +143,18 @@ class Node:
             self._stalls.stop()
         while self.endpoints:
             await self.endpoints.pop().close()
+        if self._keys is not None:
+            await self._keys.close()
+
+    def _signing(self, index: int, url: EndpointUrl) -> Signing | None:
+        if self._keys is None:
+            if url.options.signing is None:
+                return None
+            raise ConfigError(f"endpoints[{index}].signing", "expected none: this program has no keys")
+        try:
+            return self._keys.open(url.key_name, is_required=url.options.signing is not None)
+        except ConfigError as error:
+            raise ConfigError(f"endpoints[{index}].signing", error.problem) from error
 
     def add_host(self, sysid: int, compid: int, host: Receiver) -> None:
         """Deliver messages for this component of this system to `host`.
@@ -118,6 +166,7 @@ class Node:
     def remove_hosts(self, sysid: int) -> None:
         """Stop delivering messages for this system, and route them to other systems with its id."""
         self._router.remove_hosts(sysid)
+        self._heartbeats = {source: packed for source, packed in self._heartbeats.items() if source[0] != sysid}
 
     def add_telemetry(self, ids: Iterable[int]) -> None:
         """Let messages with these ids give way when they are forwarded for other systems."""
@@ -145,11 +194,23 @@ class Node:
         """
         self._router.own_sources.add((sysid, compid))
         packed = pack(message)
+        if packed.id == dialect.MAVLINK_MSG_ID_HEARTBEAT and compid != dialect.MAV_COMP_ID_AUTOPILOT1:
+            self._heartbeats[sysid, compid] = packed
         if isinstance(to, Channel):
-            to.send_packed(packed, sysid, compid, give_way=give_way)
+            to.send_packed(packed, sysid, compid, give_way=give_way, is_answer=True)
+            if self.tap is not None:
+                self._guarded(self.tap.sent, packed, sysid, compid)
             return
         for channel in self.channels if to is None else to:
             channel.send_packed(packed, sysid, compid, give_way=give_way)
+
+    def sources(self, channel: Channel) -> list[tuple[int, int]]:
+        """Return the systems and components heard on a channel, sorted."""
+        return self._router.sources(channel)
+
+    def loop_delays(self) -> list[float]:
+        """Return how late the event loop ran its timers within the last minute, s."""
+        return [] if self._stalls is None else list(self._stalls.delays)
 
     def counters(self) -> Counter[str]:
         """Everything counted since the start: by channels, endpoints and the router."""
@@ -161,37 +222,90 @@ class Node:
     # What endpoints report.
 
     def opened(self, channel: Channel) -> None:
-        logger.info("%s: open", channel.name)
+        _log_change("open", channel)
         self._router.add(channel)
         self.channels = [*self.channels, channel]
         if self.on_channel is not None:
             self._guarded(self.on_channel, channel, True)
 
+    def proved(self, channel: Channel) -> None:
+        logger.info("%s: proved its address", channel.name)
+        self.channels = [*self.channels]
+
     def closed(self, channel: Channel) -> None:
-        logger.info("%s: closed", channel.name)
+        _log_change("closed", channel)
         self._router.remove(channel)
         self.channels = [other for other in self.channels if other is not channel]
         self._closed_counters.update(total([channel]))
         if self.on_channel is not None:
             self._guarded(self.on_channel, channel, False)
 
+    def introduce(self, channel: Channel) -> None:
+        for (sysid, compid), packed in self._heartbeats.items():
+            if channel.has_system(sysid):
+                channel.send_packed(packed, sysid, compid)
+                return
+
     def received(self, channel: Channel, frames: list[ReceivedFrame]) -> None:
         now, old = self._clock.monotonic(), self._stalls is not None and self._stalls.old
+        if frames:
+            channel.heard_at = now
         for received in frames:
-            route = self._router.route(channel, received, now)
+            if self.tap is not None:
+                self._guarded(self.tap.received, received)
+            permitted = channel.access is Access.ALL or self._permits(channel, received)
+            may_forward = permitted and (channel.access is not Access.OBSERVE or self._is_harmless(channel, received))
+            route = self._router.route(channel, received, now, channel.system_ids, may_forward=may_forward)
             if route.forward:
-                raw = received.version_2()
-                for other in route.forward:
-                    other.forward(raw, give_way=received.id in self._telemetry)
+                self._forward(channel, received, route)
             if not route.hosts or not self._delivers:
                 continue
             if old:
                 self._closed_counters["stale"] += 1
                 continue
+            if received.id == dialect.MAVLINK_MSG_ID_SETUP_SIGNING:
+                # Before the log and the hosts: it holds a key.
+                if self._on_setup_signing is not None:
+                    inbound = Inbound(received.message, channel, received.sysid, received.compid, now, permitted)
+                    self._guarded(self._on_setup_signing, inbound)
+                continue
             message_logger.debug("%s: %s", channel.name, received.message)
-            inbound = Inbound(received.message, channel, received.sysid, received.compid, now)
+            inbound = Inbound(received.message, channel, received.sysid, received.compid, now, permitted)
             for host in route.hosts:
                 self._guarded(host, inbound)
+
+    def _forward(self, channel: Channel, received: ReceivedFrame, route: Route[Channel, Receiver]) -> None:
+        give_way, is_answer = received.id in self._telemetry, targets(received.message)[0] != 0
+        for other in route.forward:
+            if not other.has_system(received.sysid) or (give_way and not other.can_stream(received.id)):
+                other.counters["filtered_frames"] += 1
+            elif (raw := other.prepare_forward(received, channel)) is not None:
+                other.forward(raw, give_way=give_way, is_answer=is_answer)
+
+    def _permits(self, channel: Channel, received: ReceivedFrame) -> bool:
+        """Return True if the channel's access covers a frame; otherwise it is counted."""
+        if needed_access(received.message) <= channel.access:
+            return True
+        name = "unknown" if received.message is None else received.message.get_type()
+        channel.counters["refused_access"] += 1
+        channel.counters[f"refused_access.{name}"] += 1
+        return False
+
+    def _is_harmless(self, channel: Channel, received: ReceivedFrame) -> bool:
+        """Return True if a permitted frame of an observer deceives no other client.
+
+        It is a station's heartbeat or for one system, and not in the name of a system of ours, or of one behind a
+        channel with more access.
+        """
+        named = self._router.is_ours(received.sysid) or any(
+            other.access > channel.access for other in self._router.heard_on(received.sysid)
+        )
+        message = received.message
+        is_station = isinstance(message, dialect.MAVLink_heartbeat_message) and message.type == dialect.MAV_TYPE_GCS
+        if not named and (is_station or targets(message)[0] != 0):
+            return True
+        channel.counters["refused_observer"] += 1
+        return False
 
     def _stalled(self, seconds: float) -> None:
         logger.warning("the host stalled for %.1f s: what clients sent meanwhile is dropped", seconds)

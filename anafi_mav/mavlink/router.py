@@ -8,13 +8,13 @@ again, for endpoints are easily wired into a ring, and SETUP_SIGNING, which carr
 from __future__ import annotations
 
 from collections import Counter, OrderedDict
-from collections.abc import Hashable
+from collections.abc import Container, Hashable
 from typing import Generic, TypeVar
 
 import msgspec
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.frames import MAX_SOURCES, ReceivedFrame
+from anafi_mav.mavlink.frames import MAX_SOURCES, ReceivedFrame, Verdict
 
 KeyT = TypeVar("KeyT", bound=Hashable)
 HostT = TypeVar("HostT")
@@ -47,7 +47,8 @@ class Router(Generic[KeyT, HostT]):
 
     def __init__(self) -> None:
         self.counters: Counter[str] = Counter()
-        """forwarded (per channel), own_sources (a frame in one of our names came in), rings, sources_ignored."""
+        """forwarded (per channel), own_sources (a frame in one of our names came in), rings, sources_ignored,
+        refused_systems (for a system that the channel does not reach)."""
         self._channels: dict[KeyT, set[tuple[int, int]]] = {}
         self._hosts: dict[int, dict[int, HostT]] = {}
         """Our hosts by system and component, in that order."""
@@ -75,16 +76,22 @@ class Router(Generic[KeyT, HostT]):
         """This system is not ours at present, e.g. because its drone is disconnected."""
         self._hosts.pop(sysid, None)
 
-    def hosts(self, system: int, component: int) -> tuple[HostT, ...]:
-        """Return our hosts that a target addresses.
+    def hosts(self, system: int, component: int, reached: Container[int] | None = None) -> tuple[HostT, ...]:
+        """Return our hosts that a target addresses, of the systems in `reached` (None: of all).
 
         System 0 means all systems, component 0 all components.
         """
         systems = self._hosts if system == 0 else {system: self._hosts.get(system, {})}
+        if reached is not None:
+            systems = {system: hosts for system, hosts in systems.items() if system in reached}
         if component == EVERY_COMPONENT:
             return tuple([host for hosts in systems.values() for host in hosts.values()])
         found = [hosts.get(component, hosts.get(EVERY_COMPONENT)) for hosts in systems.values()]
         return tuple([host for host in found if host is not None])
+
+    def is_ours(self, sysid: int) -> bool:
+        """Return True for a system that has a host of ours."""
+        return sysid in self._hosts
 
     def heard_on(self, sysid: int, compid: int | None = None) -> list[KeyT]:
         """The channels on which this system, or this component of it, has been heard."""
@@ -93,21 +100,40 @@ class Router(Generic[KeyT, HostT]):
             return [channel for channel, sources in channels if (sysid, compid) in sources]
         return [channel for channel, sources in channels if any(source[0] == sysid for source in sources)]
 
-    def route(self, channel: KeyT, received: ReceivedFrame, now: float) -> Route[KeyT, HostT]:
-        """Return the destinations of a frame from this channel, and learn its source."""
+    def sources(self, channel: KeyT) -> list[tuple[int, int]]:
+        """Return the systems and components heard on a channel, sorted."""
+        return sorted(self._channels.get(channel, ()))
+
+    def route(
+        self,
+        channel: KeyT,
+        received: ReceivedFrame,
+        now: float,
+        reached: Container[int] | None = None,
+        *,
+        may_forward: bool = True,
+    ) -> Route[KeyT, HostT]:
+        """Return the destinations of a frame from this channel, and learn its source.
+
+        `reached`: the systems that the channel reaches; None: all. `may_forward` is False for a frame that goes to our
+        hosts alone: it then takes no place from the same frame on a channel that may send it.
+        """
         source = (received.sysid, received.compid)
         if source in self.own_sources:
             self.counters["own_sources"] += 1
             return Route((), ())
         # 0 is the address of all, nobody's name.
-        if received.message is not None and received.sysid != 0:
+        if received.message is not None and received.sysid != 0 and received.verdict is not Verdict.ALLOWED:
             self._learn(channel, source)
         target, component = targets(received.message)
-        hosts = () if received.message is None else self.hosts(target, component)
-        destinations = self._destinations(target, component, received.id)
+        hosts = () if received.message is None else self.hosts(target, component, reached)
+        destinations = self._destinations(target, component, received.id) if may_forward else []
+        if reached is not None and target != 0 and target not in reached:
+            self.counters["refused_systems"] += 1
+            destinations = []
         forward = tuple([other for other in destinations if other != channel])
         if forward:
-            if self._is_repeated(received.raw, now):
+            if self._is_repeated(received.identity, now):
                 self.counters["rings"] += 1
                 forward = ()
             self.counters["forwarded"] += len(forward)
@@ -132,12 +158,12 @@ class Router(Generic[KeyT, HostT]):
         else:
             self.counters["sources_ignored"] += 1
 
-    def _is_repeated(self, raw: bytes, now: float) -> bool:
-        last = self._recent.get(raw)
+    def _is_repeated(self, identity: bytes, now: float) -> bool:
+        last = self._recent.get(identity)
         if last is not None and now - last < RING_WINDOW:
             return True  # the first time stays: a sender without sequence numbers gets a frame through now and then
-        self._recent.pop(raw, None)
-        self._recent[raw] = now
+        self._recent.pop(identity, None)
+        self._recent[identity] = now
         if len(self._recent) > RING_FRAMES:
             self._recent.popitem(last=False)
         return False

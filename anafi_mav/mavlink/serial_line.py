@@ -20,12 +20,15 @@ from anafi_mav.mavlink.base import EndpointUrl, Reopening, Sink, StreamPeer, rea
 BITS_PER_BYTE = 10
 """8 data bits, start and stop."""
 
-WRITE_AHEAD_S, QUEUE_S = 0.1, 0.5
-"""s of the line's own speed that may wait outside and inside the channel: telemetry that left the queue later than
-this would be history. The kernel holds some 4 KB more."""
+WRITE_AHEAD_S = 0.1
+"""s of the line's own speed that may wait outside the channel. The kernel holds some 4 KB more."""
 
-MIN_WRITE_AHEAD, MIN_QUEUE = 280, 2048
-"""Bytes: one frame, and a burst of answers, on however slow a line."""
+MIN_WRITE_AHEAD = 280
+"""Bytes: one frame, on however slow a line."""
+
+RADIO_BAUD, RADIO_BYTES = 57_600, 2000
+"""A line at this rate or slower is taken for a SiK radio, whose factory setting it is, and which carries so many bytes
+in a second: the air is shared by both directions and error correction."""
 
 _AWAY = {errno.ENOENT, errno.ENXIO, errno.ENODEV, errno.EIO}
 """Errors of opening an absent device. Any other error is a mistake or a port in use."""
@@ -109,16 +112,19 @@ class SerialLine(Reopening):
             self._port = await loop.run_in_executor(None, opening)
         except ValueError as error:
             raise OSError(f"{baud} baud: {error}") from error
-        bytes_per_second = baud / BITS_PER_BYTE
+        line = baud / BITS_PER_BYTE
+        budget = line
+        if baud <= RADIO_BAUD and self.parsed.options.bytes_per_second is None:
+            budget = min(line, RADIO_BYTES)
 
         made = StreamPeer(
             self.parsed,
             self.url,
             self._sink,
-            write_ahead=max(MIN_WRITE_AHEAD, round(bytes_per_second * WRITE_AHEAD_S)),
-            queue_bytes=max(MIN_QUEUE, round(bytes_per_second * QUEUE_S)),
-            bytes_per_second=bytes_per_second,
+            write_ahead=max(MIN_WRITE_AHEAD, round(line * WRITE_AHEAD_S)),
+            line=budget,
         )
+        self._protect(made.channel)
         _Transport(loop, made, self._port)
         await asyncio.sleep(0)  # the transport calls connection_made in the loop's next turn; from then on it is usable
         return made

@@ -9,10 +9,14 @@ if they were new.
 from __future__ import annotations
 
 import asyncio
+from collections import deque
 from collections.abc import Callable
 
 BEAT = 0.1
 """s between two signs that the event loop runs."""
+
+KEPT = 600
+"""Delays of beats that are kept: one minute."""
 
 STALL = 1.0
 """s without one after which the host counts as stalled."""
@@ -30,6 +34,8 @@ class StallWatch:
         self._on_stall = on_stall
         self._beaten = self._loop.time()
         self._drained = self._beaten
+        self.delays: deque[float] = deque(maxlen=KEPT)
+        """How late the last beats were, s."""
         self._timer: asyncio.TimerHandle | None = None
 
     def start(self) -> None:
@@ -55,6 +61,7 @@ class StallWatch:
     def _beat(self) -> None:
         now = self._loop.time()
         late = now - self._beaten
+        self.delays.append(max(0.0, late - BEAT))
         self._beaten = now
         self._timer = self._loop.call_later(BEAT, self._beat)
         if late >= STALL:

@@ -11,6 +11,7 @@ from typing import Generic, TypeVar
 from weakref import WeakKeyDictionary
 
 from anafi_mav.errors import LocalProtocolError
+from anafi_mav.mavlink.byte_budget import StreamPace
 
 ChannelT = TypeVar("ChannelT")
 
@@ -26,10 +27,11 @@ MAX_GROUPS = 256
 class _Stream:
     """One message on one channel."""
 
-    __slots__ = ("interval", "next")
+    __slots__ = ("interval", "next", "pace")
 
-    def __init__(self, interval: float | None) -> None:
+    def __init__(self, interval: float | None, pace: StreamPace | None) -> None:
         self.interval = interval
+        self.pace = pace
         self.next = _NEVER if interval is None else -_NEVER
 
     def due(self, now: float) -> bool:
@@ -41,6 +43,8 @@ class _Stream:
         interval = self.interval
         if interval is None or now < self.next:
             return False
+        if self.pace is not None:
+            interval *= self.pace.slowdown
         late = now - self.next
         # After a silence the grid begins anew; half an interval early, so that the next message may jitter.
         self.next = self.next + interval if late <= interval else now + interval / 2
@@ -80,11 +84,13 @@ class Streams(Generic[ChannelT]):
         self,
         defaults: Mapping[int, float],
         without: Callable[[ChannelT], Collection[int]] = lambda channel: (),
+        pace: Callable[[ChannelT], StreamPace | None] = lambda channel: None,
     ) -> None:
         """Create streams with `defaults`, the intervals in s by message id.
 
-        `without` returns the message ids that a channel does not have by default.
+        `without` returns the message ids that a channel does not have by default, `pace` how far it is slowed down.
         """
+        self._pace = pace
         self._defaults = dict(defaults)
         self._without = without
         self._channels: WeakKeyDictionary[ChannelT, dict[int, _Stream]] = WeakKeyDictionary()
@@ -103,7 +109,7 @@ class Streams(Generic[ChannelT]):
         known = streams.get(id)
         # A client that says again what it has (QGroundControl does 35 times, for ArduPilot) must not get more by it.
         if known is None or known.interval != interval:
-            streams[id] = _Stream(interval)
+            streams[id] = _Stream(interval, self._pace(channel))
             self._forget(id)
 
     def reset(self, channel: ChannelT, id: int) -> None:
@@ -170,7 +176,7 @@ class Streams(Generic[ChannelT]):
             streams = self._channels.setdefault(channel, {})
         stream = streams.get(id)
         if stream is None:
-            stream = streams[id] = _Stream(self._default(channel, id))
+            stream = streams[id] = _Stream(self._default(channel, id), self._pace(channel))
         return stream
 
     def _default(self, channel: ChannelT, id: int) -> float | None:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import socket
+from collections.abc import Callable
 
 from anafi_mav.clock import Clock
-from anafi_mav.mavlink.base import MAX_PEERS, Endpoint, EndpointUrl, Reopening, Sink, StreamPeer, close_peers
+from anafi_mav.mavlink.base import EndpointUrl, Reopening, Sink, StreamPeer, close_peers
+from anafi_mav.mavlink.listener import Listener
 
 CONNECT_TIMEOUT = 5.0
 """s for one attempt: a host that drops our packets would hold us for minutes."""
@@ -18,20 +21,34 @@ UNANSWERED_MS = 30_000
 class TcpPeer(StreamPeer):
     """A TCP connection. A dead one ends after half a minute."""
 
+    def __init__(self, url: EndpointUrl, name: str, sink: Sink, heard: Callable[[TcpPeer], None]) -> None:
+        """`heard` is called when frames have arrived: on a signed endpoint, verified ones."""
+        super().__init__(url, name, sink)
+        self._heard = heard
+
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         connection = transport.get_extra_info("socket")
         if hasattr(socket, "TCP_USER_TIMEOUT"):
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNANSWERED_MS)
         super().connection_made(transport)
 
+    def heard(self) -> None:
+        self._heard(self)
 
-class TcpIn(Endpoint):
+
+class TcpIn(Listener):
     """Listens; every client is a channel."""
+
+    IDLE_LIMIT = 600.0
+    """A station sends a heartbeat a second; the connection of one that has sent none for ten minutes is left over."""
+    IDLE_LEVEL = logging.WARNING
+    """Its client may be there and only listen: it has to learn why the connection ended."""
 
     def __init__(self, url: EndpointUrl, sink: Sink, clock: Clock) -> None:
         super().__init__(url, sink, clock)
         self._server: asyncio.Server | None = None
-        self._peers: set[StreamPeer] = set()
+        self._peers: set[TcpPeer] = set()
+        """With those that have just been dropped and not ended yet."""
 
     @property
     def local_port(self) -> int | None:
@@ -43,29 +60,55 @@ class TcpIn(Endpoint):
     async def open(self) -> None:
         loop = asyncio.get_running_loop()
         self._server = await loop.create_server(lambda: _Client(self), self.parsed.place, self.parsed.number)
+        self._start_sweep()
 
     async def close(self) -> None:
+        self._stop_sweep()
         if self._server is not None:
             self._server.close()
             self._server = None
         await close_peers(self._peers)
 
     def describe(self) -> str:
-        count = len(self._peers)
+        count = len(self._table)
         return f"{self.shown_url}: {count} client{'' if count == 1 else 's'}"
 
-    def admit(self, transport: asyncio.BaseTransport) -> StreamPeer | None:
-        """The peer for a new connection; None if there are too many, or it comes while we close."""
-        if self._server is None:
+    def admit(self, transport: asyncio.BaseTransport) -> TcpPeer | None:
+        """The peer for a new connection; None if it may not connect, or comes while we close."""
+        address = transport.get_extra_info("peername")
+        if self._server is None or address is None:  # it has ended already
             return None
-        if len(self._peers) >= MAX_PEERS:
-            self.counters["refused_peers"] += 1
+        name, now = f"{address[0]}:{address[1]}", self._clock.monotonic()
+        if not self._is_allowed(address[0]):
             return None
-        host, port = transport.get_extra_info("peername")[:2]
-        peer = TcpPeer(self.parsed, f"{self.url} from {host}:{port}", self._sink)
+        peer = TcpPeer(self.parsed, f"{self.url} from {name}", self._sink, self._heard)
+        self._protect(peer.channel)
+        known = not peer.channel.is_signed  # a connection proves the address
+        if not self._make_room(name, now, known=known):
+            return None
         self._peers.add(peer)
-        peer.lost.add_done_callback(lambda _: self._peers.discard(peer))
+        self._table.add(peer, now, known=known)
+        peer.lost.add_done_callback(lambda _: self._forget(peer))
         return peer
+
+    def _heard(self, peer: TcpPeer) -> None:
+        if peer not in self._table:  # it has just been dropped
+            return
+        now = self._clock.monotonic()
+        self._table.heard(peer, now)
+        if not self._table.is_known(peer) and self._make_room(self._shown(peer), now, known=True):
+            self._table.add(peer, now, known=True)
+
+    def _forget(self, peer: TcpPeer) -> None:
+        self._peers.discard(peer)
+        self._table.remove(peer)
+
+    def _shown(self, peer: TcpPeer) -> str:
+        return peer.channel.name.removeprefix(f"{self.url} from ")
+
+    def _drop(self, peer: TcpPeer) -> None:
+        self._table.remove(peer)
+        peer.abort()
 
 
 class _Client(asyncio.Protocol):
@@ -89,7 +132,8 @@ class TcpOut(Reopening):
 
     async def _connect(self) -> StreamPeer:
         loop = asyncio.get_running_loop()
-        peer = TcpPeer(self.parsed, self.url, self._sink)
+        peer = TcpPeer(self.parsed, self.url, self._sink, lambda peer: None)
+        self._protect(peer.channel)
         attempt = loop.create_connection(lambda: peer, self.parsed.place, self.parsed.number)
         try:
             await asyncio.wait_for(attempt, CONNECT_TIMEOUT)

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from anafi_mav.clock import Clock
+from anafi_mav.mavlink.address_proof import AddressProof, Introductions
 from anafi_mav.mavlink.base import (
     CLOSE_WAIT,
-    MAX_PEERS,
     RETRY_FIRST,
     RETRY_LAST,
     WRITE_AHEAD,
@@ -20,36 +20,26 @@ from anafi_mav.mavlink.base import (
     EndpointUrl,
     Outbox,
     Sink,
+    is_loopback,
     reason,
     routed_host,
     seen_host,
+    shaped_channel,
 )
 from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.frames import ReceivedFrame, Verdict
+from anafi_mav.mavlink.listener import Listener
+from anafi_mav.mavlink.router import targets
 
 logger = logging.getLogger(__name__)
-
-MAX_DATAGRAM = 512
-"""Bytes of frames that share a datagram with `frames=many`. A smaller buffer loses the rest: gomavlib has 512,
-mavlink-router 1120, MAVSDK 2048 (gomavlib pkg/frame/reader.go, mavlink-router endpoint.cpp, MAVSDK
-udp_connection.hpp). A frame has 280 at most."""
 
 ONE_FRAME = 0
 """The limit of an `Outbox` that gathers nothing. The default: gomavlib since 3.3.2, and so mavp2p, reads the first
 frame of a datagram and loses the others."""
 
-PEER_SILENCE = 30.0
-"""s after which a peer of `udpin` is gone: thirty heartbeats missed (MAVLink heartbeat.md: 1 Hz, four or five missed
-are a lost link; a ground station whose laptop slept for a moment keeps its stream rates)."""
-
-PEER_REPLACEABLE = 5.0
-"""s of silence after which a peer makes room for a new one when all places are taken."""
-
-SWEEP_EVERY = 5.0
-"""s between looks for silent peers."""
-
 
 def _datagram_limit(url: EndpointUrl) -> int:
-    return MAX_DATAGRAM if url.frames == "many" else ONE_FRAME
+    return url.options.datagram_bytes if url.options.frames == "many" else ONE_FRAME
 
 
 class _Datagrams(asyncio.DatagramProtocol):
@@ -107,16 +97,19 @@ class UdpOut(Endpoint):
     def __init__(self, url: EndpointUrl, sink: Sink, clock: Clock) -> None:
         super().__init__(url, sink, clock)
         self._outbox = Outbox(self._write, _datagram_limit(url))
-        self.channel = Channel(url.text, self._outbox.add, flavour=url.flavour, datagrams=True)
+        self.channel = shaped_channel(url.text, self._outbox.add, url.options, datagrams=True)
         self._transport: asyncio.DatagramTransport | None = None
         self._reopening: asyncio.Task[None] | None = None
         self._problem = ""
 
     async def open(self) -> None:
+        self._protect(self.channel)
         try:
             await self._connect()
-        except (socket.gaierror, PermissionError):  # no such host; a broadcast address
+        except socket.gaierror:  # no such host
             raise
+        except PermissionError as error:
+            raise OSError(f"{reason(error)}: expected the address of one station, not of a broadcast") from error
         except OSError as error:  # no network yet
             self._reopen(error)
         self._sink.opened(self.channel)
@@ -197,21 +190,26 @@ class UdpOut(Endpoint):
 class _Peer:
     channel: Channel
     outbox: Outbox
-    heard: float
 
 
-class UdpIn(Endpoint):
+class UdpIn(Listener):
     """Listens; each address that sends a MAVLink frame is a channel.
 
-    It is one until it has been silent for `PEER_SILENCE`.
+    It is one until it has been silent for too long.
     """
+
+    IDLE_LIMIT = 30.0
+    """Thirty heartbeats missed: a ground station whose laptop slept for a moment keeps its stream rates."""
+    IDLE_LEVEL = logging.INFO
+    """UDP has no other end of a connection."""
 
     def __init__(self, url: EndpointUrl, sink: Sink, clock: Clock) -> None:
         super().__init__(url, sink, clock)
         self._transport: asyncio.DatagramTransport | None = None
         self._peers: dict[Any, _Peer] = {}
         self._is_paused = False
-        self._sweep: asyncio.TimerHandle | None = None
+        # Old frames are easily recorded: they take no turn of a sender that does not sign yet.
+        self._introductions = {verdict: Introductions() for verdict in (Verdict.UNSIGNED, Verdict.REPLAYED)}
 
     @property
     def local_port(self) -> int | None:
@@ -225,14 +223,12 @@ class UdpIn(Endpoint):
             lambda: _Datagrams(self._received, self._failed, self._paused),
             local_addr=(self.parsed.place, self.parsed.number),
         )
-        self._arm_sweep()
+        self._start_sweep()
 
     async def close(self) -> None:
-        if self._sweep is not None:
-            self._sweep.cancel()
-            self._sweep = None
+        self._stop_sweep()
         for address in tuple(self._peers):
-            self._forget(address)
+            self._drop(address)
         transport, self._transport = self._transport, None
         await _shut(transport)
 
@@ -240,55 +236,75 @@ class UdpIn(Endpoint):
         count = len(self._peers)
         return f"{self.shown_url}: {count} peer{'' if count == 1 else 's'}"
 
-    def expire(self, now: float) -> None:
-        """Forget the peers that have been silent for too long."""
-        for address, peer in tuple(self._peers.items()):
-            if now - peer.heard > PEER_SILENCE:
-                self._forget(address)
-
-    def _arm_sweep(self) -> None:
-        self.expire(self._clock.monotonic())
-        self._sweep = asyncio.get_running_loop().call_later(SWEEP_EVERY, self._arm_sweep)
-
     def _received(self, data: bytes, address: Any) -> None:
         now = self._clock.monotonic()
         peer = self._peers.get(address)
         if peer is None:
+            if not self._is_allowed(address[0]):
+                return
             # Not a peer before it has sent something true: garbage must not open channels.
             outbox = Outbox(self._writer(address), _datagram_limit(self.parsed))
-            channel = Channel(f"{self.url} from {address[0]}:{address[1]}", outbox.add, datagrams=True)
-            channel.flavour = self.parsed.flavour
-            channel.local_host = routed_host(address)
+            name = f"{self.url} from {self._shown(address)}"
+            channel = shaped_channel(name, outbox.add, self.parsed.options, datagrams=True)
+            self._protect(channel)
+            channel.proof = None if channel.is_signed or is_loopback(address[0]) else AddressProof()
             frames = channel.receive(data)
-            if not frames:
+            if not channel.is_proved_by(frames):
                 self.counters.update(channel.parser.counters)
+                self._introduce(channel, outbox, address, now)
                 return
-            if not self._make_room(now):
-                self.counters["refused_peers"] += 1
+            known = channel.proof is None
+            if not self._make_room(self._shown(address), now, known=known):
                 return
-            peer = self._peers[address] = _Peer(channel, outbox, now)
+            channel.local_host = routed_host(address)
+            peer = self._peers[address] = _Peer(channel, outbox)
+            self._table.add(address, now, known=known)
             if self._is_paused:
                 channel.pause()
             self._sink.opened(channel)
         else:
             channel = peer.channel
             frames = channel.receive(data)
-            if frames:
-                peer.heard = now
+        if frames and channel.proof is not None:
+            self._weigh(channel, frames, address, now)
+        if channel.is_proved_by(frames):
+            self._table.heard(address, now)
         with peer.outbox:
             self._sink.received(channel, frames)
 
-    def _make_room(self, now: float) -> bool:
-        if len(self._peers) < MAX_PEERS:
-            return True
-        address = min(self._peers, key=lambda address: self._peers[address].heard)
-        if now - self._peers[address].heard < PEER_REPLACEABLE:
-            return False
-        self._forget(address)
-        return True
+    def _introduce(self, channel: Channel, outbox: Outbox, address: Any, now: float) -> None:
+        """Send a refused sender one signed heartbeat.
 
-    def _forget(self, address: Any) -> None:
+        QGroundControl finds its key by a signed frame, and a station whose timestamps are behind follows ours.
+        """
+        for verdict, introductions in self._introductions.items():
+            if channel.parser.counters[verdict.value] and introductions.allow(address, now):
+                with outbox:
+                    self._sink.introduce(channel)
+                channel.close()  # gives its link id back
+                return
+
+    def _weigh(self, channel: Channel, frames: list[ReceivedFrame], address: Any, now: float) -> None:
+        """Count a datagram of an address that has not proved to be there.
+
+        After the proof it waits until there is a place for a known client.
+        """
+        assert channel.proof is not None
+        size, systems = sum(len(received.raw) for received in frames), {targets(r.message)[0] for r in frames}
+        proved = channel.proof.received(size, addressed=bool(systems - {0}), broadcast=0 in systems, now=now)
+        if proved and self._make_room(self._shown(address), now, known=True):
+            self._table.add(address, now, known=True)
+            channel.prove()
+            self._sink.proved(channel)
+        else:
+            channel.send_heartbeats()
+
+    def _shown(self, address: Any) -> str:
+        return f"{address[0]}:{address[1]}"
+
+    def _drop(self, address: Any) -> None:
         peer = self._peers.pop(address)
+        self._table.remove(address)
         peer.channel.close()
         peer.outbox.flush()
         self._sink.closed(peer.channel)

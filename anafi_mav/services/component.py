@@ -9,14 +9,18 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
+import math
+from collections.abc import Callable, Coroutine, Hashable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
+from weakref import WeakKeyDictionary
 
+from anafi_mav import texts
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.access import Access
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.router import EVERY_COMPONENT
@@ -24,6 +28,7 @@ from anafi_mav.services.command.command_service import CommandService
 from anafi_mav.services.command.running_actions import RunningActions
 from anafi_mav.services.commands import Action
 from anafi_mav.services.definition_link import DefinitionLink
+from anafi_mav.services.dropped_inputs import InputStream
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.ftp.ftp_service import FtpService
 from anafi_mav.services.gateway_uris import GatewayUris
@@ -32,12 +37,17 @@ from anafi_mav.services.payload_history import PayloadHistory
 from anafi_mav.services.pose import UNKNOWN_POSE, VehiclePose
 from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.stream import Times
+from anafi_mav.services.system_position import PositionOf
 from anafi_mav.services.telemetry.message_service import MessageService
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.failsafe_settings import FailsafeLimits
 from anafi_mav.vehicle.vehicle import Vehicle
 
 logger = logging.getLogger(__name__)
+
+DENIED_EVERY = 5.0
+"""s before a channel gets the text about its access again: setpoints arrive many times a second."""
 
 COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)
 
@@ -63,7 +73,9 @@ class ComponentSystem(Protocol):
     running: RunningActions
     download_folder: Path | None
     uris: GatewayUris
+    position_of: PositionOf
     has_picture_pose: bool
+    failsafe_limits: FailsafeLimits
     """True when the configuration allows pose from the live video."""
     payload_history: PayloadHistory
 
@@ -88,6 +100,12 @@ class ComponentSystem(Protocol):
     def warn_throttled(self, text: OperatorText) -> None:
         """Send a warning on a frequent event."""
 
+    def drop_input(self, client: Hashable, stream: InputStream, reason: OperatorText) -> None:
+        """Note that an input of a stream is not flown."""
+
+    def use_input(self, client: Hashable, stream: InputStream) -> None:
+        """Note that an input of a stream is flown."""
+
     def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """Run in the background; cancelled when the drone's link goes down."""
 
@@ -110,13 +128,17 @@ class Component:
         self.memory = system.memory
         self.download_folder = system.download_folder
         self.uris = system.uris
+        self.position_of = system.position_of
         self.has_picture_pose = system.has_picture_pose
+        self.failsafe_limits = system.failsafe_limits
         self.payload_history = system.payload_history
         self.definition = DefinitionLink()
         self._system = system
         # The system's part of `Host`, without a method here for each.
         self.text = system.text
         self.warn_throttled = system.warn_throttled
+        self.drop_input = system.drop_input
+        self.use_input = system.use_input
         self.send_heartbeat = system.send_heartbeat
         self.spawn = system.spawn
         self.times = system.times
@@ -138,6 +160,9 @@ class Component:
         self.telemetry: frozenset[int] = frozenset()
         """Messages that the next one of their kind replaces: a full channel drops them rather than answers."""
         self._handlers: dict[int, MessageHandler] = {}
+        self._denials: dict[int, MessageHandler] = {}
+        self._denied_at: WeakKeyDictionary[Channel, float] = WeakKeyDictionary()
+        """When a channel last got the text about its access."""
         self._own: frozenset[int] = frozenset()
         """The commands of this component's services."""
         self._receiving = [service for service in self.services if type(service).received is not Service.received]
@@ -160,6 +185,7 @@ class Component:
         )
         self._handlers = joined(service.messages() for service in self.services)
         self._handlers[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self._heard
+        self._denials = joined(service.denials() for service in self.services)
 
     def owns(self, message: Any) -> bool:
         """True for a COMMAND_LONG or COMMAND_INT that is this component's own."""
@@ -229,15 +255,29 @@ class Component:
                 to_all = message.target_component == EVERY_COMPONENT
                 if to_all and self._system.owner(message) is not self:
                     return
-            handler(inbound)
+            if inbound.is_permitted:
+                handler(inbound)
+            else:
+                self._deny(inbound)
         except AnafiMavError as error:  # the drone's link may just have died
             logger.debug("%s: %s not handled: %s", self.drone.name, message.get_type(), error)
         except Exception:
             logger.exception("%s: %s not handled", self.drone.name, message.get_type())
 
     def _heard(self, inbound: Inbound) -> None:
+        observes = inbound.channel.access is Access.OBSERVE
         for service in self.services:
-            service.heartbeat(inbound)
+            if not observes or service.hears_observers:
+                service.heartbeat(inbound)
+
+    def _deny(self, inbound: Inbound) -> None:
+        """Answer a message that the access of its endpoint does not cover; it has no effect."""
+        if (answer := self._denials.get(inbound.message.get_msgId())) is not None:
+            answer(inbound)
+        channel = inbound.channel
+        if inbound.now - self._denied_at.get(channel, -math.inf) >= DENIED_EVERY:
+            self._denied_at[channel] = inbound.now
+            self.text(Severity.WARNING, texts.ACCESS_DENIED.fill(access=channel.options.access), channel)
 
 
 def joined(tables: Any) -> dict[Any, Any]:

@@ -327,4 +327,4 @@ def mode_of_standard(number: float) -> FlightMode | None:
 
 def flavour_of(channel: Channel) -> Flavour:
     """Return the flavour of a channel's endpoint; PX4 when its URL names none."""
-    return FLAVOURS[channel.flavour or PX4.name]
+    return FLAVOURS[channel.options.flavour or PX4.name]

@@ -8,12 +8,9 @@ nothing of it is lost, and the drone starts without stored data.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 import math
-import os
 import re
-import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -23,6 +20,7 @@ import msgspec
 from msgspec import Meta
 
 from anafi_mav import texts
+from anafi_mav.state_lock import replace_file
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, PlanItem
 
@@ -171,7 +169,7 @@ class Memory:
         plans = {kind: list(map(_stored, items)) for kind, items in self.plans.items() if items}
         content = _File(VERSION, self._serial, plans, dict(self.settings))
         try:
-            await asyncio.get_running_loop().run_in_executor(_WRITER, _write, path, msgspec.json.encode(content))
+            await asyncio.get_running_loop().run_in_executor(_WRITER, replace_file, path, msgspec.json.encode(content))
         except OSError as error:
             self.problem = texts.MEMORY_UNWRITABLE.fill(path=path, error=error.strerror)
             return self.problem
@@ -189,25 +187,3 @@ class Memory:
                     return f"nothing, for {error.strerror}"
                 return aside.name
         return "nothing, for there are too many of them"
-
-
-def _write(path: Path, data: bytes) -> None:
-    """Replace the file, so that it survives a power cut at any moment."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(name).replace(path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            Path(name).unlink()
-        raise
-    with contextlib.suppress(OSError):  # not every system can do this, and the file itself is complete
-        folder = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)

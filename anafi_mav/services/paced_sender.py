@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.channel import FRAME_BYTES, Channel
-from anafi_mav.mavlink.frames import pack
+from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.frames import FRAME_BYTES, pack
 from anafi_mav.services.service import Host
 
 SHARE = 0.5
@@ -85,6 +85,7 @@ class PacedSender:
     async def _run(self, channel: Channel) -> None:
         sources, rate = self._sources[channel], channel.bytes_per_second
         try:
+            await _until_proved(channel)
             if rate is None:
                 await self._run_fast(channel, sources)
             else:
@@ -128,6 +129,18 @@ class PacedSender:
                 else:
                     self._host.send(message, channel)
                     await asyncio.sleep((len(pack(message).payload) + FRAME_BYTES) / (SHARE * rate))
+
+
+async def _until_proved(channel: Channel) -> None:
+    """Wait for the proof of the peer's address: lists to made-up addresses must cost nothing."""
+    if channel.proof is None:
+        return
+    proved = asyncio.Event()
+    channel.when_proved.add(proved.set)
+    try:
+        await proved.wait()
+    finally:
+        channel.when_proved.discard(proved.set)
 
 
 def _take(sources: dict[Hashable, _Source]) -> dialect.MAVLink_message | None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Coroutine, Hashable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
@@ -18,6 +18,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Action, ActionGroup, Command
 from anafi_mav.services.definition_link import DefinitionLink
+from anafi_mav.services.dropped_inputs import InputStream
 from anafi_mav.services.files import Folder, ServedFile
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.gateway_uris import GatewayUris
@@ -25,9 +26,11 @@ from anafi_mav.services.memory import Memory
 from anafi_mav.services.payload_history import PayloadHistory
 from anafi_mav.services.pose import UNKNOWN_POSE, VehiclePose
 from anafi_mav.services.stream import MessageStream, Times
+from anafi_mav.services.system_position import PositionOf
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.failsafe_settings import FailsafeLimits
 from anafi_mav.vehicle.vehicle import Vehicle
 
 MessageHandler = Callable[[Inbound], None]
@@ -56,8 +59,12 @@ class Host(Protocol):
     """Folder for copies of the drone's media after a landing; None: they are not copied."""
     uris: GatewayUris
     """What the gateway serves beside MAVLink."""
+    position_of: PositionOf
+    """Finds the other systems of this gateway, whose messages do not arrive here."""
     has_picture_pose: bool
     """True when the configuration allows pose from the live video."""
+    failsafe_limits: FailsafeLimits
+    """Values beyond which a setting of the drone is reported as dangerous."""
     payload_history: PayloadHistory
     """Newest actions of camera and gimbal, of all components."""
     definition: DefinitionLink
@@ -97,6 +104,12 @@ class Host(Protocol):
 
         Such an event arrives many times a second.
         """
+
+    def drop_input(self, client: Hashable, stream: InputStream, reason: OperatorText) -> None:
+        """Note that an input of a stream is not flown; its sender alone gets a text, if due."""
+
+    def use_input(self, client: Hashable, stream: InputStream) -> None:
+        """Note that an input of a stream is flown: what was reported of earlier ones is over."""
 
     def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """Run in the background; cancelled when the drone's link goes down."""
@@ -154,11 +167,21 @@ def client_of(inbound: Inbound) -> Hashable:
     return (inbound.channel, inbound.sysid, inbound.compid)
 
 
+def channel_of(client: Hashable) -> Channel | None:
+    """Return the channel of a `client_of`; None for any other value."""
+    match client:
+        case (Channel() as channel, _, _):
+            return channel
+    return None
+
+
 class Service:
     """One MAVLink microservice of one component.
 
     Tables are read when the system is made, `subscriptions` at link up.
     """
+
+    hears_observers: ClassVar[bool] = False
 
     def __init__(self, host: Host) -> None:
         self.host = host
@@ -173,6 +196,13 @@ class Service:
 
     def messages(self) -> Mapping[int, MessageHandler]:
         """By message id."""
+        return {}
+
+    def denials(self) -> Mapping[int, MessageHandler]:
+        """Return the answers to messages that their endpoint does not permit, by message id.
+
+        For messages whose sender waits for an answer. The component sends a text besides.
+        """
         return {}
 
     def queries(self) -> Mapping[int, Query]:
@@ -230,7 +260,8 @@ class Service:
     def heartbeat(self, inbound: Inbound) -> None:
         """Handle the HEARTBEAT of a ground station or any other component.
 
-        It is the one message that every service receives.
+        It is the one message that every service receives. Heartbeats of observers, who control nothing, reach those
+        with `hears_observers` alone.
         """
 
     def state_changed(self) -> None:

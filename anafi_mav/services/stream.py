@@ -72,6 +72,8 @@ class MessageStream:
     needs_video: bool = False
     """True when the live video runs for as long as a client has the stream: events do not report its fields. With
     `from_pictures` that client's pose is made of pictures, too, so that both have one time."""
+    spared: bool = False
+    """True when other streams have its values as well: on a small line it is streamed to a client that requests it."""
     flavoured: bool = False
     """True when its content depends on the flavour of the receiver."""
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Callable, Coroutine, Iterator, Sequence
+from collections.abc import Callable, Coroutine, Hashable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,8 +33,8 @@ from anafi_mav.services.command.guided_service import GuidedService
 from anafi_mav.services.command.modes_service import ModesService
 from anafi_mav.services.command.orbit_service import OrbitService
 from anafi_mav.services.command.running_actions import RunningActions
-from anafi_mav.services.commands import ActionGroup
 from anafi_mav.services.component import BY_AUTOPILOT, COMMANDS, Component, joined
+from anafi_mav.services.dropped_inputs import DroppedInputs, InputStream
 from anafi_mav.services.event.event_service import EventService
 from anafi_mav.services.ftp.log_service import LogService
 from anafi_mav.services.gateway_uris import GatewayUris
@@ -62,23 +62,26 @@ from anafi_mav.services.plan.fence_service import FenceService
 from anafi_mav.services.plan.mission_service import MissionService
 from anafi_mav.services.plan.plan_service import PlanService
 from anafi_mav.services.plan.rally_service import RallyService
-from anafi_mav.services.pose import UNKNOWN_POSE, VehiclePose
-from anafi_mav.services.service import Service
+from anafi_mav.services.pose import UNKNOWN_POSE, VehiclePose, reported_pose
+from anafi_mav.services.service import Service, channel_of
 from anafi_mav.services.setpoint.follow_service import FollowService
 from anafi_mav.services.setpoint.manual_control_service import ManualControlService
 from anafi_mav.services.setpoint.offboard_service import OffboardService
 from anafi_mav.services.statustext import TextNumbers
 from anafi_mav.services.stream import Times
+from anafi_mav.services.system_position import PositionOf, SystemPosition, unknown_position
 from anafi_mav.services.telemetry.flight_record_service import FlightRecordService
 from anafi_mav.services.telemetry.high_latency_service import HighLatencyService
 from anafi_mav.services.telemetry.telemetry_service import CHANGES, TelemetryService
 from anafi_mav.services.telemetry.video_service import VideoTelemetryService
 from anafi_mav.services.video.video_stream_service import VideoStreamService
 from anafi_mav.texts import OperatorText
+from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.height import TakeoffRecord
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import EventHandler, Subscriptions, in_order
+from anafi_mav.vehicle.failsafe_settings import FailsafeLimits
 from anafi_mav.vehicle.vehicle import Health, Landed, Vehicle
 
 logger = logging.getLogger(__name__)
@@ -177,6 +180,8 @@ class System:
         download_folder: Path | None = None,
         uris: GatewayUris = GatewayUris(),  # noqa: B008  # frozen
         has_picture_pose: bool = True,
+        failsafe_limits: FailsafeLimits = FailsafeLimits(),  # noqa: B008  # frozen
+        position_of: PositionOf = unknown_position,
     ) -> None:
         """`state`: folder of stored state.
 
@@ -184,11 +189,12 @@ class System:
         """
         self.sysid = sysid
         self.has_picture_pose = has_picture_pose
+        self.failsafe_limits = failsafe_limits
+        self.position_of = position_of
         self.payload_history = PayloadHistory()
         self.drone = drone
         self.clock = clock
         self.memory = Memory(state)
-        self.running = RunningActions()
         self.download_folder = download_folder
         self.uris = uris
         self.active = False
@@ -203,17 +209,22 @@ class System:
         self._mission_over = Alarm(self._show_mode)
         """Runs while heartbeats still say Mission."""
         self._warned_at: dict[str, float] = {}
+        self._dropped = DroppedInputs()
         self._muted: set[Channel] = set()
-        self._told: tuple[Sequence[Channel], Sequence[Channel]] = ([], [])
-        """The open channels when it was last looked, and those of them that are not muted."""
+        self._addressed: tuple[Sequence[Channel], Sequence[Channel]] = ([], [])
+        """The open channels when it was last looked, and those of them that this system sends to."""
+        self._unproved: Sequence[Channel] = []
+        """The channels whose peers have not proved to be at their address: they get heartbeats and answers alone."""
+        self._has_filters = False
+        """True while one of these has a filter of messages."""
         self.vehicle = Vehicle(
             drone,
             clock,
             allow_kill=allow_kill,
             text=self.text,
             changed=self._changed,
-            end_others=lambda: self.running.end_others(ActionGroup.FLIGHT),
         )
+        self.running = RunningActions(self.vehicle.control.actions)
         self._autopilot: Component = Component(self, AUTOPILOT, AUTOPILOT_SERVICES)
         camera = Component(self, CAMERA, CAMERA_SERVICES)
         self.definition = camera.definition
@@ -234,6 +245,15 @@ class System:
         ]
         self._subscribed: dict[type[Message], tuple[EventHandler, ...]] = {}
         """The handlers of each kind of event, in the order in which they are called."""
+
+    @property
+    def position(self) -> SystemPosition | None:
+        """Position of the drone by its newest events; None while it is disconnected or unplaced."""
+        pose = reported_pose(self.vehicle)
+        place, amsl = pose.place, pose.amsl(self.vehicle)
+        if not self.active or place is None or amsl is None:
+            return None
+        return SystemPosition(place, amsl, self.clock.monotonic())
 
     # Link up, link down.
 
@@ -275,6 +295,7 @@ class System:
         for task in tuple(self._tasks):
             task.cancel()
         self.vehicle.link_down()
+        self._dropped = DroppedInputs()
         self.active = False
         self._node.remove_hosts(self.sysid)
 
@@ -298,14 +319,21 @@ class System:
 
     @property
     def channels(self) -> Sequence[Channel]:
-        """The open channels without the muted ones."""
-        if not self._muted:
-            return self._node.channels
-        everybody, told = self._told
+        """The open channels that have this system.
+
+        Without the muted ones, and without those whose peers have not proved to be at their address.
+        """
+        everybody, sending = self._addressed
         if everybody is not self._node.channels:  # a new list whenever they change
-            told = [channel for channel in self._node.channels if channel not in self._muted]
-            self._told = (self._node.channels, told)
-        return told
+            everybody = self._node.channels
+            shown = [channel for channel in everybody if channel.has_system(self.sysid) and channel not in self._muted]
+            sending = [channel for channel in shown if channel.proof is None]
+            self._addressed, self._unproved = (
+                (everybody, sending),
+                [channel for channel in shown if channel.proof is not None],
+            )
+            self._has_filters = any(channel.message_filter is not None for channel in sending)
+        return sending
 
     def set_muted(self, channel: Channel, *, muted: bool) -> None:
         """Send only answers on this channel; with False everything again."""
@@ -313,7 +341,7 @@ class System:
             self._muted.add(channel)
         else:
             self._muted.discard(channel)
-        self._told = ([], [])
+        self._addressed = ([], [])
 
     def owner(self, message: Any) -> Component:
         """Return the component that answers this message to component 0.
@@ -334,6 +362,8 @@ class System:
         """
         if self.active:
             channels = self.channels if to is None else to
+            if give_way and self._has_filters and not isinstance(channels, Channel):
+                channels = [channel for channel in channels if channel.can_stream(message.get_msgId())]
             self._node.send(message, sysid=self.sysid, compid=compid, to=channels, give_way=give_way)
 
     def text(self, severity: Severity, text: OperatorText, to: Channel | None = None) -> None:
@@ -364,6 +394,19 @@ class System:
         self._warned_at[text] = now
         self.text(Severity.WARNING, text)
 
+    def drop_input(self, client: Hashable, stream: InputStream, reason: OperatorText) -> None:
+        """Note that an input of a stream is not flown; its sender alone gets a text, if due."""
+        report = self._dropped.drop(client, stream, reason, self.clock.monotonic())
+        if report is None:
+            return
+        logger.warning("%s: system %s: %s", self.drone.name, system_of(client), report.text)
+        if (channel := channel_of(client)) is not None:
+            self.text(report.severity, report.text, channel)
+
+    def use_input(self, client: Hashable, stream: InputStream) -> None:
+        """Note that an input of a stream is flown: what was reported of earlier ones is over."""
+        self._dropped.use(client, stream)
+
     def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """Run in the background; cancelled when the drone's link goes down."""
         task = asyncio.get_running_loop().create_task(work)
@@ -378,6 +421,12 @@ class System:
 
     # The heart.
 
+    @property
+    def _greeted(self) -> Sequence[Channel]:
+        """The channels that get heartbeats."""
+        channels = self.channels
+        return [*channels, *self._unproved] if self._unproved else channels
+
     def send_heartbeat(self) -> None:
         """Send one more HEARTBEAT of the autopilot to all."""
         vehicle = self.vehicle
@@ -389,7 +438,8 @@ class System:
         self._autopilot.send_by_flavour(
             lambda flavour: dialect.MAVLink_heartbeat_message(
                 dialect.MAV_TYPE_QUADROTOR, flavour.autopilot, base, flavour.custom_mode(mode), health, 3
-            )
+            ),
+            self._greeted,
         )
 
     def _send_heartbeats(self) -> None:
@@ -402,7 +452,8 @@ class System:
                 component.send(
                     dialect.MAVLink_heartbeat_message(
                         dialect.MAV_TYPE_CAMERA, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3
-                    )
+                    ),
+                    self._greeted,
                 )
         self.send_heartbeat()
 
@@ -491,7 +542,7 @@ class System:
         assert not self.active
 
         def receive(inbound: Inbound) -> None:
-            if on_command is not None and self._commands_us(inbound.message):
+            if on_command is not None and inbound.is_permitted and self._commands_us(inbound.message):
                 on_command(inbound)
 
         self._node.remove_hosts(self.sysid)
@@ -515,6 +566,7 @@ class System:
     def channel_closed(self, channel: Channel) -> None:
         """A client's channel is gone."""
         self._muted.discard(channel)
+        self._dropped.forget(lambda client: channel_of(client) is channel)
         for service in self.services:
             service.channel_closed(channel)
 

@@ -37,7 +37,8 @@ from anafi_mav.sim.world.link_emulation import LinkEmulation
 from anafi_mav.sim.world.model import model_of
 from anafi_mav.sim.world.motion import Pose
 from anafi_mav.sim.world.place import WorldOrigin
-from anafi_mav.sim.world.quirks import Quirk
+from anafi_mav.sim.world.quirks import Quirk, Scramble
+from anafi_mav.sim.world.scramble import Scrambler
 from anafi_mav.sim.world.wind import CALM, Wind, WindSpec
 
 POSE_PERIOD = 0.1
@@ -187,6 +188,9 @@ class SimulatedDrone:
             latency=spec.video_latency,
         )
         self._session: DeviceSession | None = None
+        self._quirks: frozenset[Quirk | Scramble] = frozenset()
+        """Quirks that `_scrambler` is made for."""
+        self._scrambler: Scrambler | None = None
         self._next_pose = 0.0
         self._closing = False
         self._off_at: float | None = None
@@ -379,12 +383,15 @@ class SimulatedDrone:
         if self.skycontroller is not None:
             self.skycontroller.tick(now)
         self._video.tick(now, passed)
+        scrambler = self._scrambling()
+        if scrambler is not None and self.time >= scrambler.next:
+            scrambler.advance(self.time)
         session = self._session
         if session is not None and now >= self._telemetry.next and self._in_reach:
             untold = self.faults.untold
             for message in self._telemetry.due(now):
                 if message.NAME not in untold:
-                    session.send(message)
+                    self._report(message, session.send)
         if now >= self._next_pose:
             self._next_pose = max(self._next_pose + POSE_PERIOD, now)
             if self.log.used:
@@ -469,6 +476,8 @@ class SimulatedDrone:
 
     def _on_session(self, session: DeviceSession) -> OnMessage:
         now = self._clock()
+        if self._scrambler is not None:
+            self._scrambler.flush()  # the new session gets all states, and nothing older after them
         self._session = session
         session.mute = self.faults.mute or (self.skycontroller is None and not self.powered)
         session.air = self._air
@@ -530,8 +539,8 @@ class SimulatedDrone:
     def _send_all(self, session: DeviceSession, messages: list[Message], end: Message) -> None:
         for message in messages:
             if not self._unreported(message):
-                session.send(message)
-        session.send(end)
+                self._report(message, session.send)
+        self._report(end, session.send)
 
     def _unreported(self, message: Message) -> bool:
         """True for an event that this firmware does not send."""
@@ -540,8 +549,33 @@ class SimulatedDrone:
         return message.NAME in self.faults.untold
 
     def _emit(self, message: Message) -> None:
-        if self._unreported(message):
-            return
+        if not self._unreported(message):
+            self._report(message, self._send)
+
+    def _report(self, message: Message, send: Callable[[Message], object]) -> None:
+        """Send a message, unless the quirk `scramble` drops it, holds it back or repeats it."""
+        scrambler = self._scrambling()
+        if scrambler is None:
+            send(message)
+        elif message.BUFFER is not Buffer.NON_ACK:
+            scrambler.add(message, send, self.time)
+            scrambler.advance(self.time)
+        elif scrambler.keeps(message):
+            send(message)
+
+    def _scrambling(self) -> Scrambler | None:
+        """Return what scrambles the events of this firmware, or None when nothing does."""
+        if self.faults.quirks is not self._quirks:
+            self._quirks = self.faults.quirks
+            seed = next((quirk.seed for quirk in self._quirks if isinstance(quirk, Scramble)), None)
+            if self._scrambler is not None and self._scrambler.seed != seed:
+                self._scrambler.flush()
+                self._scrambler = None
+            if self._scrambler is None and seed is not None:
+                self._scrambler = Scrambler(seed)
+        return self._scrambler
+
+    def _send(self, message: Message) -> None:
         if message.BUFFER is not Buffer.NON_ACK:
             self.log.add_message(self._clock(), "event", message)
         if self.skycontroller is not None:

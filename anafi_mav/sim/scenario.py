@@ -30,9 +30,9 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MotorError, WarningLe
 from anafi_mav.arsdk.messages.common import FlightPlanComponent
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim.autopilot.power import Battery
+from anafi_mav.sim.world import quirks
 from anafi_mav.sim.world.faults import Faults, Impairment
 from anafi_mav.sim.world.motion import Pose
-from anafi_mav.sim.world.quirks import QUIRKS
 from anafi_mav.sim.world.wind import GUSTS, Wind, WindSpec
 
 MAX_STEPS = 1000
@@ -250,7 +250,7 @@ def _changes(step: ScenarioStep) -> Iterable[tuple[str, Any]]:
     if step.refuse_plan is not UNSET:
         yield "refuse_plan", frozenset(_PARTS[name] for name in step.refuse_plan)
     if step.firmware_quirks is not UNSET:
-        yield "quirks", frozenset(QUIRKS[name] for name in step.firmware_quirks)
+        yield "quirks", quirks.named(step.firmware_quirks, "firmware_quirks")
     if step.link is not UNSET:
         for name, direction in (("up", step.link.up), ("down", step.link.down)):
             chosen = direction or step.link.both
@@ -284,10 +284,11 @@ def _check(path: str, step: ScenarioStep) -> None:
     for key, chosen, choice in (
         ("refuse_take_off", step.refuse_take_off, _CHECKS),
         ("refuse_plan", step.refuse_plan, _PARTS),
-        ("firmware_quirks", step.firmware_quirks, QUIRKS),
     ):
         for index, name in enumerate([] if chosen is UNSET else chosen):
             _one_of(f"{path}.{key}[{index}]", name, choice)
+    for index, name in enumerate([] if step.firmware_quirks is UNSET else step.firmware_quirks):
+        quirks.named([name], f"{path}.firmware_quirks[{index}]")
 
 
 def _one_of(path: str, value: str | None, known: Collection[str]) -> None:

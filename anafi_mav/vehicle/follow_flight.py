@@ -17,10 +17,11 @@ from anafi_mav.errors import LinkLost
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import LOWEST, amsl_to_ato, check_estimate, check_height, check_on_earth, check_place
+from anafi_mav.vehicle.base.flight_task import STEERING, Needs, PlainTask, Preparation, TaskRules
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
-from anafi_mav.vehicle.base.roll_sign import RollSign
+from anafi_mav.vehicle.base.requester import By
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.base.velocity_loop import MotionEstimate, VelocityController
@@ -38,13 +39,24 @@ from anafi_mav.vehicle.follow import (
 )
 
 
-class FollowFlight:
+class FollowFlight(PlainTask):
     """Mode Follow of one vehicle."""
+
+    rules = TaskRules(
+        texts.FOLLOW,
+        needs=Needs.NO_DESCENT | Needs.IN_AIR | Needs.FIX | Needs.LIMITS | STEERING,
+        start=Preparation.HOVER,
+    )
+    mode = FlightMode.FOLLOW
 
     def __init__(self, vehicle: Aircraft, motion: Callable[[], MotionEstimate], clock: Clock) -> None:
         self.settings = FollowSettings()
         self.state = State.OFF
         self.warn_throttled: Callable[[OperatorText], None] = lambda text: vehicle.text(Severity.WARNING, text)
+        self.drop: Callable[[Hashable, OperatorText], None] = lambda client, reason: vehicle.text(
+            Severity.WARNING, texts.TARGET_IGNORED.fill(reason=reason)
+        )
+        """Notifies a client that the drone does not follow its target any longer."""
         self._vehicle = vehicle
         self._motion = motion
         self._clock = clock
@@ -61,59 +73,43 @@ class FollowFlight:
         """True when the drone follows, or waits for its target."""
         return self.state is not State.OFF
 
-    async def engage(self) -> None:
+    async def engage(self, by: By) -> None:
         """Begin mode Follow; return when the drone hovers and waits for its target.
 
         Raises `Refused`.
         """
-        vehicle = self._vehicle
-        if not vehicle.in_air:
+        if not self._vehicle.in_air:
             raise Refused(texts.FOLLOW, texts.TAKE_OFF_FIRST)
-        if (descent := vehicle.descent) is not None:
-            raise Refused(texts.FOLLOW, descent)
-        if vehicle.place is None:
-            raise Refused(texts.FOLLOW, texts.NO_FIX)
-        if vehicle.drone.controller.pilot_acquired_control:
-            raise Refused(texts.FOLLOW, texts.PILOT)
-        if vehicle.drone.piloting.limits is None:
-            raise Refused(texts.FOLLOW, texts.TILT_UNKNOWN)
-        if vehicle.sticks_follow_camera:
-            raise Refused(texts.FOLLOW, texts.STICKS_FOLLOW_CAMERA)
-        if vehicle.roll.sign is RollSign.INVERTED:
-            raise Refused(texts.FOLLOW, texts.ROLL_INVERTED)
-        await vehicle.take_over()
-        await vehicle.drone.piloting.cancel_return_home()
-        if not vehicle.in_air or vehicle.returning:
-            raise Refused(texts.FOLLOW, vehicle.activity)
-        vehicle.drone.piloting.hover()
-        vehicle.select(FlightMode.FOLLOW, self)
-        self.state = TRANSITIONS[self.state][Event.ENGAGE]
-        self._leader = None
-        self._follower = TargetFollower(self.settings)
-        self._kept_height = None
-        self._controller = VelocityController(self._motion())
-        self._heard_at = self._clock.monotonic()
-        self._watch(PATIENCE)
+        async with self._vehicle.control.acquire(self, by=by):
+            self.state = TRANSITIONS[self.state][Event.ENGAGE]
+            self._leader = None
+            self._follower = TargetFollower(self.settings)
+            self._kept_height = None
+            self._controller = VelocityController(self._motion())
+            self._heard_at = self._clock.monotonic()
+            self._watch(PATIENCE)
 
-    def receive(self, sender: Hashable, seen: Sighting) -> None:
-        """Take a target's position from a sender.
+    def receive(self, sender: Hashable, seen: Sighting) -> OperatorText | None:
+        """Take a target's position; return the reason for which it is not followed, or None.
 
-        The first sender in mode Follow is followed until the mode ends.
+        The first sender in mode Follow is followed until the mode ends. In another mode a target asks for nothing: its
+        message names no drone.
         """
-        if self.state is State.OFF or (self.state is State.FOLLOWING and sender != self._leader):
-            return
+        if self.state is State.OFF:
+            return None
+        if self.state is State.FOLLOWING and sender != self._leader:
+            return texts.OTHER_TARGET
         if reason := self._objection(seen):
-            self.warn_throttled(texts.TARGET_IGNORED.fill(reason=reason))
-            return
+            return reason
         reference = self._motion().reference
         if reference is None:
-            return
+            return texts.POSITION_UNKNOWN
         now = self._clock.monotonic()
         north, east = geo.offset(*reference, seen.latitude, seen.longitude)
         self._follower.see(north, east, seen.altitude, seen.velocity, now)
         self.state, self._leader, self._heard_at = TRANSITIONS[self.state][Event.TARGET], sender, now
         self._watch(SILENCE)
-        self._fly(now)
+        return self._fly(now)
 
     def _objection(self, seen: Sighting) -> OperatorText | None:
         here = self._vehicle.place
@@ -131,7 +127,6 @@ class FollowFlight:
         if self.state is not State.OFF:
             self.state = TRANSITIONS[self.state][Event.END]
             self._silence.cancel()
-            self._vehicle.forget_mode()
             with contextlib.suppress(LinkLost):
                 self._vehicle.drone.piloting.pilot(None)
         return []
@@ -146,26 +141,16 @@ class FollowFlight:
         return {events.SpeedChanged: self._on_speed}
 
     def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
-        if self.state is State.FOLLOWING:
-            self._fly(now)
+        if self.state is State.FOLLOWING and (reason := self._fly(now)) is not None:
+            self.drop(self._leader, reason)
 
-    def _fly(self, now: float) -> None:
+    def _fly(self, now: float) -> OperatorText | None:
+        """Fly to where the target wants the drone; return why it hovers instead, or None."""
         vehicle = self._vehicle
         limits = vehicle.drone.piloting.limits
-        if limits is None:
-            return
-        reason = None
-        if vehicle.drone.controller.pilot_acquired_control:
-            reason = texts.PILOT
-        elif vehicle.sticks_follow_camera:
-            reason = texts.STICKS_FOLLOW_CAMERA
-        elif vehicle.roll.sign is RollSign.INVERTED:
-            reason = texts.ROLL_INVERTED
-        if reason is not None:
-            self.end()
-            vehicle.select(FlightMode.HOLD)
-            vehicle.text(Severity.WARNING, texts.FOLLOW_ENDED.fill(reason=reason))
-            return
+        if limits is None or not vehicle.control.keeps(self):
+            return None
+        reason: OperatorText | None = None
         sticks = PilotingCommand()
         try:
             motion = self._motion()
@@ -177,8 +162,9 @@ class FollowFlight:
                 check_place(vehicle, place)
                 sticks = self._controller.sticks(wanted, limits, now) or sticks
         except Refused as refusal:
-            self.warn_throttled(texts.TARGET_NOT_FOLLOWED.fill(reason=refusal.reason))
+            reason = refusal.reason
         vehicle.drone.piloting.pilot(sticks)
+        return reason
 
     def _height(self) -> float:
         """Return the height to fly at (m, above take-off).
@@ -216,9 +202,9 @@ class FollowFlight:
             return
         was, self.state = self.state, TRANSITIONS[self.state][Event.SILENCE]
         self._vehicle.drone.piloting.hover()
-        self._vehicle.select(FlightMode.HOLD)
+        self._vehicle.control.release(self)
         why = texts.TARGET_LOST if was is State.FOLLOWING else texts.NO_TARGET
-        self._vehicle.text(Severity.WARNING, texts.FOLLOW_ENDED.fill(reason=why))
+        self._vehicle.text(Severity.WARNING, texts.TASK_ENDED.fill(what=texts.FOLLOW, reason=why))
 
     def _watch(self, patience: float) -> None:
         """Schedule the end of the mode after `patience` s without a report of the target."""

@@ -1,7 +1,6 @@
 """Flies the drone by single commands: to a place, a height and a heading.
 
-The drone makes each move by itself. A move needs no continuous setpoints, so this class does not implement the
-flight-task interface.
+The drone makes each move by itself. The flight task is the target, a `Goto`.
 """
 
 from __future__ import annotations
@@ -11,13 +10,15 @@ from dataclasses import dataclass, replace
 
 from anafi_mav import texts, units
 from anafi_mav.drone import MoveEnd, Position
-from anafi_mav.texts import OperatorText
+from anafi_mav.texts import Subject
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import check_height, check_place
+from anafi_mav.vehicle.base.flight_task import Hover, Needs, PlainTask, Preparation, TaskRules
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.move_heading import oriented
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.requester import By
 
 SAME_HEIGHT = 0.1
 """m by which the height of a moveTo may differ from the commanded one.
@@ -26,9 +27,12 @@ Some millimetres distinguish two of them.
 """
 
 
+_GOTO = TaskRules(texts.GOTO, needs=Needs.NO_DESCENT | Needs.IN_AIR)
+
+
 @dataclass(frozen=True)
-class Goto:
-    """Target of a guided move."""
+class Goto(PlainTask):
+    """Target of a guided move; the flight task that flies to it."""
 
     place: GeoPoint
     ato: float
@@ -38,7 +42,11 @@ class Goto:
     speed: float | None
     """m/s over ground, of this move only; None: the vehicle's cruise speed."""
     mode: FlightMode
-    """Mode of the vehicle on the way."""
+    """Mode of the vehicle on the way, and at its end: Hold or Guided."""
+
+    @property
+    def rules(self) -> TaskRules:
+        return _GOTO
 
     def is_to(self, target: Position) -> bool:
         """True when a moveTo with this target (height above take-off) flies there."""
@@ -60,19 +68,19 @@ class GuidedFlight:
 
     def __init__(self, vehicle: Aircraft) -> None:
         self._vehicle = vehicle
-        self._goto: Goto | None = None
-        self._arrived: tuple[GeoPoint, Position | None] | None = None
-        """Target of the last completed move, and the drone's newest GPS location then."""
+        self._arrived: tuple[GeoPoint, Position | None, int] | None = None
+        """Target of the last completed move, and the drone's newest GPS location and the control's epoch then."""
 
     @property
     def goto(self) -> Goto | None:
         """Target of the present move, by `go` or by a single setpoint in Guided; None without one."""
-        goto, vehicle, move = self._goto, self._vehicle, self._vehicle.drone.piloting.move
+        control, move = self._vehicle.control, self._vehicle.drone.piloting.move
         if move is None or move.target is None:
             return None
-        if goto is not None and goto.mode is vehicle.selected and goto.is_to(move.target):
+        goto = control.active
+        if isinstance(goto, Goto) and goto.is_to(move.target):
             return goto
-        if vehicle.selected is not FlightMode.GUIDED:
+        if control.mode is not FlightMode.GUIDED:
             return None
         target = move.target
         return Goto(GeoPoint(target.latitude, target.longitude), target.altitude, None, None, FlightMode.GUIDED)
@@ -94,6 +102,8 @@ class GuidedFlight:
         yaw: float | None,
         speed: float | None = None,
         mode: FlightMode = FlightMode.HOLD,
+        *,
+        by: By,
     ) -> None:
         """Go to a place, height (m, above take-off) and heading (rad).
 
@@ -105,7 +115,7 @@ class GuidedFlight:
         vehicle = self._vehicle
         here, present = vehicle.place, vehicle.drone.piloting.state.altitude
         if here is None and place is None and ato is not None:
-            await self._climb(ato, yaw, mode)
+            await self._climb(ato, yaw, mode, by)
             return
         if here is None:
             raise Refused(texts.GOTO, texts.NO_FIX)
@@ -116,44 +126,48 @@ class GuidedFlight:
         else:
             check_height(vehicle, ato)
         kept = self._standing or here if self.goto is None else self.goto.place
-        await self.go(Goto(place or kept, ato, yaw, speed, mode), checked=place is None)
+        await self.go(Goto(place or kept, ato, yaw, speed, mode), by=by, checked=place is None)
 
-    async def go(self, goto: Goto, *, checked: bool = False) -> None:
+    async def go(self, goto: Goto, *, by: By, checked: bool = False) -> None:
         """Fly to a place, or change the move to it. Returns when the drone is on its way.
 
         `checked`: the place is the drone's own position, which needs no check.
         """
-        vehicle = self._vehicle
-        if (descent := vehicle.descent) is not None:
-            raise Refused(texts.GOTO, descent)
-        if not vehicle.in_air:
-            raise Refused(texts.GOTO, texts.NOT_IN_AIR)
+        vehicle, control = self._vehicle, self._vehicle.control
+        control.check(goto, by)
         if not checked:
             check_place(vehicle, goto.place, start=vehicle.place)
-        await vehicle.take_over()
-        await vehicle.drone.piloting.cancel_return_home()
-        if not vehicle.in_air or vehicle.returning:  # no await from here to the moveTo
-            raise Refused(texts.GOTO, vehicle.activity)
-        vehicle.select(goto.mode)
-        before, self._goto = self._goto, goto
-        orientation, heading = oriented(vehicle.move_heading, vehicle.place, goto.place, goto.yaw)
-        try:
-            await vehicle.drone.piloting.move_to(
-                goto.place.latitude,
-                goto.place.longitude,
-                goto.ato,
-                heading_deg=heading,
-                horizontal_speed=vehicle.cruise_speed if goto.speed is None else goto.speed,
-                vertical_speed=vehicle.climb_speed,
-                orientation=orientation,
-            )
-        except BaseException:
-            self._goto = before  # a refused one must not be flown by the next change of height or speed
-            raise
-        if (move := vehicle.drone.piloting.move) is not None:
-            move.ended.add_done_callback(lambda ended: self._on_arrival(goto.place, ended))
+        before = self.goto
+        async with control.acquire(goto, by=by, below=Hover(goto.mode)) as grant:
+            grant.begin()
+            try:
+                await self.move(goto)
+            except BaseException:
+                if before is not None and grant.is_current and self._flies_to(before):
+                    control.adopt(before, below=Hover(before.mode))  # what a change of height or speed changes
+                raise
 
-    async def _climb(self, ato: float, yaw: float | None, mode: FlightMode) -> None:
+    def _flies_to(self, goto: Goto) -> bool:
+        move = self._vehicle.drone.piloting.move
+        return move is not None and move.target is not None and goto.is_to(move.target)
+
+    async def move(self, goto: Goto) -> None:
+        """Let the drone begin the move of the active task; no await before the moveTo."""
+        vehicle = self._vehicle
+        orientation, heading = oriented(vehicle.move_heading, vehicle.place, goto.place, goto.yaw)
+        await vehicle.drone.piloting.move_to(
+            goto.place.latitude,
+            goto.place.longitude,
+            goto.ato,
+            heading_deg=heading,
+            horizontal_speed=vehicle.cruise_speed if goto.speed is None else goto.speed,
+            vertical_speed=vehicle.climb_speed,
+            orientation=orientation,
+        )
+        if (move := vehicle.drone.piloting.move) is not None:
+            move.ended.add_done_callback(lambda ended: self._on_arrival(goto, ended))
+
+    async def _climb(self, ato: float, yaw: float | None, mode: FlightMode, by: By) -> None:
         """Go straight up or down to a height (m above take-off) by a moveBy, which needs no GPS fix.
 
         Returns at the end of the move: a moveBy reports nothing before. The height is the barometer's, and the drone
@@ -161,38 +175,23 @@ class GuidedFlight:
         """
         vehicle = self._vehicle
         check_height(vehicle, ato)
-        await self._begin(texts.GOTO, mode)
-        state = vehicle.drone.piloting.state
-        if state.altitude is None:
-            raise Refused(texts.GOTO, texts.HEIGHT_UNKNOWN)
-        turn = 0.0 if yaw is None or state.attitude is None else units.wrap_pi(yaw - state.attitude.yaw)
-        await vehicle.drone.piloting.move_by(0.0, 0.0, state.altitude - ato, turn)
+        async with vehicle.control.acquire(Hover(mode), by=by, rules=_rules_of_offset(texts.GOTO)) as grant:
+            grant.begin()
+            state = vehicle.drone.piloting.state
+            if state.altitude is None:
+                raise Refused(texts.GOTO, texts.HEIGHT_UNKNOWN)
+            turn = 0.0 if yaw is None or state.attitude is None else units.wrap_pi(yaw - state.attitude.yaw)
+            await vehicle.drone.piloting.move_by(0.0, 0.0, state.altitude - ato, turn)
 
-    async def _begin(self, what: OperatorText, mode: FlightMode) -> None:
-        """Stop the drone for a moveBy. Raises `Refused`, with `what` for the text."""
-        vehicle = self._vehicle
-        if (descent := vehicle.descent) is not None:
-            raise Refused(what, descent)
-        if not vehicle.in_air:
-            raise Refused(what, texts.NOT_IN_AIR)
-        await vehicle.take_over()
-        await vehicle.drone.piloting.stop()
-        await vehicle.drone.piloting.cancel_return_home()
-        if not vehicle.in_air or vehicle.returning:
-            raise Refused(what, vehicle.activity)
-        vehicle.select(mode)
-
-    async def turn(self, angle: float, rate_dps: float | None, mode: FlightMode) -> None:
+    async def turn(self, angle: float, rate_dps: float | None, mode: FlightMode, by: By) -> None:
         """Turn by `angle` where the drone hovers; return when it has turned.
 
         `angle` is in rad, clockwise +; `rate_dps` in deg/s (None: the drone's own).
         """
-        await self._begin(texts.TURN, mode)
-        await self._vehicle.drone.piloting.move_by(0.0, 0.0, 0.0, angle, turn_rate_dps=rate_dps)
-
-    def forget_arrival(self) -> None:
-        """Forget the last arrival, because another command is run: the GPS location counts again."""
-        self._arrived = None
+        vehicle = self._vehicle
+        async with vehicle.control.acquire(Hover(mode), by=by, rules=_rules_of_offset(texts.TURN)) as grant:
+            grant.begin()
+            await vehicle.drone.piloting.move_by(0.0, 0.0, 0.0, angle, turn_rate_dps=rate_dps)
 
     @property
     def _standing(self) -> GeoPoint | None:
@@ -200,10 +199,19 @@ class GuidedFlight:
 
         A location is reported once a second only, and to use it would fly the drone back by some metres.
         """
-        if self._arrived is None or self._vehicle.drone.gps.state.location is not self._arrived[1]:
+        if self._arrived is None:
             return None
-        return self._arrived[0]
+        place, location, epoch = self._arrived
+        is_newest = self._vehicle.drone.gps.state.location is location and self._vehicle.control.epoch == epoch
+        return place if is_newest else None
 
-    def _on_arrival(self, place: GeoPoint, ended: asyncio.Future[MoveEnd]) -> None:
+    def _on_arrival(self, goto: Goto, ended: asyncio.Future[MoveEnd]) -> None:
+        """A move has ended; at its target the drone hovers, and the task is over."""
         if not ended.cancelled() and ended.result() is MoveEnd.DONE:
-            self._arrived = place, self._vehicle.drone.gps.state.location
+            self._vehicle.control.release(goto)
+            self._arrived = goto.place, self._vehicle.drone.gps.state.location, self._vehicle.control.epoch
+
+
+def _rules_of_offset(what: Subject) -> TaskRules:
+    """Return the rules of a moveBy, which ends in a hovering mode by itself."""
+    return TaskRules(what, needs=Needs.NO_DESCENT | Needs.IN_AIR, start=Preparation.STOP, is_hover=True)

@@ -14,9 +14,8 @@ import asyncio
 import contextlib
 import enum
 import math
-from collections.abc import Callable, Coroutine, Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
-from typing import Any
 
 from anafi_mav import texts
 from anafi_mav.clock import Alarm, Clock
@@ -25,14 +24,12 @@ from anafi_mav.errors import LinkLost
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.clients import system_of
+from anafi_mav.vehicle.base.flight_task import STOP_WAIT, PlainTask, TaskRules
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.silence import SILENCE
 from anafi_mav.vehicle.joystick_override import JoystickOverride, Override
-
-MEANT = 0.2
-"""Share of the way from which a stick that does nothing is worth a word."""
+from anafi_mav.vehicle.offboard.silence import SILENCE
 
 GESTURE = 0.95
 """Share of the way from which a stick is at its end: throttle down and yaw right arm an ArduPilot and a PX4."""
@@ -81,20 +78,28 @@ class Sticks:
         return not any((self.forward, self.right, self.turn, self.climb))
 
 
-class ManualFlight:
-    """Flies one vehicle by the sticks of ground stations."""
+class ManualFlight(PlainTask):
+    """Flies one vehicle by the sticks of ground stations: the hovering mode Position."""
 
-    def __init__(self, vehicle: Aircraft, clock: Clock, overridable: Callable[[], Override]) -> None:
+    rules = TaskRules(texts.Subject(FlightMode.POSITION.value), wait=STOP_WAIT, is_hover=True, is_flight=False)
+    mode = FlightMode.POSITION
+
+    def __init__(
+        self,
+        vehicle: Aircraft,
+        clock: Clock,
+        overridable: Callable[[], Override],
+        refused: Callable[[], OperatorText | None],
+    ) -> None:
         """Create the flight by sticks for one vehicle.
 
-        `overridable` returns the kind of flight that is active now, as far as a joystick may override it.
+        `overridable` returns the kind of flight that is active now, as far as a joystick may override it; `refused`
+        returns the reason for which sticks of clients do not fly the drone, whatever the mode is.
         """
-        self.run_action: Callable[[Hashable, Coroutine[Any, Any, None]], asyncio.Task[None]]
-        """Runs an action of a client, in its turn among the commands; set by the service."""
+        self._refused = refused
         self.override = JoystickOverride()
         self._overridable = overridable
         self._overriding = False
-        self.warn_throttled: Callable[[OperatorText], None] = lambda text: vehicle.text(Severity.WARNING, text)
         self.state = State.IDLE
         self._vehicle = vehicle
         self._clock = clock
@@ -102,31 +107,30 @@ class ManualFlight:
         self._said = -math.inf
         self._silence = Alarm(self._expired)
 
-    def receive(self, sender: Hashable, sticks: Sticks, *, overrides: bool = False) -> None:
-        """Take a client's stick positions.
+    def receive(self, sender: Hashable, sticks: Sticks, *, overrides: bool = False) -> OperatorText | None:
+        """Take a client's stick positions; return why they do not fly the drone, or None.
 
-        With `overrides` they may take the drone over from what flies it.
+        With `overrides` they may take the drone over from what flies it. Centred sticks ask for nothing.
         """
         vehicle = self._vehicle
         if overrides and self._takes_over(sender, sticks):
             self._overriding = True
-            self.run_action(sender, self._override(sender, sticks)).add_done_callback(self._overridden)
+            override = vehicle.control.run(sender, self._override(sender, sticks))
+            override.add_done_callback(self._overridden)
         if self._overriding:
-            return
+            return None
         sticks = replace(sticks, climb=self.override.climb(sender, sticks.climb))
         if self.state is State.HELD and sender != self._pilot:
-            if not sticks.centred:
-                self.warn_throttled(texts.STICKS_IGNORED.fill(reason=texts.OTHER_STICKS))
-            return
+            return None if sticks.centred else texts.OTHER_STICKS
         if sticks.centred:
             self._let_go(Event.CENTRED)
-            return
-        if not self._may_fly(sticks):
+            return None
+        if (reason := self._objection(sticks)) is not None:
             self._let_go(Event.END)
-            return
+            return reason
         limits = vehicle.drone.piloting.limits
         if limits is None:
-            return
+            return texts.TILT_UNKNOWN
         self.state, self._pilot = TRANSITIONS[self.state][Event.DEFLECTED], sender
         self._said = self._clock.monotonic()
         if self._silence.at is None:
@@ -139,13 +143,14 @@ class ManualFlight:
                 climb_mps=sticks.climb * limits.climb_mps,
             )
         )
+        return None
 
     def _takes_over(self, sender: Hashable, sticks: Sticks) -> bool:
         """True at the moment at which this client's joystick takes the drone over."""
         largest = max(abs(sticks.forward), abs(sticks.right), abs(sticks.turn))
         if not self.override.moved(sender, largest, self._clock.monotonic()) or self._overriding:
             return False
-        if self._vehicle.drone.controller.pilot_acquired_control:
+        if self._vehicle.drone.controller.pilot_acquired_control or self._refused() is not None:
             return False
         return bool(self._overridable() & self.override.sources)
 
@@ -164,26 +169,17 @@ class ManualFlight:
         if sender == self._pilot:
             self._let_go(Event.CENTRED)
 
-    def _may_fly(self, sticks: Sticks) -> bool:
-        """Return True when these sticks may fly the drone: in the air and in mode Position.
-
-        A refusal is sent as a text only when the deflection looks deliberate: a throttle may rest at its end.
-        """
+    def _objection(self, sticks: Sticks) -> OperatorText | None:
+        """Return why these sticks may not fly the drone; None in the air and in mode Position."""
         vehicle, mode = self._vehicle, self._vehicle.mode
-        meant = max(abs(sticks.forward), abs(sticks.right), abs(sticks.turn)) >= MEANT
-        reason: OperatorText | None = None
         if vehicle.on_ground:
-            if sticks.climb <= -GESTURE and sticks.turn >= GESTURE:
-                reason = texts.STICKS_DO_NOT_ARM
-        elif mode is not FlightMode.POSITION:
-            reason = texts.STICKS_IGNORED_MODE.fill(mode=mode.value) if meant else None
-        elif vehicle.drone.controller.pilot_acquired_control:
-            reason = texts.PILOT
-        else:
-            return True
-        if reason is not None:
-            self.warn_throttled(texts.STICKS_IGNORED.fill(reason=reason))
-        return False
+            is_gesture = sticks.climb <= -GESTURE and sticks.turn >= GESTURE
+            return texts.STICKS_DO_NOT_ARM if is_gesture else texts.TAKE_OFF_FIRST
+        if (reason := self._refused()) is not None:
+            return reason
+        if mode is not FlightMode.POSITION:
+            return texts.STICKS_IGNORED_MODE.fill(mode=mode.value)
+        return texts.PILOT if vehicle.drone.controller.pilot_acquired_control else None
 
     def end(self) -> list[asyncio.Task[None]]:
         """End this flight task: something else flies the drone now."""

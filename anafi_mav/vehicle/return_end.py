@@ -5,7 +5,7 @@ The text has the reason. The command is a client's or the gateway's own. The dro
 that the drone begins by itself. PX4 and ArduCopter land by default. So the gateway commands the landing, once the
 drone has reported that the return is finished, and only where it is certain enough of the place: see `objection`.
 
-A commanded return is one `Attempt`. Any newer command, the ground and the loss of the link end it, and with it
+A commanded return is one `ReturnAttempt`. Any newer command, the ground and the loss of the link end it, and with it
 everything that would still have been sent for it.
 """
 
@@ -34,6 +34,7 @@ from anafi_mav.drone.events import (
 from anafi_mav.errors import AnafiMavError, LinkLost
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.flight_task import PlainTask, TaskRules
 from anafi_mav.vehicle.base.flying import LANDING
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.severity import Severity
@@ -80,7 +81,7 @@ class _Phase(enum.Enum):
 
 
 @dataclass
-class Attempt:
+class ReturnAttempt:
     """One commanded return, until it has landed, hovers for good, or is replaced."""
 
     phase: _Phase
@@ -112,8 +113,12 @@ class _GivenHome:
     """Of the flight in which it was chosen; None where the drone reports none."""
 
 
-class ReturnEnd:
-    """The end of the returns of one vehicle."""
+class ReturnEnd(PlainTask):
+    """The flight task Return: a commanded return, until the drone has landed or hovers."""
+
+    rules = TaskRules(texts.RETURN, is_flight=False)
+    mode = None
+    """The drone reports that it returns; see `shown`."""
 
     def __init__(self, vehicle: Aircraft, land: Callable[[], Awaitable[None]]) -> None:
         """`land` commands a landing and returns when the drone has reported it."""
@@ -123,7 +128,7 @@ class ReturnEnd:
         """s above home before the landing (a parameter); `SHORTEST_WAIT` holds where this is less."""
         self._vehicle = vehicle
         self._command_landing = land
-        self._attempt: Attempt | None = None
+        self._attempt: ReturnAttempt | None = None
         self._given: _GivenHome | None = None
 
     @property
@@ -136,6 +141,18 @@ class ReturnEnd:
         """The mode is Return though the drone reports none: it waits above home, or lands."""
         return self._attempt is not None and self._attempt.phase in (_Phase.WAITING, _Phase.LANDING)
 
+    @property
+    def owns_descent(self) -> bool:
+        return self.active
+
+    @property
+    def commands_landing(self) -> bool:
+        """True while the gateway has commanded the landing at home, and the drone has not answered."""
+        attempt = self._attempt
+        if attempt is None or attempt.phase is not _Phase.LANDING or self._drone_lands:
+            return False
+        return attempt.task is not None
+
     def set_home(self, place: Position, label: OperatorText) -> None:
         """A client has set the drone's custom home, or a rally point has become it."""
         if not self._vehicle.on_ground:
@@ -143,19 +160,19 @@ class ReturnEnd:
 
     # A return begins and ends.
 
-    def command(self) -> Attempt:
+    def command(self) -> ReturnAttempt:
         """The drone is about to be commanded to return."""
         self.end()
-        self._attempt = Attempt(_Phase.RETURNING if self._vehicle.returning else _Phase.COMMANDED)
+        self._attempt = ReturnAttempt(_Phase.RETURNING if self._vehicle.returning else _Phase.COMMANDED)
         return self._attempt
 
-    def fail(self, attempt: Attempt) -> None:
+    def fail(self, attempt: ReturnAttempt) -> None:
         """The drone does not return, or a newer command has replaced this one."""
         if self._attempt is attempt:
             self._attempt = None
             attempt.stop()
 
-    def announce(self, attempt: Attempt, system: int | None) -> None:
+    def announce(self, attempt: ReturnAttempt, system: int | None) -> None:
         """The commanded return has begun: send every client its end.
 
         `system` commanded it; None: the gateway.
@@ -181,6 +198,11 @@ class ReturnEnd:
         if attempt.phase is _Phase.WAITING:
             self._vehicle.text(Severity.NOTICE, texts.HOME_LANDING_CANCELLED)
         return attempt.stop()
+
+    def _close(self) -> None:
+        """The attempt is over: nothing is left to be sent for it."""
+        self._attempt = None
+        self._vehicle.control.release(self)
 
     def link_down(self) -> None:
         """The drone ends a return by its own setting from now on."""
@@ -215,7 +237,7 @@ class ReturnEnd:
             elif self._vehicle.in_air:
                 self._hover(texts.HOVER_STOPPED if home.reason == ReturnReason.STOPPED else texts.HOVER_UNFINISHED)
             else:
-                self._attempt = None
+                self._close()
 
     def on_flying_state(self) -> None:
         """The drone's flying state has changed."""
@@ -223,18 +245,18 @@ class ReturnEnd:
         if attempt is None:
             return
         if self._vehicle.flying_state == FlyingState.EMERGENCY_LANDING:
-            self.end()  # by the drone itself, and shown as a landing
+            self._vehicle.control.release(self)  # by the drone itself, and shown as a landing
         elif attempt.phase is _Phase.RETURNING:
             self._watch_end(attempt)
         elif attempt.phase is _Phase.WAITING and self._vehicle.flying_state in LANDING:
             attempt.stop()
             attempt.phase = _Phase.LANDING
         elif attempt.phase is _Phase.LANDING and attempt.task is None and self._vehicle.in_air:
-            self._attempt = None  # the landing was ended elsewhere
+            self._close()  # the landing was ended elsewhere
 
     # The end.
 
-    def _arrived(self, attempt: Attempt) -> None:
+    def _arrived(self, attempt: ReturnAttempt) -> None:
         """The drone has reported the return as finished."""
         if self._drone_lands:
             attempt.phase = _Phase.LANDING
@@ -247,7 +269,7 @@ class ReturnEnd:
             attempt.phase = _Phase.WAITING
             attempt.task = asyncio.get_running_loop().create_task(self._land(attempt))
 
-    async def _land(self, attempt: Attempt) -> None:
+    async def _land(self, attempt: ReturnAttempt) -> None:
         """Wait above home, then land. Every condition is judged again before each step."""
         vehicle = self._vehicle
         vehicle.changed()
@@ -276,12 +298,11 @@ class ReturnEnd:
             logger.warning("landing at home: %s", error)
             vehicle.text(Severity.ERROR, texts.HOME_LANDING_FAILED)
             if self._attempt is attempt:
-                self._attempt = None
-                vehicle.changed()
+                self._close()
         finally:
             attempt.task = None
 
-    async def _see_landing(self, attempt: Attempt) -> None:
+    async def _see_landing(self, attempt: ReturnAttempt) -> None:
         """Report a hover when the landing by the drone's own setting does not begin in time.
 
         So a landing is not shown for longer than it is true.
@@ -309,7 +330,7 @@ class ReturnEnd:
         """
         vehicle, attempt = self._vehicle, self._attempt
         if attempt is not None:
-            self._attempt = None
+            self._close()
             attempt.stop()
         altitude = vehicle.drone.piloting.state.altitude
         at = texts.AT_HOME if altitude is None else texts.AT_HEIGHT.fill(height=altitude)
@@ -319,7 +340,7 @@ class ReturnEnd:
             vehicle.text(Severity.WARNING, texts.RETURN_HOVERS_REASON.fill(at=at, reason=reason))
         vehicle.changed()
 
-    def _watch_end(self, attempt: Attempt) -> None:
+    def _watch_end(self, attempt: ReturnAttempt) -> None:
         """Notice a drone that hovers at home and reports no end of its return."""
         if attempt.asked:
             return
@@ -330,7 +351,7 @@ class ReturnEnd:
             attempt.doubt = Alarm(partial(self._unreported, attempt))
             attempt.doubt.set_in(UNREPORTED)
 
-    def _unreported(self, attempt: Attempt) -> None:
+    def _unreported(self, attempt: ReturnAttempt) -> None:
         metres = _metres(self._vehicle.place, self._vehicle.drone.home.state.location)
         if attempt is not self._attempt or metres is None or metres > NEAR_HOME:
             return
@@ -340,7 +361,7 @@ class ReturnEnd:
         with contextlib.suppress(LinkLost):
             self._vehicle.drone.home.request_states()
 
-    def _unanswered(self, attempt: Attempt) -> None:
+    def _unanswered(self, attempt: ReturnAttempt) -> None:
         if attempt is self._attempt:
             self._hover(texts.HOVER_UNREPORTED)
 

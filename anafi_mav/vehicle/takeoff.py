@@ -15,12 +15,16 @@ from anafi_mav import texts
 from anafi_mav.clock import Alarm
 from anafi_mav.drone.events import AltitudeChanged, FlyingState, FlyingStateChanged
 from anafi_mav.errors import AnafiMavError
-from anafi_mav.texts import OperatorText
-from anafi_mav.vehicle.base.aircraft import STOP_WAIT, Aircraft
+from anafi_mav.texts import Subject
+from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import check_height
+from anafi_mav.vehicle.base.control import Control
+from anafi_mav.vehicle.base.flight_task import DISARM, HAND_LAUNCH, FlightTask, PlainTask, TaskRules
 from anafi_mav.vehicle.base.flying import AIRBORNE
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.refusal import Refused, Rejected, Unfinished, not_ready
+from anafi_mav.vehicle.base.refusal import Refused, Rejected, Unfinished, not_ready, reason_of
+from anafi_mav.vehicle.base.requester import By
+from anafi_mav.vehicle.base.right import Right
 from anafi_mav.vehicle.base.severity import Severity
 
 AUTO_DISARM = 10.0
@@ -49,9 +53,36 @@ CLOSE_ENOUGH = 0.1
 
 _RISING = (FlyingState.MOTOR_RAMPING, FlyingState.TAKINGOFF)
 
+_RISES = TaskRules(texts.TAKEOFF)
+"""Of a take-off that waits for nothing: the hovering mode after it is Guided or Hold."""
 
-class Takeoff:
+
+class _Waiting(PlainTask):
+    """A command that follows the take-off: the newest is the one successor."""
+
+    mode = None
+
+    def __init__(self, what: Subject, control: Control) -> None:
+        self.rules = TaskRules(what, keeps_below=True)
+        self._control = control
+        self._task = asyncio.current_task()
+
+    def end(self) -> list[asyncio.Task[None]]:
+        """Cancel the command when another one follows the take-off.
+
+        With the take-off it fails by itself.
+        """
+        if self._task is not None and self._control.successor not in (None, self):
+            self._task.cancel()
+        return []
+
+
+class Takeoff(PlainTask):
     """The way of one vehicle from standing disarmed to hovering at a height."""
+
+    rules = TaskRules(texts.TAKEOFF, keeps_below=True)
+    mode = None
+    """The drone reports that it takes off."""
 
     def __init__(self, vehicle: Aircraft, armed: Callable[[Hashable], None]) -> None:
         self.height = 2.5
@@ -64,10 +95,6 @@ class Takeoff:
         self._armed = False
         self._armed_by: set[Hashable] = set()
         """Clients that have armed since the vehicle was disarmed last."""
-        self.ended: Callable[[], None] = lambda: None
-        """Called when an accepted take-off has ended, at its height or not."""
-        self._waiting: asyncio.Task[Any] | None = None
-        """The command that waits for the end of a take-off."""
         self._reached = False
         """The last take-off has reached its height."""
         self._climbing = False
@@ -109,7 +136,7 @@ class Takeoff:
 
     # What clients ask for. Each returns when the drone confirmed, or raises.
 
-    async def arm(self, client: Hashable = None) -> None:
+    async def arm(self, by: Right) -> None:
         """Accept arming.
 
         An ANAFI has no such state: nothing turns until a take-off; it lapses after `AUTO_DISARM`.
@@ -119,14 +146,14 @@ class Takeoff:
         A take-off that this client commanded begins now. Another client's does not: a client that arms only to look
         at something must not find propellers turning.
         """
-        vehicle = self._vehicle
+        vehicle, client = self._vehicle, by.client
         if vehicle.armed and not vehicle.on_ground:
             return
         if problems := vehicle.prearm_problems():
             raise not_ready(problems)
         if self.hand_launch:
-            await vehicle.take_over()
-            await vehicle.drone.piloting.hand_launch()
+            async with vehicle.control.acquire(HAND_LAUNCH, by=by):
+                await vehicle.drone.piloting.hand_launch()
             return
         if not self._armed:
             self._armed_by.clear()
@@ -136,12 +163,12 @@ class Takeoff:
         vehicle.changed()
         if self._pending is not None and self._pending[1] == client:
             height, _ = self._pending
-            self.forget()
-            self._start_background(self._take_off_and_report(height))
+            self._forget()
+            self._start_background(self._take_off_and_report(height, by))
         else:
             self._tell_armed(client)
 
-    async def disarm(self, *, force: bool) -> None:
+    async def disarm(self, by: Right, *, force: bool) -> None:
         """Disarm on the ground; propellers that turn there are stopped first.
 
         With `force` the motors are cut for that if need be. In the air only `force` with `allow_kill` disarms: the
@@ -149,22 +176,26 @@ class Takeoff:
         """
         vehicle = self._vehicle
         if vehicle.on_ground:
-            await vehicle.take_over(STOP_WAIT)
-            await vehicle.drone.piloting.land()  # a take-off that is on its way to the drone must not follow
+            await self._land(by)  # a take-off that is on its way to the drone must not follow
             if not vehicle.on_ground:
                 raise Refused(texts.DISARM, texts.JUST_TAKEN_OFF)
-            self._armed = False
-            vehicle.changed()
+        elif self._turns_near_ground:
+            async with vehicle.control.acquire(DISARM, by=by):
+                await vehicle.drone.piloting.stop_motors(force=force)
+        elif force:
+            await vehicle.terminate(by)
             return
-        if self._turns_near_ground:
-            await vehicle.take_over(STOP_WAIT)
-            await vehicle.drone.piloting.stop_motors(force=force)
-            self._armed = False
-            vehicle.changed()
-            return
-        if not force:
+        else:
             raise Refused(texts.DISARM, texts.IN_AIR)
-        await vehicle.terminate()
+        self._set_disarmed()
+
+    async def _land(self, by: By) -> None:
+        async with self._vehicle.control.acquire(DISARM, by=by):
+            await self._vehicle.drone.piloting.land()
+
+    def _set_disarmed(self) -> None:
+        self._armed = False
+        self._vehicle.changed()
 
     @property
     def _turns_near_ground(self) -> bool:
@@ -175,7 +206,7 @@ class Takeoff:
             return height is not None and height < LOW
         return vehicle.flying_state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF)
 
-    async def begin(self, ato: float | None, client: Hashable = None) -> None:
+    async def take_off(self, ato: float | None, by: Right) -> None:
         """Take off to `ato` m (None: `height`). Returns when the drone confirmed that it takes off.
 
         Disarmed, it returns at once and the take-off waits `ARM_WAIT` for this client to arm.
@@ -187,15 +218,14 @@ class Takeoff:
             raise Refused(texts.TAKEOFF, texts.IN_AIR)
         if problems := vehicle.prearm_problems():
             raise not_ready(problems)
-        await vehicle.take_over()  # also where it waits for arming: what lifts off then is replaced now
         if not self._armed:
-            self._pending = (height, client)
-            self._lapsing.set_in(ARM_WAIT)
+            async with vehicle.control.acquire(self, by=by):  # what lifts off while it waits is replaced now
+                self._pending = (height, by.client)
+                self._lapsing.set_in(ARM_WAIT)
             return
-        await self._lift_off()
-        if vehicle.selected is not FlightMode.GUIDED:
-            vehicle.forget_mode()
-        self._start_background(self._climb(height))
+        async with vehicle.control.acquire(self, by=by, below=self._below, rules=_RISES):
+            await self._lift_off()
+        self._start_background(self._climb(height, by))
 
     async def launch(self) -> None:
         """Take off to the drone's own height, for setpoints; returns when the drone confirmed it."""
@@ -203,17 +233,15 @@ class Takeoff:
             raise not_ready(problems)
         await self._lift_off()
 
-    async def abort(self) -> None:
+    async def abort(self, by: By) -> None:
         """Disarm a drone that stands, land one that is about to leave the ground.
 
         Its setpoints have stopped.
         """
-        await self._vehicle.take_over(STOP_WAIT)
-        await self._vehicle.drone.piloting.land()
-        self._armed = False
-        self._vehicle.changed()
+        await self._land(by)
+        self._set_disarmed()
 
-    async def over(self, what: OperatorText) -> None:
+    async def over(self, what: Subject) -> None:
         """Wait until an accepted take-off has reached its height.
 
         Returns at once when the drone does not rise. When a Hold has ended the climb, the drone still rises to its
@@ -223,8 +251,9 @@ class Takeoff:
         """
         if not self.rises:
             return
-        self.displace()
-        current = self._waiting = asyncio.current_task()
+        control = self._vehicle.control
+        waiting = _Waiting(what, control)
+        control.succeed(waiting)
         end = asyncio.get_running_loop().create_task(self._until_risen())
         try:
             await asyncio.wait({end}, timeout=TAKEOFF_WAIT)
@@ -234,14 +263,7 @@ class Takeoff:
                 raise Unfinished(what, texts.TAKEOFF_TOO_LOW)
         finally:
             end.cancel()
-            if self._waiting is current:
-                self._waiting = None
-
-    def displace(self) -> None:
-        """Cancel the command that waits for the end of a take-off: a newer one is flown at that end."""
-        waiting, self._waiting = self._waiting, None
-        if waiting is not None:
-            waiting.cancel()
+            control.release(waiting)
 
     async def _until_risen(self) -> bool:
         """Wait for the end of a take-off, or of a rise.
@@ -258,35 +280,42 @@ class Takeoff:
 
     # What ends it.
 
-    def forget(self) -> None:
+    def end(self) -> list[asyncio.Task[None]]:
+        """End the take-off: another flight task is active now. Also one that waits for arming.
+
+        Returns tasks that are about to end.
+        """
+        self._forget()
+        task, self._background, self._climbing = self._background, None, False
+        if task is None or task is asyncio.current_task():
+            return []
+        task.cancel()
+        return [task]
+
+    @property
+    def _below(self) -> FlightTask | None:
+        """The hovering mode after the take-off: Guided where it was chosen, else Hold."""
+        control = self._vehicle.control
+        return control.below if control.mode is FlightMode.GUIDED else None
+
+    @property
+    def owns_descent(self) -> bool:
+        """True before the climb.
+
+        A take-off that has yet to begin is not disturbed, and reports its own failure.
+        """
+        return self.under_way and not self._climbing
+
+    def _forget(self) -> None:
         """Cancel the take-off that waits for arming, if there is one."""
         if self._pending is not None:
             self._pending = None
             self._lapsing.cancel()
 
-    def end(self) -> list[asyncio.Task[None]]:
-        """Abort the background part of the take-off: another flight task is active now.
-
-        Returns tasks that are about to end.
-        """
-        task, self._background, self._climbing = self._background, None, False
-        if task is None:
-            return []
-        task.cancel()
-        return [task]
-
-    def end_climb(self) -> None:
-        """The drone lands or returns: it does not climb.
-
-        A take-off that has yet to begin is not disturbed.
-        """
-        if self._climbing:
-            self.end()
-
     def came_down(self) -> None:
         """The drone has come down: it is disarmed, and nothing of before lifts it off again."""
         self._armed = False
-        self.forget()
+        self._forget()
 
     def left_ground(self) -> None:
         """The drone has left the ground: arming does not lapse any more."""
@@ -306,26 +335,29 @@ class Takeoff:
         Until it has succeeded or failed, the armed state does not lapse.
         """
         self._disarming.cancel()
-        self._vehicle.paused = False  # a pause that comes from here on ends this take-off
+        self._vehicle.control.resume()  # a pause that comes from here on ends this take-off
         try:
             await self._vehicle.drone.piloting.take_off()
         finally:
             if self._armed and self._vehicle.on_ground:
                 self._disarming.set_in(AUTO_DISARM)
 
-    async def _take_off_and_report(self, height: float) -> None:
+    async def _take_off_and_report(self, height: float, by: By) -> None:
         """Take off after the wait for arming; failures are sent as texts.
 
-        The command was answered long ago.
+        The command was answered long ago, and its permission may have ended since.
         """
         try:
+            self._vehicle.control.check(self, by)
             await self._lift_off()
         except AnafiMavError as error:
-            self._vehicle.text(Severity.ERROR, texts.TAKEOFF_FAILED.fill(error=error))
+            self._vehicle.text(Severity.ERROR, texts.TAKEOFF_FAILED.fill(error=reason_of(error)))
+            self._over()
             return
-        await self._climb(height)
+        self._vehicle.control.adopt(self, below=self._below)
+        await self._climb(height, by)
 
-    async def _climb(self, height: float) -> None:
+    async def _climb(self, height: float, by: By) -> None:
         """From the drone's own hover height to the asked one."""
         vehicle = self._vehicle
         self._climbing = True
@@ -337,33 +369,33 @@ class Takeoff:
             present = (await vehicle.drone.expect(AltitudeChanged, timeout=ALTITUDE_WAIT)).altitude
             if not vehicle.in_air or vehicle.returning:
                 raise Rejected(vehicle.activity)
+            vehicle.control.check(self, by)
             if abs(height - present) > CLOSE_ENOUGH:
                 await vehicle.drone.piloting.move_by(0.0, 0.0, present - height, 0.0)
             self._reached = True
         except AnafiMavError as error:
-            vehicle.text(Severity.ERROR, texts.CLIMB_ABORTED.fill(height=height, error=error))
+            vehicle.text(Severity.ERROR, texts.CLIMB_ABORTED.fill(height=height, error=reason_of(error)))
         finally:
-            if self._background is asyncio.current_task():
-                self._climbing, self._background = False, None
-                vehicle.changed()
+            self._over()
+
+    def _over(self) -> None:
+        """The background part has ended: its successor flies, or the drone hovers."""
+        if self._background is asyncio.current_task():
+            self._climbing, self._background = False, None
+            self._vehicle.control.release(self)
+            self._vehicle.changed()
 
     def _start_background(self, work: Coroutine[Any, Any, None]) -> None:
-        self.end()
         self._reached = False
         task = asyncio.get_running_loop().create_task(work)
         self._background = task
         self._tasks.add(task)
-        task.add_done_callback(self._done)
-
-    def _done(self, task: asyncio.Task[None]) -> None:
-        self._tasks.discard(task)
-        if not self.under_way:
-            self.ended()
+        task.add_done_callback(self._tasks.discard)
 
     # What lapses.
 
     def _lapsed(self) -> None:
-        self.forget()
+        self._vehicle.control.release(self)
         self._vehicle.text(Severity.WARNING, texts.TAKEOFF_CANCELLED.fill(seconds=ARM_WAIT))
 
     def _auto_disarm(self) -> None:
@@ -372,6 +404,5 @@ class Takeoff:
                 AUTO_DISARM
             )  # a mission's start is with the drone: who says disarmed now may see it rise
         elif self._armed and self._vehicle.on_ground:
-            self._armed = False
             self._vehicle.text(Severity.INFO, texts.DISARMED)
-            self._vehicle.changed()
+            self._set_disarmed()

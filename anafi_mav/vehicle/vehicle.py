@@ -2,19 +2,16 @@
 
 No flavour, no message.
 
-It holds the states that MAVLink has and an ANAFI has not (armed, chosen mode) and keeps them true: both follow the
-drone's behaviour, and a verb returns when the drone confirmed. Every flight task is acquired and released here. The
-take-off is in `takeoff`, the flight to a place in `guided_flight`; a part that sends the drone setpoints all the time
-is a flight task.
+It holds the states that MAVLink has and an ANAFI has not (armed, mode) and keeps them true: both follow the drone's
+behaviour, and a verb returns when the drone confirmed. Which flight task is active is stored in `base.control` alone.
+The mode is derived from that task and from what the drone does by itself.
 """
 
 from __future__ import annotations
 
-import asyncio
 import enum
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 
 from anafi_mav import texts
@@ -40,29 +37,33 @@ from anafi_mav.drone.events import (
 from anafi_mav.errors import CommandRejected
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.aborted_return import AbortedReturn
-from anafi_mav.vehicle.base.aircraft import STOP_WAIT, Aircraft
+from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.clients import system_of
+from anafi_mav.vehicle.base.control_machine import DroneAct, State
+from anafi_mav.vehicle.base.flight_task import LAND, MOTOR_CUT, FlightTask, Hover
 from anafi_mav.vehicle.base.flying import AIRBORNE, LANDING, ON_GROUND, TAKING_OFF
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.height import ESTIMATE_ERROR, TakeoffRecord
-from anafi_mav.vehicle.base.helm import Helm
-from anafi_mav.vehicle.base.link_loss import LossPolicy
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.requester import By, Source, client_of, right_of
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.controller_inputs import ControllerInputs
 from anafi_mav.vehicle.fence.rally import RallyPoints
+from anafi_mav.vehicle.flight_policy import first_refusal
 from anafi_mav.vehicle.follow_flight import FollowFlight
 from anafi_mav.vehicle.guided_flight import GuidedFlight
 from anafi_mav.vehicle.hold_rule import APART, HoldRule
 from anafi_mav.vehicle.initiator import Initiator, Initiators
 from anafi_mav.vehicle.joystick_override import Override
+from anafi_mav.vehicle.link_loss import LossPolicy
 from anafi_mav.vehicle.manual_flight import ManualFlight
 from anafi_mav.vehicle.mission.flight import MissionFlight
 from anafi_mav.vehicle.offboard.flight import OffboardFlight
+from anafi_mav.vehicle.pilot_switch import PilotSwitch
 from anafi_mav.vehicle.return_end import ReturnEnd
 from anafi_mav.vehicle.takeoff import Takeoff
 
@@ -122,47 +123,38 @@ class Vehicle(Aircraft):
         allow_kill: bool,
         text: Callable[[Severity, OperatorText], None],
         changed: Callable[[], None],
-        end_others: Callable[[], list[asyncio.Task[None]]],
     ) -> None:
         super().__init__(drone, clock, text=text, changed=changed)
         self.gcs_loss = LossPolicy()
         """Reaction to the loss of all ground stations (a parameter)."""
         self.rally = RallyPoints()
-        self.orders = 0
-        """Counts who took the vehicle over, and what ended all orders: the ground, the loss of the link."""
         self.intended: FlightMode | None = None
         """The mode that a client last asked for by name or number."""
         self.allow_kill = allow_kill
         self._lands_next: tuple[int, float] | None = None
-        """A return has finished that the drone ends by landing: the count of orders then, and until when it is due."""
-        self._end_others = end_others
+        """A return has finished that the drone ends by landing: the epoch then, and until when it is due."""
         self._initiators = Initiators()
-        self._landing_sent = 0
-        """Landings that were sent and have not been answered."""
         self.landing_ended_at = -math.inf
         """When a client last ended a landing."""
-        self._returns_sent = 0
-        """Returns that were sent and have not been answered."""
         self.holds = HoldRule()
         """Which Holds of clients count against a return of the drone's own."""
         self.aborted_return: AbortedReturn | None = None
         """The return of the drone's own that a client has ended, while that has to be repeated to everybody."""
-        self._terminating = False
         self._last_flying: FlyingState | None = None
         self.return_end = ReturnEnd(self, self._land_after_return)
         self._takeoff_before: Position | None = None
         """The take-off place that the drone reported when it landed: of the flight that has ended."""
-        self.mission = MissionFlight(self)
+        self.mission = MissionFlight(self, clock)
         self.takeoff = Takeoff(self, self.mission.armed)
         self.guided = GuidedFlight(self)
         self.offboard = OffboardFlight(self, clock, self.takeoff)
-        self.takeoff.ended = self.offboard.after_takeoff
-        self.manual = ManualFlight(self, clock, lambda: self.overridable)
+        self.manual = ManualFlight(self, clock, lambda: self.overridable, lambda: self.pilot_switch.objection)
+        self.pilot_switch = PilotSwitch(self, drone.controller, lambda: self.control.perform(self.stop_for_pilot()))
+        self.control.policy = first_refusal(self.pilot_switch.refusal)
         self.controller_inputs = ControllerInputs(drone.controller)
         self.follow = FollowFlight(self, lambda: self.offboard.motion, clock)
         self.plan_ids: dict[int, int] = {}
         """Opaque ids of the plans that are in force, by MAV_MISSION_TYPE."""
-        self.helms = (self.offboard, self.manual, self.follow, self.mission)
 
     # What the vehicle is.
 
@@ -194,17 +186,18 @@ class Vehicle(Aircraft):
             return FlightMode.RETURN
         if state in TAKING_OFF or (self.takeoff.climbing and not self.on_ground):
             return FlightMode.MISSION if self.mission.flying else FlightMode.TAKEOFF
-        if state in AIRBORNE and self.drone.piloting.state.plan == PlayingState.PLAYING:
+        plays = self.drone.piloting.state.plan == PlayingState.PLAYING
+        if state in AIRBORNE and plays and not self.mission.machine.has_withdrawn_start:
             return FlightMode.MISSION
-        return self._selected
+        return self.control.mode
 
     @property
     def _is_about_to_land(self) -> bool:
         """Between a return and its landing the drone reports neither; no mode is shown in between."""
         if self._lands_next is None or not self.in_air:
             return False
-        orders, until = self._lands_next
-        return orders == self.orders and self._clock.monotonic() < until
+        epoch, until = self._lands_next
+        return epoch == self.control.epoch and self._clock.monotonic() < until
 
     @property
     def overridable(self) -> Override:
@@ -236,12 +229,12 @@ class Vehicle(Aircraft):
     @property
     def mission_needs_gimbal(self) -> bool:
         """True while the gimbal belongs to the mission that is flown; a paused mission frees it."""
-        return self.mission.progress.needs_gimbal
+        return self.control.active is self.mission and self.mission.machine.needs_gimbal
 
     @property
     def mission_needs_camera(self) -> bool:
         """True while the camera belongs to the mission that is flown; a paused mission frees it."""
-        return self.mission.progress.needs_camera
+        return self.control.active is self.mission and self.mission.machine.needs_camera
 
     @property
     def enterable_modes(self) -> frozenset[FlightMode]:
@@ -259,7 +252,7 @@ class Vehicle(Aircraft):
 
     # What it can be told to do. Each returns when the drone confirmed, or raises.
 
-    async def terminate(self) -> None:
+    async def terminate(self, by: By) -> None:
         """Cut the motors, at once: what this replaces is not waited for, and sends nothing any more."""
         if not self.allow_kill:
             raise Refused(
@@ -268,135 +261,150 @@ class Vehicle(Aircraft):
                 lasting=True,
                 critical=True,
             )
-        self._require_motors()
-        self._terminating = True
-        try:
-            self.drone.silence(self._replace())
+        async with self.control.acquire(MOTOR_CUT, by=by):
             await self.drone.piloting.emergency()
-        finally:
-            self._terminating = False
 
-    async def land(self) -> None:
+    async def land(self, by: By) -> None:
         """Land here. On the ground there is nothing to do."""
         self._initiators.land_commanded(self._clock.monotonic())
-        self._landing_sent += 1
-        try:
-            await self.take_over(STOP_WAIT)
-            with self._selected_no_more(None):
-                await self.drone.piloting.land()
-                self.paused = False
-        finally:
-            self._landing_sent -= 1
+        rules = replace(LAND.rules, keeps_below=self.on_ground)  # on the ground there is no mode to leave
+        async with self.control.acquire(LAND, by=by, rules=rules):
+            await self.drone.piloting.land()
+        if self.flying_state not in LANDING:
+            self.control.release(LAND)
 
     async def _land_after_return(self) -> None:
         """Land at the end of a return that a client commanded; the landing is that client's too."""
         self._initiators.land_commanded(self._clock.monotonic())
-        self._landing_sent += 1
-        try:
-            await self.drone.piloting.land()
-        finally:
-            self._landing_sent -= 1
+        await self.drone.piloting.land()
 
-    async def return_home(self, by: Right | None = None) -> None:
-        """Fly home by the drone's own return. A landing goes on unless `by` ends it."""
+    async def return_home(self, by: By) -> None:
+        """Fly home by the drone's own return. A landing goes on unless `by` may end it."""
         if self.on_ground:
             raise Refused(texts.RETURN, texts.ON_GROUND)
         if self.return_end.shown:
             return  # it waits above home or lands there, and would climb and fly home once more
-        commanded = None if by is None else replace(by, extent=Extent.COMMANDED)
+        commanded = replace(by, extent=Extent.COMMANDED) if isinstance(by, Right) else None
         if lands := self.landing:
             self._require_endable(texts.RETURN, commanded)
             if self.drone.home.state.rth == RthState.UNAVAILABLE:  # the landing would be ended for nothing
                 raise Refused(texts.RETURN, texts.RETURN_UNAVAILABLE)
-        await self.take_over()
-        if lands or self.landing:
-            with self._selected_no_more(FlightMode.HOLD):
-                if await self.drone.piloting.settle_landing():
-                    self._require_endable(texts.RETURN, commanded)
-                    await self._end_landing(texts.RETURN, commanded)
-        self._initiators.return_commanded(self._clock.monotonic())
-        self._returns_sent += 1
-        attempt = self.return_end.command()
-        try:
-            with self._selected_no_more(None):
+        async with self.control.acquire(self.return_end, by=by):
+            if (lands or self.landing) and await self.drone.piloting.settle_landing():
+                self._require_endable(texts.RETURN, commanded)
+                await self._end_landing(texts.RETURN, commanded)
+            self._initiators.return_commanded(self._clock.monotonic())
+            attempt = self.return_end.command()
+            try:
                 await self.drone.piloting.return_home()
-                self.paused = False
-        except BaseException:
-            self.return_end.fail(attempt)
-            raise
-        finally:
-            self._returns_sent -= 1
-        self.return_end.announce(attempt, None if by is None else system_of(by.client))
+            except BaseException:
+                self.return_end.fail(attempt)
+                raise
+        self.return_end.announce(attempt, system_of(client_of(by)))
 
-    async def hold(self, mode: FlightMode = FlightMode.HOLD, by: Right | None = None, *, pause: bool = False) -> None:
-        """Stop and hover. A landing or return goes on, and this is refused, unless `by` ends it.
+    async def hold(self, mode: FlightMode, by: By, *, chosen: bool = False, pause: bool = False) -> None:
+        """Stop and hover. A landing or return goes on, and this is refused, unless `by` may end it.
 
-        `pause`: setpoints of every client are ignored from now on, see `paused`.
+        `chosen`: a client has chosen the mode by name or number. `pause`: setpoints of every client are ignored from
+        now on; what flew is what DO_PAUSE_CONTINUE goes on with.
         """
-        self._require_endable(texts.Subject(mode.value), by)
+        what, right = texts.Subject(mode.value), right_of(by)
+        self._require_endable(what, right)
         own = self.returning_by_itself
         rising = self.drone.piloting.about_to_fly
-        latched = self.paused and (pause or mode is self.mode)
-        before, orders = self.paused, self.orders
-        self.paused = before or pause
-        try:
-            await self.take_over(STOP_WAIT)
+        pauses = pause or (self.control.paused and mode is self.mode)
+        resumes = self._paused_task if pause else None
+        hover = Hover(mode, client_of(by) if chosen else None, resumes)
+        async with self.control.acquire(
+            self.manual if mode is FlightMode.POSITION else hover, by=by, pauses=pauses
+        ) as grant:
             if not self.on_ground or rising:
-                with self._selected_no_more(mode):
-                    await self._stop(texts.Subject(mode.value), by, own=own)
-        except BaseException:
-            if self.orders <= orders + 1:  # else a newer command has replaced this one, and the latch is its own
-                self.paused = before
-            raise
-        self.select(mode)
-        self.paused = (latched or pause) and (rising or not self.on_ground)
+                await self._stop(what, right, own=own)
+            grant.begin(pauses=pauses and (rising or not self.on_ground))
         if rising:
             self.text(Severity.WARNING, texts.MODE_MAY_RISE.fill(mode=mode.value))
+
+    async def stop_for_pilot(self) -> None:
+        """End what flies or is about to fly, for the pilot; return when the drone hovers or stands.
+
+        A drone that has not left the ground stays there, and a landing or return goes on. A drone that nothing of ours
+        flies receives nothing: its take-off may be the pilot's own.
+        """
+        control, active, by = self.control, self.control.active, Source.SWITCH
+        is_pending = control.state in (State.RELEASING, State.ACQUIRING)
+        is_flown = active is not None and active.rules.is_flight
+        may_rise = self.drone.piloting.about_to_fly
+        moves = self.drone.controller.taken and not self.on_ground
+        if is_flown:
+            control.lose(texts.PILOT_SWITCH)
+        if self.descends and (not is_pending or control.next in (None, LAND, self.return_end)):
+            return
+        if not (is_pending or is_flown or may_rise or moves):
+            return
+        if may_rise or self.flying_state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF):
+            await self.takeoff.abort(by)
+            return
+        async with control.acquire(Hover(), by=by):
+            if not self.on_ground and not self.descends:
+                await self._stop(texts.Subject(FlightMode.HOLD.value), None)
+
+    @property
+    def _paused_task(self) -> FlightTask | None:
+        """Return the task that a pause stops now, or that an earlier pause has stopped."""
+        if (goto := self.guided.goto) is not None:
+            return goto
+        if self.mission.flying:
+            return self.mission
+        return self.interrupted
+
+    @property
+    def interrupted(self) -> FlightTask | None:
+        """The goto or mission that a pause has stopped, while nothing else was commanded since."""
+        below = self.control.below
+        return below.resumes if isinstance(below, Hover) and self.control.active is below else None
 
     async def take_off(self, ato: float | None, by: Right) -> None:
         """Take off to a height, or end a landing: then the drone hovers where it is."""
         if not self.landing or self.on_ground:
-            await self.takeoff.begin(ato, by.client)
+            await self.takeoff.take_off(ato, by)
             return
         self._require_endable(texts.TAKEOFF, by)
-        await self.take_over(STOP_WAIT)
-        with self._selected_no_more(FlightMode.HOLD):
+        async with self.control.acquire(Hover(), by=by):
             if await self.drone.piloting.settle_landing():
                 await self._end_landing(texts.TAKEOFF, by, take_off=True)
-        if self.on_ground:
-            raise Refused(texts.LANDING, texts.ALREADY_LANDED, form=texts.NOT_ABORTED)
-        self.select(FlightMode.HOLD)
+            if self.on_ground:
+                raise Refused(texts.LANDING, texts.ALREADY_LANDED, form=texts.NOT_ABORTED)
 
     async def set_mode(self, mode: FlightMode, by: Right) -> None:
         """Do what this mode means, for the client that chose it: Offboard flies its setpoints."""
         self.intended = mode
-        client, commanded = by.client, replace(by, extent=Extent.COMMANDED)
+        commanded = replace(by, extent=Extent.COMMANDED)
         match mode:
             case FlightMode.HOLD | FlightMode.POSITION:
                 await self.hold(mode, by)
             case FlightMode.GUIDED:
-                await self.hold(mode, commanded)
-                self.mode_client = client
+                await self.hold(mode, commanded, chosen=True)
             case FlightMode.LAND:
-                await self.land()
+                await self.land(by)
             case FlightMode.RETURN:
                 await self.return_home(by)
             case FlightMode.TAKEOFF:
                 await self.take_off(None, by)
             case FlightMode.OFFBOARD:
-                if self.descends and not self.offboard.streamed_for(client):
+                if self.descends and not self.offboard.streamed_for(by.client):
                     raise Refused(texts.OFFBOARD, texts.NO_SETPOINTS)
+                self.control.require_allowed(self.offboard, by)
                 await self._free(texts.OFFBOARD, commanded)
-                await self.offboard.engage(client)
-                self.mode_client = client
+                await self.offboard.engage(by)
             case FlightMode.MISSION:
                 if self.mission.there and not self.mission.flying:
+                    self.control.require_allowed(self.mission, by)
                     await self._free(texts.MISSION, commanded)
-                await self.mission.engage(client)
+                await self.mission.engage(by)
             case FlightMode.TERMINATED:
-                await self.terminate()
+                await self.terminate(by)
             case FlightMode.FOLLOW:
-                await self.follow.engage()
+                await self.follow.engage(by)
             case FlightMode.ORBIT:
                 raise Refused(texts.ORBIT, texts.BY_COMMAND_ONLY, lasting=True)
 
@@ -405,12 +413,17 @@ class Vehicle(Aircraft):
     @property
     def landing(self) -> bool:
         """The drone lands, or has been commanded to and has not answered."""
-        return self.flying_state in LANDING or (self._landing_sent > 0 and not self.on_ground)
+        return self.flying_state in LANDING or (self._landing_is_sent and not self.on_ground)
+
+    @property
+    def _landing_is_sent(self) -> bool:
+        """A landing was commanded and has not been answered."""
+        return self.control.next is LAND or self.return_end.commands_landing
 
     @property
     def descends(self) -> bool:
         """The drone lands or returns, or has been commanded to and has not answered."""
-        return self.landing or self.returning or self._returns_sent > 0
+        return self.landing or self.returning or self.control.next is self.return_end
 
     @property
     def descent(self) -> OperatorText | None:
@@ -442,7 +455,7 @@ class Vehicle(Aircraft):
                 raise Refused(what, texts.PILOT_RETURNS)
             elif by is None:
                 raise Refused(what, texts.RETURNS)
-        elif by is None and self._returns_sent > 0:
+        elif by is None and self.control.next is self.return_end:
             raise Refused(what, texts.RETURNS)
 
     def _require_own_endable(self, what: OperatorText, by: Right | None) -> None:
@@ -460,8 +473,7 @@ class Vehicle(Aircraft):
         """
         if self.descends:
             self._require_endable(what, by)
-            await self.take_over(STOP_WAIT)
-            with self._selected_no_more(FlightMode.HOLD):
+            async with self.control.acquire(Hover(), by=by):
                 await self._stop(what, by)
 
     async def _stop(self, what: OperatorText, by: Right | None, *, own: bool = False) -> None:
@@ -470,6 +482,8 @@ class Vehicle(Aircraft):
         `own`: the drone returned by itself when the command arrived. A return that it begins afterwards goes on.
         """
         piloting, home = self.drone.piloting, self.drone.home
+        if self.landing:  # it may have begun during the wait for what flew
+            self._require_endable(what, by)
         await self._end_landing(what, by)
         announced = None if by is None else self._announced_for(by)
         if own and by is not None and self.returning_by_itself:
@@ -559,16 +573,13 @@ class Vehicle(Aircraft):
             return
         self._note_landing(before)
         if state in ON_GROUND and before is not None:
-            self.orders += 1
             self.return_end.on_ground()
             self.takeoff.came_down()
-            self.end_helms(self._ending_mission)
-            self.takeoff.end_climb()
-            self._selected = FlightMode.HOLD
-            self.paused = False
+            self.control.on_ground()
+            if state == FlyingState.EMERGENCY:
+                self.control.on_descent(DroneAct.EMERGENCY)
         elif state in LANDING:
-            self.end_helms(self._ending_mission)
-            self.takeoff.end_climb()
+            self.control.on_descent(DroneAct.LANDING)
         elif state in TAKING_OFF and before in ON_GROUND:
             self.height.take_off()
             self._report_accuracy()
@@ -583,7 +594,14 @@ class Vehicle(Aircraft):
             if before in ON_GROUND:
                 self.offboard.left_ground()
         self.return_end.on_flying_state()
+        self._note_hover()
         self.changed()
+
+    def _note_hover(self) -> None:
+        """The drone may have ended what it did by itself."""
+        if self.in_air and not self.returning:
+            self.control.release(LAND)  # ended elsewhere
+            self.control.on_hover()
 
     def on_location(self) -> None:
         """A new GPS location."""
@@ -645,6 +663,8 @@ class Vehicle(Aircraft):
     def standing_warnings(self) -> list[OperatorText]:
         """Texts that stay true for a while: a client that connects later gets them with its banner."""
         warnings = [ESTIMATED] if self.height.estimated and not self.on_ground else []
+        if self.pilot_switch.objection is not None:
+            warnings.append(texts.SWITCH_PILOT)
         return [*warnings, texts.ROLL_SIGN_INVERTED] if self.roll.sign is RollSign.INVERTED else warnings
 
     @property
@@ -668,30 +688,32 @@ class Vehicle(Aircraft):
         home = self.drone.home.state
         finished = home.rth == RthState.AVAILABLE and home.reason == ReturnReason.FINISHED
         lands = finished and home.ending == RthEndingBehavior.LANDING
-        self._lands_next = (self.orders, self._clock.monotonic() + LANDS_AFTER_RETURN) if lands else None
+        self._lands_next = (self.control.epoch, self._clock.monotonic() + LANDS_AFTER_RETURN) if lands else None
         if self.returning:
             if self.mission.returns and not (self.returning_by_itself or self.return_end.active):
                 self.return_end.announce(self.return_end.command(), None)  # the mission's last item
-            self.end_helms(self._ending_mission)
-            self.takeoff.end_climb()
+                if self.control.active is self.mission:
+                    self.control.succeed(self.return_end)
+                else:
+                    self.control.adopt(self.return_end)
+            self.control.on_descent(DroneAct.RETURN)
         self.return_end.on_return_state()
+        self._note_hover()
         self.changed()
 
     def link_down(self) -> None:
         """The link is lost: nothing that was asked for outlives it."""
         self.height.link_down()
-        self.orders += 1
         self.return_end.link_down()
-        self._let_go()
+        self.mission.link_down()  # before it could be ended: the drone may fly on
+        self.control.link_down()
+        self.pilot_switch.link_down()
         self.takeoff.link_down()
-        self._selected = FlightMode.HOLD
-        self.paused = False
         self.intended = None
         self._last_flying = None
         self._located_at, self._location_every = -math.inf, 0.0
-        for helm in self.helms:
-            helm.link_down()
-        self._terminating = False
+        for task in (self.offboard, self.manual, self.follow):
+            task.link_down()
 
     @property
     def alone(self) -> str | None:
@@ -711,13 +733,17 @@ class Vehicle(Aircraft):
         """
         if self.descends:
             if not self.landing:
-                self.return_end.end()
+                self.control.release(self.return_end)
             return
-        await self.take_over()
-        if self.drone.piloting.about_to_fly:
-            await self.drone.piloting.land()
-        if not self.on_ground and not self.drone.controller.pilot_has_source:
-            await self.drone.piloting.stop()
+        if self.drone.controller.pilot_has_source:
+            if self.drone.piloting.about_to_fly:
+                await self.drone.piloting.land()
+            return
+        async with self.control.acquire(Hover(), by=Source.GATEWAY):
+            if self.drone.piloting.about_to_fly:
+                await self.drone.piloting.land()
+            if not self.on_ground:
+                await self.drone.piloting.stop()
 
     def _note_landing(self, before: FlyingState | None) -> None:
         """Record the initiator of the landing that begins or ends."""
@@ -725,7 +751,7 @@ class Vehicle(Aircraft):
         if before is None:
             self._note_return()
         if self.flying_state not in LANDING:
-            initiators.on_landing_over(unsent=self._landing_sent == 0)
+            initiators.on_landing_over(unsent=not self._landing_is_sent)
         elif initiators.landing is None:
             initiators.on_landing(
                 now,
@@ -747,53 +773,3 @@ class Vehicle(Aircraft):
             by_plan=home.reason == ReturnReason.FLIGHTPLAN,
             skycontroller=self.drone.controller.present,
         )
-
-    # Machinery.
-
-    @contextmanager
-    def _selected_no_more(self, wanted: FlightMode | None) -> Iterator[None]:
-        """Withdraw the chosen mode, unless it is `wanted`, while the drone is commanded.
-
-        The mode ends before the drone shows the effect of the command in the block. A setpoint or stick input of that
-        mode that arrives meanwhile is no newer command. On the ground there is no mode to withdraw.
-
-        If the command fails, the mode is restored, unless a newer command has arrived.
-        """
-        before, orders = self._selected, self.orders
-        if before is not wanted and not self.on_ground:
-            self.forget_mode()
-        try:
-            yield
-        except BaseException:
-            if self.orders == orders:
-                self._selected = before
-            raise
-
-    @property
-    def _ending_mission(self) -> Helm | None:
-        """The mission, where the landing or return that begins is its own."""
-        return self.mission if self.mission.ending else None
-
-    async def take_over(self, limit: float | None = None) -> None:
-        self._require_motors()
-        ended = self._replace()
-        if ended:
-            _, late = await asyncio.wait(ended, timeout=limit)
-            self.drone.silence(late)
-
-    def _require_motors(self) -> None:
-        if self._terminating:
-            raise Refused(texts.FLIGHT_COMMAND, texts.MOTORS_STOPPING)
-
-    def _replace(self) -> list[asyncio.Task[None]]:
-        """End what is under way, which can fly the drone no further; tasks that are about to end."""
-        self.orders += 1
-        ended = [*self._end_others(), *self._let_go()]
-        self.drone.retire(ended)
-        return ended
-
-    def _let_go(self) -> list[asyncio.Task[None]]:
-        """End what this vehicle does by itself; the tasks that are still about to end."""
-        self.takeoff.forget()
-        self.guided.forget_arrival()
-        return [*self.return_end.end(), *self.end_helms(), *self.takeoff.end()]

@@ -24,6 +24,7 @@ FILES: Final = {
     "/live.css": ("live.css", "text/css"),
     "/live.js": ("live.js", "text/javascript"),
     "/drone.js": ("drone.js", "text/javascript"),
+    "/picture.js": ("picture.js", "text/javascript"),
 }
 """Path: file and its type. Nothing else of the folder is served."""
 
@@ -53,9 +54,9 @@ class LivePage:
         self._drones = drones
         for path, (name, kind) in FILES.items():
             add = server.add_page if kind == HTML else server.add_get
-            add(path, _file((FOLDER / name).read_bytes(), kind))
+            add(path, serve_file((FOLDER / name).read_bytes(), kind))
         path, name = DRONE_PAGE
-        server.add_page(path, _file((FOLDER / name).read_bytes(), HTML))
+        server.add_page(path, serve_file((FOLDER / name).read_bytes(), HTML))
         server.add_get("/drones", self._list)
 
     async def _list(self, request: web.Request) -> web.Response:
@@ -63,7 +64,7 @@ class LivePage:
         return web.Response(body=body, content_type="application/json", headers={"Cache-Control": "no-store"})
 
 
-def _file(content: bytes, kind: str) -> RequestCallback:
+def serve_file(content: bytes, kind: str) -> RequestCallback:
     async def answer(request: web.Request) -> web.Response:
         return web.Response(body=content, content_type=kind, charset="utf-8", headers={"Cache-Control": "no-cache"})
 

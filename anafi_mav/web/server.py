@@ -6,8 +6,9 @@
 
 `gateway` registers the routes before the start; a handler takes an `aiohttp.web.Request` and returns a response.
 
-HTTP has no password here, so it is open to this computer only unless it is configured otherwise, and even there a web
-page of another site must not reach it through the user's browser:
+It is open to this computer only unless it is configured otherwise; a request to a server that is open to the network
+needs the gateway's token. Even on this computer a web page of another site must not reach it through the user's
+browser:
 
 - The Host header has to be an IP address or a name of this gateway. A page whose own name was made to point to
   127.0.0.1 (DNS rebinding) sends that name.
@@ -26,6 +27,7 @@ import errno
 import ipaddress
 import logging
 import socket
+from collections import Counter
 from collections.abc import Awaitable, Callable, Collection
 from typing import Final
 from urllib.parse import urlsplit
@@ -37,6 +39,7 @@ from aiohttp.web_protocol import RequestHandler
 
 from anafi_mav.errors import ConfigError, LocalProtocolError
 from anafi_mav.relay.uri_host import EVERY_ADDRESS, is_loopback, uri_host
+from anafi_mav.web.access_token import AccessToken
 
 log = logging.getLogger("anafi_mav.web")
 
@@ -82,6 +85,14 @@ HEADERS: Final = {
 FOREIGN_SITES: Final = ("cross-site", "same-site")
 """Sec-Fetch-Site of another site, and of another port of this host (Fetch Metadata, W3C)."""
 
+COOKIE, QUERY = "anafi_mav_token", "token"
+"""Names under which a request has the token: of the cookie, and in the query of the first link."""
+
+COOKIE_AGE = 30 * 24 * 3600
+"""s that a browser keeps the cookie."""
+
+NO_TOKEN = "token missing or wrong: open the link that `anafi-mav status --link` prints, or send it as Bearer\n"
+
 RequestCallback = Callable[[web.Request], Awaitable[web.StreamResponse]]
 """Answers one request."""
 
@@ -123,6 +134,11 @@ class HttpServer:
         """TCP port while it is open, else 0."""
         self.refused_connections = 0
         """Connections closed because there were too many."""
+        self.refused: Counter[str] = Counter()
+        """Refused requests by reason: host, origin, site, token."""
+        self.token: AccessToken | None = None
+        """With one, each request needs it, also one of this computer: a reverse proxy makes all requests look like
+        that. Set before `start`."""
         own = socket.gethostname().lower()
         self._names = {"localhost", own, f"{own}.local", host.lower(), *(name.lower() for name in names)}
         if public_host is not None:
@@ -240,6 +256,18 @@ class HttpServer:
         return None if host is None else f"http://{host}:{self.port}{path}"
 
     @property
+    def routes(self) -> list[tuple[str, str]]:
+        """Method and path, with its placeholders, of everything that is served."""
+        resources = ((route.method, route.resource) for route in self._app.router.routes())
+        return [(method, resource.canonical) for method, resource in resources if resource is not None]
+
+    @property
+    def connections(self) -> int:
+        """Number of open connections."""
+        server = self._runner.server if self._runner is not None else None
+        return 0 if server is None else len(server.connections)
+
+    @property
     def is_open_to_network(self) -> bool:
         """True when other computers can connect."""
         return not is_loopback(self.host)
@@ -294,12 +322,17 @@ class HttpServer:
         self._silent.discard(request.protocol)
         host = request.headers.get("Host", "")
         if not self._is_own(host):
+            self.refused["host"] += 1
             raise web.HTTPForbidden(text=f"{host[:100]!r} is no name of this gateway; use its address\n")
         origin = request.headers.get("Origin")
         if origin is not None and _place_of(origin) != host.lower():
+            self.refused["origin"] += 1
             raise web.HTTPForbidden(text="a page of another server may not use this one\n")
         if request.headers.get("Sec-Fetch-Site") in FOREIGN_SITES and not self._is_link_to_page(request):
+            self.refused["site"] += 1
             raise web.HTTPForbidden(text="a page of another server may not use this one\n")
+        if self.token is not None:
+            self._admit(request, self.token)
         if "\0" in request.path or ".." in request.path.replace("\\", "/").split("/"):
             raise web.HTTPNotFound
         if request.can_read_body:
@@ -310,6 +343,23 @@ class HttpServer:
                 refusal.force_close()
                 raise refusal from None
         return await handler(request)
+
+    def _admit(self, request: web.Request, token: AccessToken) -> None:
+        """Raise an answer, unless cookie or Authorization header have the token.
+
+        The link to a page has it in its query once: the answer is the cookie, and the same page without the query.
+        """
+        if token.is_in(request.cookies.get(COOKIE), request.headers.get("Authorization")):
+            return
+        given, resource = request.query.get(QUERY), request.match_info.route.resource
+        is_page = resource is not None and resource.canonical in self._pages
+        if given is not None and is_page and token.equals(given):
+            answer = web.HTTPSeeOther(request.path)
+            answer.set_cookie(COOKIE, token.text, max_age=COOKIE_AGE, path="/", httponly=True, samesite="Lax")
+            answer.headers["Cache-Control"] = "no-store"
+            raise answer
+        self.refused["token"] += 1
+        raise web.HTTPUnauthorized(text=NO_TOKEN, headers={"WWW-Authenticate": 'Bearer realm="anafi-mav"'})
 
     def _is_link_to_page(self, request: web.Request) -> bool:
         """True for a page that is opened as such, and not as a part of another one."""

@@ -1,11 +1,11 @@
 """Rounds of random flight through MAVLink from a new seed each time, and a tally.
 
     python tests/bench/soak.py                  # 100 rounds from a printed seed
-    python tests/bench/soak.py --rounds 1000
+    python tests/bench/soak.py --rounds 5000    # 40 min of an idle core; the figures of docs/performance.md
     python tests/bench/soak.py --seed 4711 --rounds 1     # one round once more
 
-Exit status 1 when a round of this call fails. The rounds of the suite have fixed seeds: tests/conformance/
-test_vehicle_soak.py.
+Exit status 1 when a round of this call fails. The suite flies 200 rounds from its own seed, which a run prints:
+tests/conformance/test_vehicle_soak.py.
 """
 
 from __future__ import annotations
@@ -32,6 +32,9 @@ from anafi_mav.arsdk.link import watchdog  # noqa: E402
 
 watchdog.LIMIT = None
 
+REPORT_EVERY = 100
+"""Rounds between two lines of progress."""
+
 
 def main() -> int:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -54,6 +57,10 @@ def main() -> int:
                 print("\n".join([f"{seed}:", *(f"  {known(text) or ''} {text}" for text in wrong)]), flush=True)
             if unknown and not given.brief:
                 print(draw(seed), flush=True)
+            if (done := seed - first + 1) % REPORT_EVERY == 0:
+                left = (given.rounds - done) * (time.perf_counter() - began) / done
+                each = (time.process_time() - cpu) / done
+                print(f"{done} rounds, {dict(tally)}, {each:.2f} s of CPU each, {left / 60.0:.0f} min left", flush=True)
     spent = time.process_time() - cpu
     print(dict(tally), f"{spent:.0f} s of CPU, {time.perf_counter() - began:.0f} s")
     return 1 if tally["failed"] else 0

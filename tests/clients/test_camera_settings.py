@@ -25,7 +25,6 @@ SCRIPT = Path(__file__).with_name("mavsdk_camera_settings.py")
 MAVPROXY = shutil.which("mavproxy.py", path=str(Path(sys.executable).parent)) or "mavproxy.py"
 
 
-@pytest.mark.timeout(120)
 @pytest.mark.parametrize(("model", "flavour"), [("4k", "px4"), ("thermal", "ardupilot")])
 async def test_conf_116_mavsdk_lists_and_sets_camera_settings(model: str, flavour: str, tmp_path: Path) -> None:
     async with world(model=model, flavour=flavour) as w:
@@ -87,7 +86,6 @@ async def shows(mavproxy: Process, name: str, value: str) -> None:
             return
 
 
-@pytest.mark.timeout(120)
 async def test_conf_113_mavproxy_loads_and_sets_camera_settings(tmp_path: Path) -> None:
     async with world(model="thermal", flavour="ardupilot") as w:
         values = {name: value_of(message) for name, message in (await fetch(w.client)).items()}

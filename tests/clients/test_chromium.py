@@ -13,7 +13,12 @@ from support.mav import CAMERA
 from support.pictures import horizon
 from support.world import World, world
 
-from anafi_mav.mavlink.dialect import MAV_CMD_VIDEO_START_STREAMING, MAV_RESULT_ACCEPTED
+from anafi_mav.mavlink.dialect import (
+    MAV_CMD_DO_PARACHUTE,
+    MAV_CMD_VIDEO_START_STREAMING,
+    MAV_RESULT_ACCEPTED,
+    MAV_RESULT_UNSUPPORTED,
+)
 
 pytestmark = [pytest.mark.chromium, pytest.mark.third_party, chromium.needed]
 
@@ -78,3 +83,25 @@ async def test_page_follows_the_stream_that_the_drone_shows() -> None:
         shown = cv2.imdecode(np.frombuffer(await page.screenshot(), np.uint8), cv2.IMREAD_COLOR)
         blue, _, red = (int(shade) for shade in shown[500, 300])
         assert red > blue + 80  # warm ground; that of the visible picture is green
+
+
+PHONE = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
+
+
+async def test_status_page_on_a_phone_shows_drone_refusal_and_picture() -> None:
+    async with world(speed=1.0) as w, chromium.chromium() as browser:
+        page = await browser.page()
+        await page.command("Emulation.setDeviceMetricsOverride", **PHONE)
+        await page.open(url(w, "/status"))
+        await page.until(
+            "document.querySelector('#drones .name')?.textContent", lambda text: text == "alpha (system 1)"
+        )
+        ack = await w.client.command(MAV_CMD_DO_PARACHUTE, 1)
+        assert ack.result == MAV_RESULT_UNSUPPORTED
+        await page.until("document.getElementById('refused').innerText", lambda text: "DO_PARACHUTE" in text)
+        await page.until("document.getElementById('endpoints').innerText", lambda text: "255/190" in text)
+        await page.js("document.querySelector('#drones button').click()")
+        await page.until("document.querySelector('#drones video').videoWidth", lambda width: width == 1280)
+        assert await page.js("document.documentElement.scrollWidth") == PHONE["width"]
+        await page.js("document.querySelector('#drones button').click()")
+        await viewers_end(w)

@@ -24,6 +24,7 @@ NOT_RUN = {
     "python3 -m venv": "it installs from the network; what it starts then is run by tests/unit/cli/test_run.py",
     "mavproxy.py": "MAVProxy is flown by tests/clients/test_mavproxy.py",
     "anafi-mav doctor 192.168.42.1": "it wants an aircraft; tests/unit/cli/test_doctor.py runs it on simulated ones",
+    "anafi-mav run -c fleet.yaml --check": "it wants a fleet; tests/unit/cli/test_run_check.py runs it on one",
     "anafi-mav media": "it needs files on a drone; tests/conformance/test_media_download.py runs its verbs",
     "for name in missions/*.plan; do": "tests/unit/plans/test_missions.py makes each of them by the same command",
 }

@@ -19,7 +19,6 @@ HOME = (48.8789, 2.3677, 35.0)
 SCRIPT = Path(__file__).with_name("dronekit_flight.py")
 
 
-@pytest.mark.timeout(180)
 async def test_conf_117_dronekit(tmp_path: Path) -> None:
     address = loopback()
     config = f"""
@@ -40,7 +39,6 @@ async def test_conf_117_dronekit(tmp_path: Path) -> None:
         assert len(p.entries("command", "rth.return_to_home")) == 1
 
 
-@pytest.mark.timeout(180)
 async def test_conf_075_117_dronekit_missions(tmp_path: Path) -> None:
     """Up, down and flown; what the drone did is from its own log."""
     address = loopback()

@@ -18,7 +18,7 @@ PACE = 4.0
 
 NAMES = ("set_attitude_target", "guided_set_speed_yaw", "simple_goto")
 
-pytestmark = [pytest.mark.third_party, pytest.mark.timeout(240)]
+pytestmark = pytest.mark.third_party
 
 
 async def test_flights_of_dronekits_examples_end_by_themselves() -> None:

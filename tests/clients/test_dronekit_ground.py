@@ -15,7 +15,6 @@ HOME = (48.8789, 2.3677, 35.0)
 SCRIPT = Path(__file__).with_name("dronekit_ground.py")
 
 
-@pytest.mark.timeout(180)
 async def test_dronekit_on_the_ground_gets_each_answer_once(tmp_path: Path) -> None:
     address = loopback()
     config = f"""

@@ -17,7 +17,6 @@ pytestmark = pytest.mark.third_party
 SCRIPT = Path(__file__).with_name("dronekit_setpoints.py")
 
 
-@pytest.mark.timeout(180)
 @both
 async def test_conf_118_setpoints(flavour: str) -> None:
     async with world(speed=TAKE_OFF_SPEED, flavour=flavour) as w:

@@ -54,7 +54,6 @@ async def holds_what_mavsdk_sent(w: World, count: int) -> None:
     ]
 
 
-@pytest.mark.timeout(400)
 @counts
 async def test_conf_061_items_by_mavsdk_on_a_bad_link(count: int) -> None:
     async with world(udp=True) as w, lossy_link((w.address, UDP_PORT), BAD) as link:
@@ -66,7 +65,6 @@ async def test_conf_061_items_by_mavsdk_on_a_bad_link(count: int) -> None:
         await holds_what_mavsdk_sent(w, count)
 
 
-@pytest.mark.timeout(240)
 @counts
 async def test_conf_061_items_by_mavsdk_there_and_back(count: int) -> None:
     async with world(udp=True) as w, lossy_link((w.address, UDP_PORT), MAVSDKS_OWN) as link:

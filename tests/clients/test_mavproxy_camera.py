@@ -34,7 +34,6 @@ async def done(w: World, mavproxy: Process, line: str, command: str, **args: obj
     await w.drone.log.wait(received, 15.0, since=since)
 
 
-@pytest.mark.timeout(240)
 async def test_camera_module_takes_photos_records_zooms_and_switches(tmp_path: Path) -> None:
     """It imports wx for a map, also where none is drawn. An empty package stands in, after MAVProxy has started."""
     async with world(model="thermal", flavour="ardupilot", web=True, speed=1.0) as w:

@@ -28,7 +28,6 @@ async def accepted(mavproxy: Process, line: str, name: str) -> None:
     await mavproxy.line(lambda shown: shown.endswith(f"Got COMMAND_ACK: {name}: ACCEPTED"), since=since, timeout=15.0)
 
 
-@pytest.mark.timeout(240)
 async def test_gimbal_and_mount_of_mavproxy_turn_the_gimbal(tmp_path: Path) -> None:
     """On the ArduPilot flavour, an Ai. Its gimbal module sends a rate once a second.
 

@@ -83,7 +83,6 @@ def same(seen: list[Any], wanted: list[Item]) -> bool:
     return True
 
 
-@pytest.mark.timeout(180)
 @both
 async def test_conf_119_fence_and_rally(flavour: str, tmp_path: Path) -> None:
     async with world(flavour=flavour) as w:
@@ -130,7 +129,6 @@ async def test_conf_119_fence_and_rally(flavour: str, tmp_path: Path) -> None:
             assert not [line for line in mavproxy.lines if re.search("Traceback|ERROR|fence breach", line)], mavproxy
 
 
-@pytest.mark.timeout(180)
 async def test_conf_119_142_missions(tmp_path: Path) -> None:
     """From a file, listed, edited in place, saved, its current item set, flown, and cleared."""
     async with world(flavour="ardupilot", web=True) as w:

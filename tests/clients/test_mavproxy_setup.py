@@ -65,7 +65,6 @@ async def setup(w: World, mavproxy: Process, flavour: str, folder: Path) -> None
     assert not [line for line in mavproxy.lines if "Traceback" in line], mavproxy
 
 
-@pytest.mark.timeout(180)
 @both
 async def test_conf_114_mavproxy_param_and_ftp(flavour: str, tmp_path: Path) -> None:
     async with world(flavour=flavour) as w:

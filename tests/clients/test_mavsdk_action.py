@@ -14,7 +14,6 @@ pytestmark = pytest.mark.third_party
 SCRIPT = Path(__file__).with_name("mavsdk_action.py")
 
 
-@pytest.mark.timeout(240)
 async def test_conf_116_mavsdk_action_and_calibration() -> None:
     async with (
         world(speed=2.0) as w,

@@ -17,7 +17,6 @@ pytestmark = pytest.mark.third_party
 SCRIPT = Path(__file__).with_name("mavsdk_camera.py")
 
 
-@pytest.mark.timeout(240)
 async def test_conf_116_mavsdk_camera() -> None:
     async with (
         world(model="usa", web=True, speed=1.0) as w,

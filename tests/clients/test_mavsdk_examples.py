@@ -28,7 +28,7 @@ HIGHEST = {
 }
 """m above take-off that each reaches at least, less half a metre. Velocities climb for a time and no height."""
 
-pytestmark = [pytest.mark.third_party, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.third_party
 
 
 @pytest.mark.parametrize("names", [tuple(HIGHEST)[:4], tuple(HIGHEST)[4:]], ids=["first", "rest"])

@@ -19,7 +19,6 @@ pytestmark = pytest.mark.third_party
 SCRIPT = Path(__file__).with_name("mavsdk_gimbal.py")
 
 
-@pytest.mark.timeout(240)
 async def test_conf_116_mavsdk_gimbal() -> None:
     async with (
         world(model="ai", speed=1.0) as w,

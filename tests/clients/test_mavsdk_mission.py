@@ -25,7 +25,6 @@ def script(w: World, *paths: Path) -> tuple[str, ...]:
     return (sys.executable, "-u", str(SCRIPT), url, str(HOME[0]), str(HOME[1]), *map(str, paths))
 
 
-@pytest.mark.timeout(180)
 async def test_conf_116_a_mission_of_mavsdks_own_kind() -> None:
     """Up, down, flown, held, gone on with and finished; the drone did what the items say, in their order."""
     async with world(web=True) as w, program(*script(w)) as mavsdk:
@@ -52,7 +51,6 @@ async def test_conf_116_a_mission_of_mavsdks_own_kind() -> None:
         assert [name for name in done if name not in modes] == ["take_photo", "start_recording", "stop_recording"]
 
 
-@pytest.mark.timeout(180)
 @both
 async def test_conf_116_raw_missions(flavour: str) -> None:
     """What QGroundControl has stored is imported, uploaded and read back; somebody else's upload is told."""

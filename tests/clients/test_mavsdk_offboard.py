@@ -20,7 +20,7 @@ from anafi_mav import geo
 
 SCRIPT = Path(__file__).with_name("mavsdk_offboard.py")
 
-pytestmark = [pytest.mark.third_party, pytest.mark.timeout(240)]
+pytestmark = pytest.mark.third_party
 
 
 @asynccontextmanager

@@ -16,7 +16,6 @@ pytestmark = pytest.mark.third_party
 SCRIPT = Path(__file__).with_name("mavsdk_plans.py")
 
 
-@pytest.mark.timeout(180)
 @both
 async def test_conf_076_077_mavsdk(flavour: str) -> None:
     async with world(flavour=flavour) as w:

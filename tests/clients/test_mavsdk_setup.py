@@ -23,7 +23,6 @@ def sets_of(script: Process) -> int:
     return len([line for line in script.complaints if "Sending param_set" in line])
 
 
-@pytest.mark.timeout(180)
 @both
 async def test_conf_116_mavsdk_param_ftp_metadata_events(flavour: str, tmp_path: Path) -> None:
     async with world(flavour=flavour) as w:

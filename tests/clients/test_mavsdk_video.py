@@ -14,7 +14,6 @@ pytestmark = pytest.mark.third_party
 SCRIPT = Path(__file__).with_name("mavsdk_video.py")
 
 
-@pytest.mark.timeout(180)
 async def test_conf_116_mavsdk_video_streams() -> None:
     async with world(model="thermal") as w:
         words = (sys.executable, "-u", str(SCRIPT), f"tcpout://{w.address}:5760", "3")

@@ -21,7 +21,6 @@ MAVPROXY = shutil.which("mavproxy.py", path=str(Path(sys.executable).parent)) or
 VIDEO = 400_000
 
 
-@pytest.mark.timeout(120)
 async def test_conf_116_mavsdk_lists_downloads_and_removes_media(tmp_path: Path) -> None:
     async with world(web=True) as w:
         photo, video = add_photo(w.drone), add_video(w.drone, VIDEO)
@@ -38,7 +37,6 @@ async def test_conf_116_mavsdk_lists_downloads_and_removes_media(tmp_path: Path)
         assert w.drone.firmware.payload.media.resource(video.id) is None
 
 
-@pytest.mark.timeout(120)
 async def test_conf_113_mavproxy_lists_downloads_and_removes_media(tmp_path: Path) -> None:
     async with world(web=True) as w:
         photo = add_photo(w.drone)

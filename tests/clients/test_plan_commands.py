@@ -8,7 +8,6 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-import pytest
 from support.flavours import both
 from support.mav import Client
 from support.plans import download
@@ -125,7 +124,6 @@ async def test_plan_download_without_a_vehicle_fails(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.timeout(240)
 async def test_a_plan_is_flown_and_followed(tmp_path: Path) -> None:
     address = loopback()
     config = fleet(address, loopback()).replace("sim: {", "sim: {speed: 8, ")
@@ -154,7 +152,6 @@ async def test_a_plan_is_flown_and_followed(tmp_path: Path) -> None:
         assert items[-1] == "return_to_launch"
 
 
-@pytest.mark.timeout(240)
 async def test_interrupted_plan_fly_leaves_the_flight_alone(tmp_path: Path) -> None:
     address = loopback()
     url = f"tcpout://{address}:5760"

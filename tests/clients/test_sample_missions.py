@@ -76,14 +76,12 @@ def judge_all(logs: dict[Flight, Log]) -> None:
             raise AssertionError(f"{name} on {model}: {error}") from error
 
 
-@pytest.mark.timeout(400)
 async def test_conf_075_121_every_sample_once_by_mavsdk(tmp_path: Path) -> None:
     """At twice the clock's speed: the poses in the log are then 0.2 simulated seconds apart, 1.6 m at most."""
     judge_all(await flown(tmp_path, list(zip(SAMPLES, itertools.cycle(ZOOMS), strict=False)), speed=2.0))
 
 
 @pytest.mark.full
-@pytest.mark.timeout(400)
 @pytest.mark.parametrize("samples", [SAMPLES[:5], SAMPLES[5:]], ids=["short", "long"])
 async def test_conf_075_121_every_sample_on_every_model_by_mavsdk(samples: tuple[str, ...], tmp_path: Path) -> None:
     judge_all(await flown(tmp_path, list(itertools.product(samples, ZOOMS)), speed=1.0))

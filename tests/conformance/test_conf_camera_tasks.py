@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support import camera_commands
 from support.cameras import ACCEPTED, PHOTO, VIDEO, command, enter, photos, press, request, shoot, texts, videos
-from support.ext_params import write
+from support.ext_params import fetch, write
 from support.flavours import both
-from support.mav import CAMERA
+from support.mav import CAMERA, Client
 from support.missions import ACTIVE, PAUSED, put, start, state, takeoff, way
 from support.plans import Item
 from support.sim_settings import sim_value
@@ -287,3 +288,83 @@ async def test_geotag_is_that_of_the_picture_while_the_video_runs() -> None:
         assert pitch == pytest.approx(scene.pitch, abs=1.0)
         assert abs(scene.pitch + 40.0) > 5.0
         assert image.alt / 1e3 == pytest.approx(scene.altitude, abs=0.4)
+
+
+# QGroundControl 5 (VehicleCameraControl.cc): what it sends, in its order, with its unset parameters of 0.
+
+
+async def station_command(client: Client, id: int, *params: float) -> int:
+    """A COMMAND_LONG of QGroundControl to the camera: seven parameters, 0 where it sets none."""
+    seven = [*params, *[0.0] * (7 - len(params))]
+    return await command(client, id, *seven[:4], x=seven[4], y=seven[5], z=seven[6])
+
+
+async def station_request(client: Client, kind: str, number: float = 0.0) -> Any:
+    """A message of the camera, as QGroundControl requests it."""
+    mark = client.mark()
+    id = getattr(dialect, f"MAVLINK_MSG_ID_{kind}")
+    assert await station_command(client, dialect.MAV_CMD_REQUEST_MESSAGE, id, number) == ACCEPTED
+    message = await client.wait(kind, since=mark)
+    assert message.get_srcComponent() == CAMERA
+    return message
+
+
+@both
+@pytest.mark.parametrize("model", ["4k", "thermal", "usa", "ai"])
+async def test_requests_of_qgroundcontrol_work_the_camera(flavour: str, model: str) -> None:
+    async with world(model=model, flavour=flavour, web=True) as w:
+        station = w.client
+        await station.wait("CAMERA_HEARTBEAT", since=0)
+        information = await station_request(station, "CAMERA_INFORMATION")
+        flags = information.flags
+        assert flags & dialect.CAMERA_CAP_FLAGS_HAS_MODES
+        assert flags & dialect.CAMERA_CAP_FLAGS_HAS_BASIC_ZOOM
+        assert information.cam_definition_version
+        assert information.cam_definition_uri.startswith("mftp://")
+        settings = await fetch(station)
+        assert "CAM_MODE" in settings  # with such a parameter the station sends no MAV_CMD_SET_CAMERA_MODE
+        await station_request(station, "CAMERA_SETTINGS")
+        first = await station_request(station, "VIDEO_STREAM_INFORMATION")
+        assert first.stream_id == 1
+        for number in range(1, first.count + 1):
+            mark = station.mark()
+            await station_request(station, "VIDEO_STREAM_INFORMATION", number)
+            assert station.since(mark, "VIDEO_STREAM_INFORMATION")[0][1].stream_id == number
+            assert (await station_request(station, "VIDEO_STREAM_STATUS", number)).stream_id == number
+        number = 2 if model == "ai" else 1  # the card
+        storage = await station_request(station, "STORAGE_INFORMATION", number)
+        assert storage.status == dialect.STORAGE_STATUS_READY
+        status = await station_request(station, "CAMERA_CAPTURE_STATUS")
+        assert (status.image_status, status.video_status) == (0, 0)
+
+        # The photo button, then the video button, each after its mode.
+        kind = settings["CAM_MODE"].param_type
+        assert (await write(station, "CAM_MODE", PHOTO, kind)).param_result == dialect.PARAM_ACK_ACCEPTED
+        mark = station.mark()
+        assert await station_command(station, dialect.MAV_CMD_IMAGE_START_CAPTURE, 0, 0, 1) == ACCEPTED
+        shot = await station.wait("CAMERA_IMAGE_CAPTURED", since=mark)
+        assert (shot.capture_result, len(photos(w))) == (1, 1)
+        assert await station_command(station, dialect.MAV_CMD_IMAGE_START_CAPTURE, 0, 1, 0) == ACCEPTED  # a series
+        await station.wait("CAMERA_CAPTURE_STATUS", lambda m: m.image_status >= 2, since=mark)
+        assert await station_command(station, dialect.MAV_CMD_IMAGE_STOP_CAPTURE) == ACCEPTED
+        assert (await write(station, "CAM_MODE", VIDEO, kind)).param_result == dialect.PARAM_ACK_ACCEPTED
+        mark = station.mark()
+        assert await station_command(station, dialect.MAV_CMD_VIDEO_START_CAPTURE) == ACCEPTED
+        await station.wait("CAMERA_CAPTURE_STATUS", lambda m: m.video_status == 1, since=mark)
+        assert await station_command(station, dialect.MAV_CMD_VIDEO_STOP_CAPTURE) == ACCEPTED
+        await station.wait("CAMERA_CAPTURE_STATUS", lambda m: m.video_status == 0, since=mark)
+        assert len(videos(w)) == 1
+
+        # Zoom: slider, step, pressed and released; then reset and format.
+        for kind, level in (
+            (dialect.ZOOM_TYPE_RANGE, 30.0),
+            (dialect.ZOOM_TYPE_STEP, 1.0),
+            (dialect.ZOOM_TYPE_CONTINUOUS, 1.0),
+            (dialect.ZOOM_TYPE_CONTINUOUS, 0.0),
+        ):
+            assert await station_command(station, dialect.MAV_CMD_SET_CAMERA_ZOOM, kind, level) == ACCEPTED
+        assert await station_command(station, dialect.MAV_CMD_RESET_CAMERA_SETTINGS, 1) == ACCEPTED
+        assert await station_command(station, dialect.MAV_CMD_STORAGE_FORMAT, number, 1) == ACCEPTED
+        storage = await station_request(station, "STORAGE_INFORMATION", number)
+        assert storage.status == dialect.STORAGE_STATUS_READY
+        assert not photos(w) + videos(w)

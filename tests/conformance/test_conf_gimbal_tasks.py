@@ -28,11 +28,14 @@ from support.gimbal import (
 from support.mav import Client
 from support.missions import ACTIVE, PAUSED, put, start, state, takeoff, way
 from support.plans import Item
-from support.world import HOME, World, world
+from support.world import HOME, World, loopback, world
 
 from anafi_mav import geo, units
 from anafi_mav.arsdk.messages.ardrone3 import PoiMode, PoiStatus
+from anafi_mav.config import Config, DroneConfig
+from anafi_mav.gateway import Gateway
 from anafi_mav.mavlink import dialect as newer
+from anafi_mav.sim import DroneSpec, Simulator
 from anafi_mav.vehicle.base.modes import FlightMode
 
 ACCEPTED, DENIED, REJECTED, UNSUPPORTED = (
@@ -127,6 +130,45 @@ async def test_region_follows_another_system_that_reports_its_position() -> None
         await next_truth(w)
         await next_truth(w)
         assert len(pois(w)) == count
+
+
+async def test_region_follows_another_drone_of_the_gateway() -> None:
+    address, drones = loopback(), [loopback(), loopback()]
+    config = Config(
+        endpoints=(f"tcpin://{address}:5760",),
+        drones=tuple(DroneConfig(name=f"d{n}", sysid=n, address=place) for n, place in enumerate(drones, 1)),
+        http=False,
+        video=False,
+    )
+    homes = (HOME, (*NORTH, HOME[2]))
+    specs = [DroneSpec(address=place, home=home, http_port=None) for place, home in zip(drones, homes, strict=True)]
+    async with Simulator(specs, speed=3.0, seed=1) as simulator, Gateway(config) as gateway:
+        assert await gateway.ready(10.0)
+        w = World(simulator, gateway, address, "px4")
+        await w.connect()
+        try:
+            await w.client.wait("GLOBAL_POSITION_INT", lambda m: m.get_srcSystem() == 2, since=0)
+            await w.take_off(20.0)
+            assert (await w.client.command(ROI_SYSTEM, 1.0)).result == REJECTED
+            assert (await w.client.command(ROI_SYSTEM, 2.0)).result == ACCEPTED
+            await looks(w, pitch_absolute=-math.degrees(math.atan2(20.0, 60.0)))
+            await heads(w, 0.0)
+            other = simulator.drones[1]
+            for command, z in (
+                (dialect.MAV_CMD_COMPONENT_ARM_DISARM, NAN),
+                (dialect.MAV_CMD_NAV_TAKEOFF, HOME[2] + 20.0),
+            ):
+                assert (await w.client.command(command, 1.0, z=z, target=(2, 1))).result == ACCEPTED
+            await other.wait_log(lambda e: e.kind == "pose" and e.args["up"] > 10.0, 20.0)
+            place = geo.destination(HOME[0], HOME[1], 60.0, 60.0)
+            goto = dialect.MAV_CMD_DO_REPOSITION
+            frame = dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
+            ack = await w.client.command(goto, -1.0, 1.0, frame=frame, x=place[0], y=place[1], z=20.0, target=(2, 1))
+            assert ack.result == ACCEPTED
+            await heads(w, 45.0)
+        finally:
+            await w.client.close()
+            await simulator.close()
 
 
 async def test_region_beside_the_path_turns_nose_and_gimbal() -> None:
@@ -323,7 +365,7 @@ async def test_conf_100_mission_has_the_gimbal_while_its_items_come(flavour: str
         assert (await w.client.command(PITCHYAW, 5.0, x=LEVEL)).result == ACCEPTED
 
 
-async def test_mount_commands_and_messages_have_the_same_signs() -> None:
+async def test_conf_139_mount_commands_and_messages_have_the_same_signs() -> None:
     async with world(flavour="ardupilot") as w:
         assert (await w.client.command(MOUNT, -30.0, 5.0, 10.0, 0.0, x=0.0, y=0.0, z=TARGETING)).result == ACCEPTED
         await looks(w, pitch_absolute=-30.0, roll_absolute=5.0)

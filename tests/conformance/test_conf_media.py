@@ -165,14 +165,21 @@ async def test_media_that_is_not_indexed_is_refused_with_a_text() -> None:
         assert (await ftp.ask(LIST, b"/media")).error == EOF  # empty
 
 
-async def test_file_over_4_gib_is_listed_and_refused_with_a_text() -> None:
+@pytest.mark.parametrize(
+    ("size", "text"),
+    [
+        (5_000_000_000, "File too large for FTP: use media download"),
+        (0, "File size unknown: use media download"),
+    ],
+)
+async def test_file_over_4_gib_or_unsized_is_listed_and_refused(size: int, text: str) -> None:
     async with world(web=True) as w:
-        video, ftp = add_video(w.drone, 5_000_000_000), camera(w)
-        assert video.size > 2**32
+        video, ftp = add_video(w.drone, size or 1000), camera(w)
+        object.__setattr__(video, "size", size)
         assert await ftp.names(f"/media/{DAY}") == [f"F{video.id}\t{video.size}"]
         mark = w.client.mark()
         assert (await ftp.ask(OPEN, f"/media/{DAY}/{video.id}".encode())).error == FAIL
-        await w.client.wait("STATUSTEXT", lambda m: m.text == "File too large for FTP: use media download", since=mark)
+        await w.client.wait("STATUSTEXT", lambda m: m.text == text, since=mark)
 
 
 async def test_listing_is_kept_until_the_drone_reports_a_change() -> None:

@@ -270,6 +270,17 @@ async def test_conf_074_item_selected_after_upload_belongs_to_new_mission(flavou
         assert whole(told).total == len(OTHER_WAY)  # home is not one of them
 
 
+async def test_conf_074_mission_armed_during_its_upload_is_the_new_one() -> None:
+    """The mode is chosen before the upload; arming follows its last item, while the mission is being stored."""
+    async with world(web=True) as w:
+        await put(w, ONE_WAY)
+        assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 4)).result == ACCEPTED
+        await up_to_the_last_item(w, OTHER_WAY)
+        assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["east"] > 11.0, timeout=40.0)
+        assert all(e.args["north"] < 2.0 for e in w.drone.log if e.kind == "pose")
+
+
 async def test_conf_063_failed_storing_is_reported_and_the_next_upload_succeeds(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

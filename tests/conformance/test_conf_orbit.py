@@ -49,7 +49,6 @@ async def lap(w: World, radius: float, seconds: float) -> list[dict[str, Any]]:
     return [e.args for e in w.drone.log if e.kind == "pose" and began.t <= e.t <= ended.t]
 
 
-@pytest.mark.timeout(180)
 @pytest.mark.parametrize(
     ("flavour", "frame", "z", "radius"),
     [

@@ -183,7 +183,6 @@ async def throw(w: World, frames: list[bytes], pause: float = BATCH_EVERY) -> No
     await asyncio.sleep(pause)
 
 
-@pytest.mark.timeout(300)
 @pytest.mark.parametrize("times", TIMES)
 @pytest.mark.parametrize("flavour", FLAVOURS)
 async def test_random_frames_on_the_ground(flavour: str, times: int, fuzz_seed: int, mistakes: list[str]) -> None:
@@ -259,7 +258,6 @@ STIRRED = 0.5
 """m that nobody notices in the air."""
 
 
-@pytest.mark.timeout(300)
 @pytest.mark.parametrize("times", TIMES)
 @pytest.mark.parametrize(("flavour", "mode"), [("px4", "hold"), ("ardupilot", "brake"), ("ardupilot", "guided")])
 async def test_random_frames_in_the_air(
@@ -340,7 +338,6 @@ async def handled(w: World) -> list[int]:
     return known
 
 
-@pytest.mark.timeout(400)
 @pytest.mark.parametrize("flavour", FLAVOURS)
 async def test_commands_with_invalid_numbers_are_answered(flavour: str, mistakes: list[str]) -> None:
     async with world(flavour=flavour, speed=5.0) as w:

@@ -25,7 +25,7 @@ from support.world import HOME, World, world
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.mavlink import dialect
-from anafi_mav.vehicle.base.link_loss import LossAction
+from anafi_mav.vehicle.link_loss import LossAction
 
 PAUSE, SET_HOME, ALTITUDE, ROI_NONE = (
     dialect.MAV_CMD_DO_PAUSE_CONTINUE,

@@ -19,6 +19,7 @@ from support.process import gateway_process
 from support.world import HOLD, HOME, WEB_PORT, World, loopback
 
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
+from anafi_mav.arsdk.messages.rth import StateReason
 from anafi_mav.arsdk.messages.skyctrl import Source
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, Simulator
@@ -197,3 +198,28 @@ async def test_ended_gateway_leaves_a_hovering_drone(tmp_path: Path, way: str) -
         finally:
             if task is not None:
                 task.cancel()
+
+
+RETURN_DELAY = 4.0
+"""s from the loss of the link to the drone's return."""
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+async def test_gateway_killed_or_hung_leaves_a_returning_drone(tmp_path: Path, number: signal.Signals) -> None:
+    """The drone notices the silence by itself: it hovers, and flies home after its delay."""
+    async with apart(tmp_path, None) as (w, gateway):
+        w.drone.firmware.settings.set("rth_delay", RETURN_DELAY)
+        task = await set_out(w, "offboard")
+        assert task is not None
+        try:
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 1.0 and e.args["north"] > 20.0, 60.0)
+            gateway.send_signal(number)
+            struck = asyncio.get_running_loop().time()
+            await w.drone.wait_log(
+                lambda e: e.kind == "pose" and math.hypot(e.args["vn"], e.args["ve"]) < 0.3, 20.0, since=struck
+            )
+            assert not w.drone.firmware.homing.active
+            await w.drone.wait_log(lambda e: math.hypot(w.drone.pose.north, w.drone.pose.east) < 2.0, 60.0)
+            assert w.drone.firmware.homing.reason is StateReason.CONNECTION_LOST
+        finally:
+            task.cancel()

@@ -30,6 +30,8 @@ from support.world import ARMED, World, world
 from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.sim.world.quirks import Quirk
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.requester import Source
 
 FORCE = 21196
 PAUSE = dialect.MAV_CMD_DO_PAUSE_CONTINUE
@@ -173,12 +175,12 @@ async def test_pause_holds_against_setpoints_of_every_client(pause: str, positio
         async with companion(program, position=position):
             await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 3.0, 15.0)
             who = program if own else w.client
-            mark = w.client.mark()
+            mark = program.mark()
             id, params = PAUSES[pause]
             assert (await who.command(id, *params)).result == ACCEPTED
             await standing(w)
             await w.client.heartbeat(lambda beat: beat.custom_mode == 4)  # Guided stays shown
-            await w.client.wait("STATUSTEXT", lambda m: "paused by a client" in m.text, since=mark)
+            await program.wait("STATUSTEXT", lambda m: "paused by a client" in m.text, since=mark)
             # Choosing the shown mode again changes nothing.
             assert (await who.command(SET_MODE, 1, 4)).result == ACCEPTED
             await standing(w)
@@ -234,5 +236,5 @@ async def test_land_and_hold_await_the_replaced_command_briefly(stop: str) -> No
         loop = asyncio.get_running_loop()
         began = loop.time()
         with contextlib.suppress(Exception):
-            await (vehicle.land() if stop == "land" else vehicle.hold())
+            await (vehicle.land(Source.FENCE) if stop == "land" else vehicle.hold(FlightMode.HOLD, Source.FENCE))
         assert loop.time() - began < 3.0  # the undoing alone takes five

@@ -32,7 +32,6 @@ pytestmark = [pytest.mark.third_party, olympe.needed]
 
 
 @pytest.mark.parametrize("on", olympe.combinations("visit"))
-@pytest.mark.timeout(240)
 async def test_olympe_does_everything(on: olympe.Combination, tmp_path: Path) -> None:
     _, model, kind, version = on
     # The telemetry is as frequent as the simulator logs where the drone is.

@@ -15,7 +15,6 @@ pytestmark = [pytest.mark.third_party, olympe.needed]
 
 
 @pytest.mark.parametrize("on", olympe.combinations("media"))
-@pytest.mark.timeout(240)
 async def test_olympes_media_examples(on: olympe.Combination, tmp_path: Path) -> None:
     via = "drone" if on.controller == "Drone" else "skycontroller"
     address, log, downloads = loopback(), tmp_path / "sim.jsonl", tmp_path / "downloads"

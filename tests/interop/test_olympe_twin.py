@@ -76,7 +76,6 @@ def apart(these: list[Point], those: list[Point]) -> float:
 
 
 @pytest.mark.parametrize("on", olympe.combinations("twin"))
-@pytest.mark.timeout(300)
 async def test_the_same_file_flies_the_same_path(on: olympe.Combination, tmp_path: Path) -> None:
     """Both at once, each at a drone of its own."""
     model = on.model

@@ -147,7 +147,6 @@ def check_streams(streams: dict[str, Any], log: list[dict[str, Any]]) -> None:
 
 # Directly, and through the mux of a Skycontroller 4; through the third `test_olympe.py` looks.
 @pytest.mark.parametrize("on", olympe.combinations("video"))
-@pytest.mark.timeout(240)
 async def test_olympe_watches_a_flight(on: olympe.Combination, tmp_path: Path) -> None:
     _, model, kind, _ = on
     report, err, log = await olympe.visit("olympe_video.py", on, tmp_path, timeout=200.0, options=("--speed", SPEED))

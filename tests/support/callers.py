@@ -6,7 +6,10 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-from anafi_mav.vehicle.base.link_loss import LossAction
+from anafi_mav.arsdk.messages.common import MavlinkFilePlayingStateChanged, MavlinkType, PlayingState
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.requester import Source
+from anafi_mav.vehicle.link_loss import LossAction
 from anafi_mav.vehicle.manual_flight import Event
 from support.world import World
 
@@ -29,16 +32,18 @@ async def _ended(tasks: list[asyncio.Task[None]]) -> None:
         await asyncio.wait(tasks)
 
 
+OTHER_PLAN = MavlinkFilePlayingStateChanged(PlayingState.PLAYING, "other", MavlinkType.FLIGHT_PLAN)
+
 CALLERS: dict[str, Callable[[Any], Awaitable[None]]] = {
     "link loss hold": lambda system: _service(system, "LinkLossService")._act(LossAction.HOLD),
     "link loss return": lambda system: _service(system, "LinkLossService")._act(LossAction.RETURN),
-    "fence hold": lambda system: system.vehicle.hold(),
+    "fence hold": lambda system: system.vehicle.hold(FlightMode.HOLD, Source.FENCE),
     "fence return": lambda system: _service(system, "FenceService")._return_or_hold(),
     "guided end": lambda system: _ended(system.vehicle.offboard.end()),
     "follow end": lambda system: _ended(system.vehicle.follow.end()),
     "orbit end": lambda system: _ended(_service(system, "OrbitService").end()),
     "mission end": lambda system: _ended(system.vehicle.mission.end()),
-    "mission break": lambda system: _call(system.vehicle.mission._break_off, "test"),
+    "mission break": lambda system: _call(system.vehicle.mission._on_playing, OTHER_PLAN, 0.0),
     "setpoints silent": lambda system: _call(system.vehicle.offboard._expired),
     "target silent": lambda system: _call(system.vehicle.follow._expired),
     "sticks silent": lambda system: _call(system.vehicle.manual._let_go, Event.END),

@@ -5,8 +5,9 @@ before a timer is due, and nothing is on its way between their sockets (the loop
 before `send` returns), then nothing can happen until that timer: the clock is set to it, and the loop goes on at once.
 A minute of flight takes as long as its computations do, on any machine, with the timers in the order they are due.
 
-While callbacks run the clock goes at a hundredth of its pace: no two moments are the same, and a machine that lets them
-wait for a second, or a hypervisor that takes the processor away and tells nobody, makes them ten milliseconds late.
+While callbacks run the clock goes at a hundredth of the processor time that they take: no two moments are the same, and
+a busy machine that lets them wait changes nothing. A hypervisor that takes the processor away for a second, without
+a sign of it, makes them ten milliseconds late.
 How long one turn of callbacks computed at most, which every timer has to wait for in earnest, can be asked for
 (`turns`): it is processor time of this thread. What latencies that makes is for tests/bench/ to say, and that nothing
 of ours blocks a loop in other ways for ruff.
@@ -30,7 +31,7 @@ from contextlib import contextmanager
 from typing import Any
 
 SHARE = 0.01
-"""Of the time that callbacks take."""
+"""Of the processor time that callbacks take."""
 
 DELIVERY_LIMIT = 60.0
 """s of real time for a datagram to ourselves: only a broken machine needs longer."""
@@ -40,17 +41,17 @@ _ahead = 0.0
 """s that the clock is ahead of `time.monotonic` when nothing of this process runs; negative when it is behind."""
 _newest = 0.0
 _began: tuple[float, float, int] | None = None
-"""Of the callbacks that are running alone: the clock's time and the real one then, and in which thread."""
+"""Of the callbacks that are running alone: the time then, the processor time of their thread then, and its id."""
 
 
 def now() -> float:
     """What `time.monotonic` is in tests; never steps back."""
     global _newest
     if _began is not None and _began[2] == threading.get_ident() and asyncio._get_running_loop() is not None:
-        told = _began[0] + SHARE * (_real() - _began[1])
+        here = _began[0] + SHARE * (time.thread_time() - _began[1])
     else:
-        told = _real() + _ahead
-    _newest = max(_newest, told)
+        here = _real() + _ahead
+    _newest = max(_newest, here)
     return _newest
 
 
@@ -128,14 +129,14 @@ class Selector(selectors.DefaultSelector):
         if not alone:
             ready = super().select(timeout)
             if self._only_threads():
-                _began = now(), _real(), threading.get_ident()
+                _began = now(), time.thread_time(), threading.get_ident()
             return ready
         here = now()
         ready = self._look()
         if not ready and timeout is not None:
             here += max(timeout, 0.0)
         _ahead = here - _real()
-        _began = here, _real(), threading.get_ident()
+        _began = here, time.thread_time(), threading.get_ident()
         return ready
 
     def _alone(self) -> bool:

@@ -39,7 +39,8 @@ def offset(kind: Any, name: str) -> int:
     raise KeyError(name)
 
 
-EVERY = tuple(sorted(dialect.mavlink_map))
+EVERY = tuple(sorted(dialect.mavlink_map.keys() - {dialect.MAVLINK_MSG_ID_SETUP_SIGNING}))
+"""Without the message that locks out a client without its key, as it should: test_signing_setup.py has random ones."""
 
 
 def random_frames(source: random.Random, ids: Sequence[int] = EVERY) -> Iterator[bytes]:

@@ -20,6 +20,9 @@ from anafi_mav.mavlink import dialect as newer
 
 NAN = math.nan
 
+EPOCH = 1_420_070_400
+"""s from 1970 to 2015, where time stamps of signatures begin."""
+
 CAMERA = 100
 """Component id of a vehicle's camera."""
 
@@ -102,9 +105,26 @@ class Client:
 
     def pack(self, message: Any) -> bytes:
         """Return the next frame, for a segment with several of them."""
+        # One object in pymavlink: what is sent follows the timestamps of what was received.
+        self._out.signing.timestamp = max(self._out.signing.timestamp, self._parser.signing.timestamp)
         data: bytes = message.pack(self._out)
         self._out.seq = (self._out.seq + 1) % 256
         return data
+
+    def expect_key(self, secret: bytes) -> None:
+        """Verify signed frames with this key and still read unsigned ones, as QGroundControl does while it waits."""
+        self._parser.signing.secret_key = secret
+        self._parser.signing.allow_unsigned_callback = lambda *_: True
+
+    def sign(self, secret: bytes | None, *, link: int = 9) -> None:
+        """Sign what is sent from now on, and read signed frames only, both as pymavlink does; None: neither."""
+        for mav in (self._out, self._parser):
+            mav.signing.secret_key = secret
+            mav.signing.link_id = link
+            mav.signing.timestamp = int((time.time() - EPOCH) * 1e5)
+            mav.signing.allow_unsigned_callback = None
+        self._parser.signing.stream_timestamps.clear()
+        self._out.signing.sign_outgoing = secret is not None
 
     def mark(self) -> int:
         """Now, as a place in what was received."""
@@ -180,10 +200,11 @@ class Client:
         y: float = NAN,
         z: float = NAN,
         target: tuple[int, int] = (1, 1),
+        confirmation: int = 0,
     ) -> None:
         p = [*params, *([NAN] * (4 - len(params)))]
         if frame is None:
-            self.send(dialect.MAVLink_command_long_message(*target, id, 0, *p, x, y, z))
+            self.send(dialect.MAVLink_command_long_message(*target, id, confirmation, *p, x, y, z))
         else:
             places = [2**31 - 1 if math.isnan(v) else round(v * 1e7) for v in (x, y)]
             self.send(dialect.MAVLink_command_int_message(*target, frame, id, 0, 0, *p, *places, z))

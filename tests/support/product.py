@@ -178,13 +178,15 @@ class Product(Process):
 
 
 @asynccontextmanager
-async def product(folder: Path, config: str, *arguments: str, ready: bool = True) -> AsyncIterator[Product]:
+async def product(
+    folder: Path, config: str, *arguments: str, ready: bool = True, env: Mapping[str, str] | None = None
+) -> AsyncIterator[Product]:
     """The gateway and its simulator for the length of a block; by default it begins when both are ready."""
     path, log = folder / "fleet.yaml", folder / "sim.jsonl"
     path.write_text(config)
     flavours.note(config)
     words = (sys.executable, "-m", "anafi_mav", "run", "-c", str(path), "--sim-log", str(log), *arguments)
-    held = await Product.start(*words)
+    held = await Product.start(*words, env=env)
     held.log = log
     try:
         if ready:

@@ -20,7 +20,7 @@ INTERNAL = frozenset(
 INTERNAL_OF = {
     "Drone": {"moves_started", "counters"},
     "Move": {"answer", "end", "ended", "is_to", "running", "under_way"},
-    "Piloting": {"moves_started", "set_min_altitude", "settle_landing", "sticks_held", "take_off_wanted"},
+    "Piloting": {"moves_started", "set_min_altitude", "settle_landing", "sticks_held"},
     "Home": {"request_states"},
     "Video": {"close"},
 }

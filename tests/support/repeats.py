@@ -22,6 +22,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.get_closest_marker(MARKER) is not None:
             item.add_marker(pytest.mark.flaky(reruns=1))
+            # The limit of pytest-timeout counts once for a test with its repetition, unless it is that of the call.
+            item.add_marker(pytest.mark.timeout(func_only=True))
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

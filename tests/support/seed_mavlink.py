@@ -147,8 +147,8 @@ REACHED: dict[str, Reach] = {
     "home/navigate": Reach("`MAV_CMD_NAV_RETURN_TO_LAUNCH`, mode Hold", _FLIGHT + "test_conf_025_return"),
     "home/set": Reach("`MAV_CMD_DO_SET_HOME`", _GUIDED + "test_conf_083_set_home"),
     "skycontroller/offboard": Reach(
-        "`ANAFI_CONTROLLER_INPUT`.source; the gateway takes it when it is told to move",
-        _SAFETY + "test_a_pilots_stick_ends_offboard_for_good",
+        "`ANF_SC_OFFBOARD`, `ANAFI_CONTROLLER_INPUT`.source",
+        "conformance/test_pilot_switch.py::test_program_keeps_the_aircraft_until_the_pilots_stick",
     ),
     "storage/download": Reach(
         "MAVLink FTP of component 100, `/media`; `anafi-mav media download`",

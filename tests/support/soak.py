@@ -13,8 +13,8 @@ import itertools
 import logging
 import math
 import random
-from collections.abc import Coroutine, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Coroutine, Iterator, Sequence
+from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -23,25 +23,30 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from anafi_mav import geo
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.mavlink import dialect as newer
+from anafi_mav.services.command.orbit_service import OrbitService
 from anafi_mav.sim.world.faults import CLEAR, Impairment
+from anafi_mav.vehicle.offboard.moves import MOVE_EVERY
 from support.fault_scenarios import watched
 from support.mav import NAN, Client
-from support.missions import ACTIVE, CORNERS, put, start, state, way
+from support.missions import ACTIVE, COMPLETE, CORNERS, NO_MISSION, NOT_STARTED, PAUSED, put, start, state, way, whole
 from support.missions import RTL as ITEM_RTL
 from support.missions import takeoff as item_takeoff
 from support.plans import MISSION, Item, upload
-from support.setpoints import EVERY, POSITION_ONLY, VELOCITY_ONLY, earth, local
+from support.setpoints import EVERY, POSITION_ONLY, VELOCITY_ONLY, attitude, earth, local
 from support.world import HOME, TAKE_OFF_SPEED, World, world
 
 MODELS = ("4k", "usa", "thermal", "ai")
-STEPS = 12
+STEPS = 10
 """Steps of a round."""
 
 SPEED, SETTLING_SPEED, WATCHING_SPEED = 3.0, 8.0, 2.0
 """Simulated seconds in one: while steps run, while the end is awaited, while modes and drone are compared."""
 
-SILENCE, GUIDED_TIMEOUT = 0.5, 1.5
-"""s after the last setpoint or stick within which the sticks are centred."""
+SILENCE, GUIDED_TIMEOUT, TARGET_SILENCE = 0.5, 1.5, 2.6
+"""s after the last setpoint, stick or target within which the sticks are centred."""
+
+WATCH_EVERY = 0.1
+"""s between two looks at what flies."""
 
 SLACK = 0.1
 """s of the simulator's and the gateway's own timers."""
@@ -51,6 +56,9 @@ FINAL_WITHIN = 45.0
 
 GAZ_FOR = 1.0
 """s of full gaz at most that end a landing (arsdk: ardrone3.xml 1-0-3)."""
+
+RESENT_WITHIN = 0.5
+"""s in which a command reaches the drone though datagrams are lost."""
 
 LONGEST_CUT = 1.3
 """s that the link is interrupted at most; below the time after which it counts as lost."""
@@ -77,9 +85,20 @@ SET_MODE, GOTO, ALTITUDE, PAUSE, ORBIT, START = (
     dialect.MAV_CMD_DO_ORBIT,
     dialect.MAV_CMD_MISSION_START,
 )
-SET_CURRENT = dialect.MAV_CMD_DO_SET_MISSION_CURRENT
+SET_CURRENT, ROI, NO_ROI, PANORAMA = (
+    dialect.MAV_CMD_DO_SET_MISSION_CURRENT,
+    dialect.MAV_CMD_DO_SET_ROI_LOCATION,
+    dialect.MAV_CMD_DO_SET_ROI_NONE,
+    dialect.MAV_CMD_PANORAMA_CREATE,
+)
+
+ONCE = (TAKEOFF, GOTO, ALTITUDE, ORBIT, SET_CURRENT)
+"""Commands that a retransmission never executes again (`services.commands.Effect`): its result is the first one's."""
 
 ACCEPTED, IN_PROGRESS = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_IN_PROGRESS
+
+YAW_STICK, PITCH_STICK = 0, 3
+"""Axes of a Skycontroller."""
 
 PX4_MODES = {
     "hold": (4, 3),
@@ -89,8 +108,18 @@ PX4_MODES = {
     "return": (4, 5),
     "land": (4, 6),
     "takeoff": (4, 2),
+    "follow": (4, 8),
 }
-COPTER_MODES = {"hold": 17, "position": 5, "offboard": 4, "mission": 3, "return": 6, "land": 9, "takeoff": 4}
+COPTER_MODES = {
+    "hold": 17,
+    "position": 5,
+    "offboard": 4,
+    "mission": 3,
+    "return": 6,
+    "land": 9,
+    "takeoff": 4,
+    "follow": 23,
+}
 
 SHOWN = {
     "px4": {0x04040000: "mission", 0x04050000: "return", 0x05040000: "return", 0x06040000: "land"}
@@ -110,20 +139,23 @@ MAY_SHOW = {
 }
 """Modes that agree with what the drone does; `other` are those in which only a client's input moves it."""
 
+_NOT_ACTIVE = {NO_MISSION, NOT_STARTED, PAUSED, COMPLETE}
+
+MISSION_STATES = dict.fromkeys(MAY_SHOW, _NOT_ACTIVE | {ACTIVE}) | {
+    "mission": {ACTIVE},
+    "hover": _NOT_ACTIVE,
+    "ground": _NOT_ACTIVE,
+}
+"""States of the mission that agree with what the drone does."""
+
 DIFFERS_AT_MOST = 20.0
 """s that a mode may differ. A commanded return hovers at home for 5 s before it lands, and for 13 s more where the
 drone reports no end of it."""
 
 BEGINNINGS = ("ground", "hover", "hover", "mission")
 
-AFTER_CANCEL, BLAMED = ", after COMMAND_CANCEL", "continued by another controller, and there is none"
-
-DEFECTS = {
-    AFTER_CANCEL: "CONTROL 3: cancel while control is acquired leaves mode Mission",
-    BLAMED: "CONTROL 2: cancelled mission restart is reported as another controller's",
-}
-"""Defects that issue CONTROL ends, by what their failures end with. Its number 1, a single goto that becomes a stream,
-breaks no promise that a round can judge: the goto ends where any newer command may end it."""
+DEFECTS: dict[str, str] = {}
+"""Known defects, by what their failures end with."""
 
 WEIGHTS = {
     "arm": 2,
@@ -137,7 +169,13 @@ WEIGHTS = {
     "offboard": 3,
     "velocity": 2,
     "position": 2,
+    "positions": 2,
+    "attitude": 1,
+    "follow": 2,
     "stick": 3,
+    "pilot": 2,
+    "roi": 1,
+    "panorama": 1,
     "upload": 2,
     "start": 3,
     "restart": 2,
@@ -191,13 +229,13 @@ def draw(seed: int, steps: int = STEPS) -> Draw:
     chance = random.Random(seed)
     flavours = ["px4", "ardupilot"]
     chance.shuffle(flavours)
-    if chance.random() < 0.4:
+    for _ in range(chance.choice([0, 0, 0, 1, 1, 2])):
         flavours.append(chance.choice(flavours))
     up = down = CLEAR
     if chance.random() < 0.7:
         loss = chance.choice([0.0, 0.1])
         up = Impairment(loss=loss, delay=chance.choice([0.0, 0.0, 0.1]))
-        down = Impairment(loss=loss, delay=chance.choice([0.0, 0.2, 0.5, 0.9]))
+        down = Impairment(loss=loss, delay=chance.choice([0.0, 0.2, 0.5, chance.uniform(0.0, 1.0)]))
     kinds, weights = list(WEIGHTS), list(WEIGHTS.values())
     drawn = []
     for _ in range(steps):
@@ -206,7 +244,7 @@ def draw(seed: int, steps: int = STEPS) -> Draw:
         args = (chance.uniform(-30.0, 30.0), chance.uniform(-30.0, 30.0), chance.uniform(0.2, 2.5))
         drawn.append(Step(gap, chance.randrange(len(flavours)), kind, args))
     model = chance.choice(MODELS)
-    skycontroller = 3 if chance.random() < 0.25 and model != "ai" else None
+    skycontroller = 3 if chance.random() < 0.35 and model != "ai" else None
     return Draw(seed, model, tuple(flavours), skycontroller, chance.choice(BEGINNINGS), up, down, tuple(drawn))
 
 
@@ -219,8 +257,8 @@ class Sent:
     command: int
     values: tuple[Any, ...]
     """Its parameters, NaN as None."""
-    repeated: bool
-    """Sent by the step `again`."""
+    confirmation: int
+    """Above 0: a retransmission of the same client's command before."""
 
 
 @dataclass
@@ -230,6 +268,8 @@ class Stream:
     begun: float
     lasts: float
     ended: float = math.inf
+    place: tuple[float, float] | None = None
+    """Of a stream of positions."""
 
 
 @dataclass
@@ -260,11 +300,11 @@ class Flight:
 
     # Sending.
 
-    def command(self, index: int, id: int, *params: float, repeated: bool = False, **where: Any) -> None:
+    def command(self, index: int, id: int, *params: float, confirmation: int = 0, **where: Any) -> None:
         values = tuple(None if isinstance(v, float) and math.isnan(v) else v for v in (*params, *where.values()))
-        self.sent.append(Sent(now(), index, id, values, repeated))
+        self.sent.append(Sent(now(), index, id, values, confirmation))
         self._last[index] = (id, params, where)
-        self.client(index).send_command(id, *params, **where)
+        self.client(index).send_command(id, *params, confirmation=confirmation, **where)
 
     def mode(self, index: int, name: str) -> None:
         if self.flavour(index) == "px4":
@@ -275,8 +315,16 @@ class Flight:
     def spawn(self, work: Coroutine[Any, Any, None]) -> None:
         self._tasks.add(asyncio.ensure_future(work))
 
-    def stream(self, index: int, message: Any, seconds: float, every: float = EVERY, lasts: float = SILENCE) -> None:
-        entry = Stream(now(), lasts)
+    def stream(
+        self,
+        index: int,
+        message: Any,
+        seconds: float,
+        every: float = EVERY,
+        lasts: float = SILENCE,
+        place: tuple[float, float] | None = None,
+    ) -> None:
+        entry = Stream(now(), lasts, place=place)
         self.streams.append(entry)
 
         async def send() -> None:
@@ -289,6 +337,31 @@ class Flight:
                 await asyncio.sleep(every)  # the program's own rate
 
         self.spawn(send())
+
+    def pilot(self, axis: int, percent: int, seconds: float) -> None:
+        """Let the pilot at the Skycontroller hold a stick, where there is one."""
+        controller = self.w.drone.skycontroller
+        if controller is None:
+            return
+        controller.stick(axis, percent)
+        self.streams.append(Stream(now(), SILENCE, now() + seconds))
+        asyncio.get_running_loop().call_later(seconds, controller.stick, axis, 0)
+
+    @asynccontextmanager
+    async def watched(self) -> AsyncIterator[None]:
+        """See that at most one flight task flies within the block."""
+        watch = asyncio.ensure_future(self._watch())
+        try:
+            yield
+        finally:
+            watch.cancel()
+            with suppress(asyncio.CancelledError):
+                await watch
+
+    async def _watch(self) -> None:
+        while len(flying := pilots(self.w)) < 2:
+            await watched(WATCH_EVERY)  # samples of what flies
+        self.wrong.append(f"two pilots: {', '.join(flying)}")
 
     async def streams_end(self) -> None:
         if self._tasks:
@@ -333,6 +406,25 @@ class Flight:
                 self.stream(n, local(VELOCITY_ONLY, v=(first / 10.0, second / 10.0, 0.0)), 0.0, lasts=lasts)
             case "position":
                 self.stream(n, earth(POSITION_ONLY, 6, first, second, height), 0.0)
+            case "positions":
+                message = earth(POSITION_ONLY, 6, first, second, height)
+                self.stream(n, message, 0.5 + third, place=(message.lat_int / 1e7, message.lon_int / 1e7))
+                self.mode(n, "offboard")
+            case "attitude":
+                self.stream(n, attitude(first / 300.0, 0.5), third)
+                self.mode(n, "offboard")
+            case "follow":
+                self.mode(n, "follow")
+                self.stream(n, target(place), third, every=0.4, lasts=TARGET_SILENCE)
+            case "pilot":
+                self.pilot(PITCH_STICK if second > 0.0 else YAW_STICK, int(first * 3.0), third / 2.0)
+            case "roi":
+                if second > 0.0:
+                    self.command(n, ROI, NAN, NAN, NAN, NAN, frame=6, x=place[0], y=place[1], z=0.0)
+                else:
+                    self.command(n, NO_ROI)
+            case "panorama":
+                self.command(n, PANORAMA, 360.0, 0.0, 10.0, 10.0)
             case "stick":
                 if second > 0.0:
                     self.mode(n, "position")
@@ -374,7 +466,8 @@ class Flight:
             case "again":
                 if n in self._last:
                     id, params, where = self._last[n]
-                    self.command(n, id, *params, repeated=True, **where)
+                    long = "frame" not in where  # COMMAND_INT has no such field
+                    self.command(n, id, *params, confirmation=int(long and first > 0.0), **where)
             case "cut":
                 self.w.drone.faults.mute = True
                 asyncio.get_running_loop().call_later(third / 2.0, setattr, self.w.drone.faults, "mute", False)
@@ -407,6 +500,10 @@ class Flight:
                 missing.append(self.sent_of(index, command)[-1])
         return missing
 
+    def _is_unsupported(self, s: Sent) -> bool:
+        results = [ack.result for _, ack in self.acks(s.client) if ack.command == s.command]
+        return dialect.MAV_RESULT_UNSUPPORTED in results
+
     def sent_of(self, index: int, command: int) -> list[Sent]:
         return [s for s in self.sent if (s.client, s.command) == (index, command)]
 
@@ -418,7 +515,8 @@ class Flight:
             before = newest.get(s.client)
             same = before is not None and (before.command, before.values) == (s.command, s.values)
             table.setdefault((s.client, s.command), ([], []))[0].append((s, same))
-            newest[s.client] = s
+            if s.command != PANORAMA or not self._is_unsupported(s):  # such a command ends no other one
+                newest[s.client] = s
         for index in range(len(self.drawn.flavours)):
             for at, ack in self.acks(index):
                 if ack.result != IN_PROGRESS and (index, ack.command) in table:
@@ -488,13 +586,14 @@ async def fly(drawn: Draw) -> list[str]:
             await begin(w, drawn.begins)
             flight = Flight(w, drawn)
             w.drone.faults.up, w.drone.faults.down = drawn.up, drawn.down
-            for step in drawn.steps:
-                if step.gap:
-                    await asyncio.sleep(step.gap)  # a client's own time
-                await flight.step(step)
-            await flight.streams_end()
-            w.drone.faults.mute = False
-            await settle(flight)
+            async with flight.watched():
+                for step in drawn.steps:
+                    if step.gap:
+                        await asyncio.sleep(step.gap)  # a client's own time
+                    await flight.step(step)
+                await flight.streams_end()
+                w.drone.faults.mute = False
+                await settle(flight)
             await compare(flight)
             judge(flight)
             await hold(flight)
@@ -571,9 +670,10 @@ async def _differences(flight: Flight, seconds: float = 2.4) -> list[str]:
         modes = {SHOWN[flight.flavour(index)].get(m.custom_mode, "other") for m in beats}
         armed = {bool(m.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED) for m in beats}
         if len(modes) == 1 and not modes <= MAY_SHOW[truth]:
-            cancels = any(step.kind in ("cancel", "withdraw") for step in flight.drawn.steps)
-            after = AFTER_CANCEL if cancels and modes == {"mission"} else ""
-            found.append(f"mode of client {index} is {modes} while the drone's state is {truth}{after}")
+            found.append(f"mode of client {index} is {modes} while the drone's state is {truth}")
+        states = {whole(m).mission_state for _, m in w.clients[index].since(mark, "MISSION_CURRENT")}
+        if states and states.isdisjoint(MISSION_STATES[truth]):
+            found.append(f"mission state of client {index} is {states} while the drone's state is {truth}")
         if truth != "ground" and armed != {True}:
             found.append(f"armed of client {index} is {armed} while the drone's state is {truth}")
     return found
@@ -582,10 +682,12 @@ async def _differences(flight: Flight, seconds: float = 2.4) -> list[str]:
 def judge(flight: Flight) -> None:
     """What the log and the acknowledgements of the steps say."""
     _judge_acks(flight)
+    _judge_retransmissions(flight)
     texts = [m.text for client in flight.w.clients for _, m in client.since(0, "STATUSTEXT")]
     if flight.drawn.skycontroller is None and any("resumed by another controller" in text for text in texts):
-        flight.wrong.append(f"mission is {BLAMED}")
+        flight.wrong.append("mission is continued by another controller, and there is none")
     _judge_sticks(flight)
+    _judge_moves(flight)
     _judge_motors(flight)
 
 
@@ -604,6 +706,23 @@ def _judge_acks(flight: Flight) -> None:
                 begun = sum(s.at <= at for s, _ in sends)
                 if sum(final < at for final, _ in finals) >= begun:
                     flight.wrong.append(f"client {index} {name}: IN_PROGRESS after the final result")
+
+
+def _judge_retransmissions(flight: Flight) -> None:
+    """A retransmission gets the result of its command, unless another client has intervened."""
+    for (index, command), (sends, finals) in flight.by_command().items():
+        if command not in ONCE:
+            continue
+        for (original, _), (again, _) in itertools.pairwise(sends):
+            if not again.confirmation or original.confirmation or again.values != original.values:
+                continue
+            before = [result for at, result in finals if original.at <= at < again.at]
+            after = [result for at, result in finals if at >= again.at][:1]
+            others = [s for s in flight.sent if s.client != index and original.at <= s.at <= again.at + 1.0]
+            recent = again.at - original.at < RESEND
+            if len(before) == 1 and recent and not others and after != before:
+                name = dialect.enums["MAV_CMD"][command].name
+                flight.wrong.append(f"client {index} {name}: result {before}, of its retransmission {after}")
 
 
 def _judge_sticks(flight: Flight) -> None:
@@ -633,6 +752,64 @@ def _judge_sticks(flight: Flight) -> None:
             last = max((b for a, b in spans if a <= entry.t), default=-math.inf)
             flight.wrong.append(f"PCMD {args} is received {entry.t - last:.2f} s after the end of the last stream")
             return
+
+
+def _judge_moves(flight: Flight) -> None:
+    """A move that a stream of positions has commanded ends with the stream."""
+    log = [e for e in flight.w.drone.log if e.t >= flight.began]
+    late = flight.delay + SLACK
+    if flight.drawn.up.loss or any(step.kind == "cut" for step in flight.drawn.steps):
+        late += LONGEST_CUT + RESENT_WITHIN
+    for stream in flight.streams:
+        if stream.place is None:
+            continue
+        over = stream.ended + stream.lasts + late
+        if any(other.place and other.begun < stream.ended < other.ended for other in flight.streams):
+            # Another client's positions are flown instead, once the drone has answered the move before: at most one
+            # is on its way.
+            over += flight.drawn.down.delay + MOVE_EVERY + SLACK
+        begun = [e for e in log if e.kind == "command" and e.t <= over and _flies_to(e, stream.place)]
+        if begun and not any(begun[-1].t < e.t <= over and _ends_move(e) for e in log):
+            flight.wrong.append(f"a move of a stream is flown {over - stream.ended:.2f} s after its end")
+
+
+def _flies_to(entry: Any, place: tuple[float, float]) -> bool:
+    if not entry.name.lower().replace("_", "").endswith("moveto") or entry.name.endswith("CancelMoveTo"):
+        return False
+    return math.dist((entry.args["latitude"], entry.args["longitude"]), place) < 1e-6
+
+
+def target(place: tuple[float, float]) -> Any:
+    """Return a FOLLOW_TARGET that stands at a place."""
+    unknown, sure = [NAN] * 3, [1.0, NAN, NAN, NAN]
+    where = (round(place[0] * 1e7), round(place[1] * 1e7), HOME[2])
+    return dialect.MAVLink_follow_target_message(0, 1, *where, unknown, unknown, sure, unknown, unknown, 0)
+
+
+def pilots(w: World) -> list[str]:
+    """Return the flight tasks that fly the drone at this moment."""
+    (system,) = w.gateway.systems
+    vehicle: Any = system.vehicle
+    (orbit,) = (service for service in system.services if isinstance(service, OrbitService))
+    tasks = {
+        "offboard": vehicle.offboard.engaged,
+        "follow": vehicle.follow.engaged,
+        "mission": vehicle.mission.flying,
+        "orbit": orbit.circle is not None,
+        "sticks": vehicle.manual.state.name == "HELD",
+    }
+    return [name for name, flies in tasks.items() if flies]
+
+
+def _ends_move(entry: Any) -> bool:
+    """Return True for what ends a move: its own end, a stop, or anything else that flies the drone."""
+    if entry.kind == "event":
+        return entry.name.endswith("moveToChanged") and entry.args["status"] != 0
+    if entry.kind == "state":
+        return entry.name == "flying" and entry.args["to"] in ("landing", "landed", "emergency")
+    name = entry.name.rpartition(".")[2]
+    moves = ("CancelMoveTo", "moveTo", "extended_move_to", "moveBy", "extended_move_by")
+    return entry.kind == "command" and name in (*moves, "Landing", "return_to_home", "Start")
 
 
 def _landings(w: World) -> list[tuple[float, float]]:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import random
 import socket
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from anafi_mav.config import Config, DroneConfig, HttpConfig, MediaConfig, VideoConfig
+from anafi_mav.config import Config, DroneConfig, HttpConfig, MediaConfig, RecordingConfig, VideoConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 from support import flavours
@@ -26,6 +26,9 @@ VIDEO_PORT = 8554
 """Of a drone's video server; no user needs a right for it."""
 
 UDP_PORT = 14550
+
+OPTIONS_PORT = 5770
+"""Of the first endpoint with options of its own."""
 
 HOLD, LAND, RETURN, TAKEOFF = 0x03040000, 0x06040000, 0x05040000, 0x02040000
 POSITION, OFFBOARD = 0x00030000, 0x00060000
@@ -148,15 +151,20 @@ async def world(
     video: VideoConfig | bool = True,
     video_latency: float = 0.0,
     media: MediaConfig | None = None,
+    recording: RecordingConfig | None = None,
     pose: Literal["video", "events"] = "video",
     rtsp_port: int = VIDEO_PORT,
+    quirks: tuple[str, ...] = (),
+    before: Callable[[SimulatedDrone], None] = lambda drone: None,
+    options: Sequence[str] = (),
 ) -> AsyncIterator[World]:
     """One simulated drone, one gateway with a TCP endpoint, and its clients, connected and ready.
 
     With `flavour` the endpoint shows that autopilot. `also` is the flavour of a second endpoint, at port 5761.
-    With `udp` there is another one that waits at UDP_PORT.
+    With `udp` there is another one that waits at UDP_PORT. Each of `options` has one at OPTIONS_PORT and above.
     With `web` the drone has its web server, which takes flight plans. A drone at the same `drone_address` as an earlier
     one has the same serial number. With another `rtsp_port` the gateway finds a video server of the test there.
+    `before` is called with the drone before the gateway is made.
     """
     drone_address, address = drone_address or loopback(), loopback()
     spec = DroneSpec(
@@ -168,24 +176,30 @@ async def world(
         telemetry_rate=telemetry_rate,
         skycontroller=skycontroller,
         video_latency=video_latency,
+        firmware_quirks=quirks,
     )
     config = Config(
         endpoints=(
             f"tcpin://{address}:5760?flavour={flavour}",
             *([f"tcpin://{address}:5761?flavour={also}"] if also else []),
             *([f"udpin://{address}:{UDP_PORT}?flavour={flavour}"] if udp else []),
+            *(f"tcpin://{address}:{OPTIONS_PORT + index}?{query}" for index, query in enumerate(options)),
         ),
         drones=(
             DroneConfig(name="alpha", sysid=sysid, address=drone_address, http_port=WEB_PORT, rtsp_port=rtsp_port),
         ),
         video=video,
         media=media or MediaConfig(),
+        recording=recording or RecordingConfig(),
         http=HttpConfig(port=0),
         allow_kill=allow_kill,
         pose=pose,
     )
     flavours.note(*config.endpoints)
-    async with Simulator([spec], speed=speed, seed=1) as simulator, Gateway(config) as gateway:
+    async with AsyncExitStack() as stack:
+        simulator = await stack.enter_async_context(Simulator([spec], speed=speed, seed=1))
+        before(simulator.drones[0])
+        gateway = await stack.enter_async_context(Gateway(config))
         held = World(simulator, gateway, address, flavour)
         try:
             for _ in range(clients):

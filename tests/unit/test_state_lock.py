@@ -35,6 +35,7 @@ def test_state_lock_while_held_names_process_and_drones(tmp_path: Path) -> None:
         "version": 1,
         "pid": os.getpid(),
         "drones": [{"name": "alpha", "address": "192.168.42.1", "interface": "wlan1", "serial": "PI040416DA9H839157"}],
+        "web": "",
     }
     lock.release()
     lock.release()

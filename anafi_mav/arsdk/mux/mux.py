@@ -58,7 +58,7 @@ class MuxFrame(NamedTuple):
     payload: bytes
 
 
-class Control(NamedTuple):
+class MuxControl(NamedTuple):
     """One message of channel 0."""
 
     id: int
@@ -76,12 +76,12 @@ def encode_control(id: int, channel: int = 0, *args: int, payload: bytes = b"") 
     return encode_frame(CONTROL, _CONTROL.pack(id, channel, *args, *[0] * (6 - len(args))) + payload)
 
 
-def decode_control(payload: bytes) -> Control | None:
+def decode_control(payload: bytes) -> MuxControl | None:
     """A control message; None when it is too short."""
     if len(payload) < _CONTROL.size:
         return None
     id, channel, *args = _CONTROL.unpack_from(payload)
-    return Control(id, channel, tuple(args))
+    return MuxControl(id, channel, tuple(args))
 
 
 class Decoder:

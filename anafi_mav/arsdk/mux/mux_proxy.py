@@ -17,7 +17,7 @@ import logging
 from collections.abc import Callable
 from typing import Protocol
 
-from anafi_mav.arsdk.mux.mux import Control, encode_control, encode_frame
+from anafi_mav.arsdk.mux.mux import MuxControl, encode_control, encode_frame
 from anafi_mav.arsdk.mux.mux_udp import REMOTE_UPDATE_ACK, UdpSocket, UdpTunnel
 from anafi_mav.errors import LinkLost
 
@@ -118,7 +118,7 @@ class Slave:
         self._early: dict[int, bytearray] = {}
         self._tasks: set[asyncio.Task[None]] = set()
 
-    def control(self, message: Control, payload: bytes) -> None:
+    def control(self, message: MuxControl, payload: bytes) -> None:
         """A control message of the mux; what is not the proxy's is ignored."""
         master = message.channel
         match message.id:
@@ -330,7 +330,7 @@ class Master:
         finally:
             self._end(number)
 
-    def control(self, message: Control, payload: bytes) -> None:
+    def control(self, message: MuxControl, payload: bytes) -> None:
         """A control message of the mux; what is not the proxy's is ignored."""
         number = message.channel & ~_SLAVE_BIT
         held = self._channels.get(number)

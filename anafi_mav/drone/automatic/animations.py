@@ -18,6 +18,7 @@ from anafi_mav.arsdk.messages import animation
 from anafi_mav.arsdk.messages.animation import AnimationState, Indicator, Mode, PlayMode, Type, VertigoFinishAction
 from anafi_mav.drone.element import Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
+from anafi_mav.drone.sent_commands import SentCommand, Slot
 from anafi_mav.drone.settings import Commanding, number
 from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported
@@ -270,7 +271,7 @@ class Animations(Commanding[AnimationsState]):
     async def cancel(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """End the animation; returns when none is flown, at once when none is running or starting."""
         self._require(self.state.running, "animations")
-        self._commander.abort_pending("stopped", animation.Cancel)
+        self._commander.abort_pending("stopped", Slot.ANIMATION)
         await self._commander.stops_delivered(animation.Cancel.NAME, timeout)
         if not self.state.is_running:
             return
@@ -303,11 +304,11 @@ class Animations(Commanding[AnimationsState]):
             raise CommandRejected(self._why(type))
         try:
             await self._commander.begin(
+                SentCommand(Slot.ANIMATION, undo=animation.Cancel()),
                 order,
                 (_FIGURES[type],),
                 lambda m: True if m.state == AnimationState.RUNNING else None,
                 ANSWER_TIMEOUT,
-                animation.Cancel(),
             )
         except CommandTimeout:
             if type not in (self.state.available or ()):

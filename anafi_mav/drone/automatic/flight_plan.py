@@ -7,7 +7,7 @@ drone says which by what it reports (feature flight_plan).
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from typing import Any, ClassVar
 
 import msgspec
@@ -19,16 +19,16 @@ from anafi_mav.arsdk.messages import flight_plan as modern
 from anafi_mav.arsdk.messages.common import FlightPlanComponent, MavlinkType, PlayError, PlayingState
 from anafi_mav.arsdk.messages.flight_plan import Indicator, SupportedCapabilities
 from anafi_mav.drone.element import Reducer, members, with_item
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
 from anafi_mav.drone.rest import Rest
+from anafi_mav.drone.sent_commands import PLAN_MEMORY, Phase, SentCommand, Slot
 from anafi_mav.drone.settings import Commanding
 from anafi_mav.drone.status.alerts import spoken
-from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported, RemoteProtocolError
 from anafi_mav.models import NO_MODEL, Model
 
 API = "/api/v1/upload"
-START_TIMEOUT = 20.0
-"""s; as Olympe (common.Mavlink.Start): the drone reads the whole file before it says anything."""
+START_TIMEOUT = PLAN_MEMORY
 
 _UID = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,127}")
 
@@ -128,23 +128,15 @@ class FlightPlan(Commanding[FlightPlanState]):
         self._rest = rest
         self.model: Callable[[], Model] = lambda: NO_MODEL
         """Which drone it is; the drone sets it."""
-        self._starts = 0
-        self._asked: str | None = None
-        """The plan whose start was asked for last."""
-        self._unwanted: tuple[str, float] | None = None
-        """Plan whose start was aborted, and loop time until which the drone may still begin it."""
-
-    def reset(self) -> None:
-        super().reset()
-        self._asked = self._unwanted = None
+        self.reported_attempt: Hashable | None = None
+        """The `attempt` of the start that the newest playing state is about; None: of no start of this program."""
 
     def on_playing(self, message: common.MavlinkFilePlayingStateChanged, now: float) -> None:
         """A flight plan plays, is paused or stopped."""
-        if self._unwanted is None or message.state != PlayingState.PLAYING:
-            return
-        uid, until = self._unwanted
-        if uid == message.filepath and now < until:
-            # It took the drone so long to read the plan that the order against it came before its beginning.
+        sent = self._commander.sent.attribute(message, now)
+        self.reported_attempt = None if sent is None else sent.attempt
+        playing = message.state == PlayingState.PLAYING
+        if playing and sent is not None and self._commander.sent.is_unwanted(sent, now):
             self._commander.send_stop_if_connected(common.Stop())
 
     @property
@@ -215,38 +207,29 @@ class FlightPlan(Commanding[FlightPlanState]):
         *,
         continue_on_disconnect: bool | None = None,
         timeout: float = START_TIMEOUT,
+        attempt: Hashable | None = None,
     ) -> None:
         """Fly an uploaded plan, or resume the paused one; returns when it plays.
 
         `item` (from 0) is where it begins, `continue_on_disconnect` flies on without a link: Ai only. Raises
         `CommandRejected` with what the drone lacks, `CommandTimeout`. A start that times out or is cancelled is
-        withdrawn, also when the drone begins the plan only then.
+        withdrawn, also when the drone begins the plan only then. `attempt` names this start in `reported_attempt`.
         """
         self._available()
         command = self._start(uid, item, type, continue_on_disconnect)
-        others = {self.state.uid, self._asked} - {uid, ""}
+        attempt = object() if attempt is None else attempt
+        sent = SentCommand(Slot.PLAN, uid, common.Stop(), attempt=attempt, plan_before=self.state.uid)
 
         def judge(message: Any) -> bool | AnafiMavError | None:
-            if isinstance(message, common.StartingErrorEvent):
+            if sent.phase is Phase.REFUSED:
                 return CommandRejected(self._why())
-            return True if message.state == PlayingState.PLAYING and message.filepath not in others else None
+            return True if sent.phase is Phase.CONFIRMED else None
 
-        self._starts += 1
-        number, self._asked, self._unwanted = self._starts, uid, None
+        answers = (common.MavlinkFilePlayingStateChanged, common.StartingErrorEvent)
         try:
-            await self._commander.begin(
-                command,
-                (common.MavlinkFilePlayingStateChanged, common.StartingErrorEvent),
-                judge,
-                timeout,
-                common.Stop(),
-            )
-        except LinkLost:
-            raise
-        except BaseException as error:
-            if number == self._starts and self._commander.may_begin(common.Stop, START_TIMEOUT):
-                self._unwanted = uid, loop_time() + START_TIMEOUT
-            if isinstance(error, CommandTimeout) and self.state.unavailable:
+            await self._commander.begin(sent, command, answers, judge, timeout)
+        except CommandTimeout:
+            if self.state.unavailable:
                 raise CommandRejected(self._why()) from None
             raise
 
@@ -270,8 +253,8 @@ class FlightPlan(Commanding[FlightPlanState]):
 
     def suspend(self) -> None:
         """Pause without waiting for the drone's confirmation; an unconfirmed start is withdrawn."""
-        self._commander.abort_pending("something else flies", common.Stop)
-        if self.state.playing == PlayingState.PLAYING:
+        self._commander.abort_pending("something else flies", Slot.PLAN)
+        if self.state.playing == PlayingState.PLAYING or self._commander.sent.is_executed(Slot.PLAN):
             self._commander.send_stop_if_connected(common.Pause())
 
     async def pause(self, timeout: float = ANSWER_TIMEOUT) -> None:
@@ -284,7 +267,7 @@ class FlightPlan(Commanding[FlightPlanState]):
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """End the plan and hover; returns at once when none is playing, paused or starting."""
         self._available()
-        self._commander.abort_pending("stopped", common.Stop)
+        self._commander.abort_pending("stopped", Slot.PLAN)
         await self._commander.stops_delivered(common.Stop.NAME, timeout)
         if self.state.playing == PlayingState.STOPPED:
             return

@@ -17,6 +17,7 @@ from anafi_mav.arsdk.messages import controller_info, follow_me
 from anafi_mav.arsdk.messages.follow_me import Behavior, Input, Mode
 from anafi_mav.drone.element import Position, Reducer, members, position, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, loop_time
+from anafi_mav.drone.sent_commands import SentCommand, Slot
 from anafi_mav.drone.settings import Commanding, number
 from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.errors import (
@@ -101,10 +102,9 @@ class FollowMe(Commanding[FollowMeState]):
                 return None
             return CommandRejected(self._why(mode)) if message.behavior == Behavior.IDLE else True
 
+        sent = SentCommand(Slot.FOLLOW, undo=follow_me.Stop(), undo_refused=True)
         try:
-            await self._commander.begin(
-                follow_me.Start(mode), (follow_me.State,), judge, timeout, follow_me.Stop(), undo_refused=True
-            )
+            await self._commander.begin(sent, follow_me.Start(mode), (follow_me.State,), judge, timeout)
         except CommandTimeout:
             if self.state.missing.get(mode):
                 raise CommandRejected(self._why(mode)) from None
@@ -120,7 +120,7 @@ class FollowMe(Commanding[FollowMeState]):
         Returns at once when the drone is neither following nor about to.
         """
         self._require(self.state.mode, "follow me")
-        self._commander.abort_pending("stopped", follow_me.Stop)
+        self._commander.abort_pending("stopped", Slot.FOLLOW)
         await self._commander.stops_delivered(follow_me.Stop.NAME, timeout)
         if self.state.mode == Mode.NONE:
             return

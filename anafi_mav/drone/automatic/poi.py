@@ -16,6 +16,7 @@ from anafi_mav.arsdk.messages.ardrone3 import PoiMode, PoiStatus
 from anafi_mav.arsdk.messages.poi import Indicator
 from anafi_mav.drone.element import Position, Reducer, members, position
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
+from anafi_mav.drone.sent_commands import SentCommand, Slot
 from anafi_mav.drone.settings import Commanding
 from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.errors import AnafiMavError, CommandRejected, LocalProtocolError
@@ -77,21 +78,22 @@ class Poi(Commanding[PoiState]):
             return True if accepted else None
 
         command = ardrone3.StartPilotedPOIV2(latitude, longitude, altitude, mode)
-        await self._commander.begin(command, (ardrone3.PilotedPOIV2,), judge, timeout, ardrone3.StopPilotedPOI())
+        sent = SentCommand(Slot.POI, undo=ardrone3.StopPilotedPOI())
+        await self._commander.begin(sent, command, (ardrone3.PilotedPOIV2,), judge, timeout)
 
     def abort(self) -> None:
         """Command the end of pointing at the place, without waiting.
 
         An unanswered start is withdrawn. Does nothing without a place or a link.
         """
-        self._commander.abort_pending("stopped", ardrone3.StopPilotedPOI)
+        self._commander.abort_pending("stopped", Slot.POI)
         if self.state.status in (PoiStatus.RUNNING, PoiStatus.PENDING):
             self._commander.send_stop_if_connected(ardrone3.StopPilotedPOI())
 
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """End pointing at the place; returns at once when none is active or about to be."""
         self._require(self.state.status, "points of interest")
-        self._commander.abort_pending("stopped", ardrone3.StopPilotedPOI)
+        self._commander.abort_pending("stopped", Slot.POI)
         await self._commander.stops_delivered(ardrone3.StopPilotedPOI.NAME, timeout)
         if self.state.status not in (PoiStatus.RUNNING, PoiStatus.PENDING):
             return

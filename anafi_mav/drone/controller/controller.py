@@ -37,7 +37,7 @@ from anafi_mav.arsdk.messages.skyctrl import Source
 from anafi_mav.clock import Alarm
 from anafi_mav.drone.controller.state import REDUCERS, ControllerState, KnownDrone
 from anafi_mav.drone.element import Element, Reducer
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation, loop_time
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
 
 log = logging.getLogger("anafi_mav")
@@ -116,6 +116,8 @@ class Controller(Element[ControllerState]):
         """Why the newest of them, in two words."""
         self._confirmed = False
         """The controller has said that the source is ours."""
+        self._kept = False
+        """Sticks and source stay ours while nothing moves, too."""
         self._commander = commander
         self._moving = moving
         self._take_over = take_over
@@ -138,7 +140,7 @@ class Controller(Element[ControllerState]):
 
     def link_lost(self) -> None:
         """The controller has taken everything back by itself."""
-        self.present = self.taken = self._confirmed = False
+        self.present = self.taken = self._confirmed = self._kept = False
         self.model = 0
         self._extra_axes = self._extra_buttons = 0
         self._pilot_keeps_until = -math.inf
@@ -194,18 +196,23 @@ class Controller(Element[ControllerState]):
             raise CommandRejected("the pilot at the Skycontroller flies")
         self._last_motion = now
         if not self.taken:
-            self.taken, self._confirmed = True, False
-            log.info("the source of piloting is ours, the axes of the Skycontroller are grabbed")
-            self._commander.send(self._grab_message(self._extra_axes, self._extra_buttons))
-            self._commander.send(skyctrl.SetPilotingSource(Source.CONTROLLER))
-            self._stand_by(self._hand_back())
+            self._take()
         if self._watching.at is None:
             self._watching.set_in(LOOK_EVERY)
         return True
 
+    def _take(self) -> None:
+        """Take sticks and source for our user."""
+        self.taken, self._confirmed = True, False
+        log.info("the source of piloting is ours, the axes of the Skycontroller are grabbed")
+        self._commander.send(self._grab_message(self._extra_axes, self._extra_buttons))
+        self._commander.send(skyctrl.SetPilotingSource(Source.CONTROLLER))
+        self._stand_by(self._hand_back())
+
     def give_back(self) -> None:
         """Return sticks and piloting source to the pilot now; inputs of `grab` stay grabbed."""
         self._watching.cancel()
+        self._kept = False
         if not self.taken:
             return
         self.taken = False
@@ -239,13 +246,8 @@ class Controller(Element[ControllerState]):
         if not self.taken:
             return
         self._pilot_keeps_until = math.inf
-        back = self._commander.expect(
-            (skyctrl.PilotingSource,), lambda message: True if message.source == Source.SKY_CONTROLLER else None
-        )
-        self.give_back()
-        back.expire_after(GOODBYE, CommandTimeout(skyctrl.SetPilotingSource.NAME, GOODBYE))
         with contextlib.suppress(CommandTimeout, LinkLost):
-            await back.wait()
+            await self.hand_back(GOODBYE)
 
     def questions(self) -> tuple[Message, ...]:
         """Return the queries for a Skycontroller that speaks protobuf.
@@ -287,6 +289,8 @@ class Controller(Element[ControllerState]):
 
     def _look(self) -> None:
         """Is the motion over?"""
+        if self._kept:
+            return
         now = loop_time()
         if self._moving():
             self._last_motion = now
@@ -300,6 +304,51 @@ class Controller(Element[ControllerState]):
         return mapper.Grab(buttons, axes | (STICKS if self.taken else 0))
 
     # -- verbs
+
+    async def keep(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Take sticks and piloting source until `hand_back`, also while nothing moves.
+
+        Returns when the Skycontroller has confirmed it. The pilot's stick ends it, as it ends a motion. Raises
+        `CommandRejected` while the pilot has control.
+        """
+        self._require()
+        if self.pilot_acquired_control:
+            raise CommandRejected("the pilot at the Skycontroller flies")
+        self._kept = True
+        if self.taken and self._confirmed:
+            return
+        try:
+            taken = self._expect_source(Source.CONTROLLER)
+            if not self.taken:
+                self._take()
+            taken.expire_after(timeout, CommandTimeout(skyctrl.SetPilotingSource.NAME, timeout))
+            await taken.wait()
+        except BaseException:
+            self.keep_no_longer()
+            raise
+        if not self._kept:
+            raise CommandRejected("the pilot at the Skycontroller flies")
+
+    def keep_no_longer(self) -> None:
+        """End `keep`: sticks and source go back to the pilot once nothing moves."""
+        self._kept = False
+        if self.taken and self._watching.at is None:
+            self._watching.set_in(LOOK_EVERY)
+
+    async def hand_back(self, timeout: float = ANSWER_TIMEOUT) -> None:
+        """Do `give_back`, and wait for its confirmation; at once when the pilot has both."""
+        if not self.taken:
+            self._kept = False
+            return
+        back = self._expect_source(Source.SKY_CONTROLLER)
+        self.give_back()
+        back.expire_after(timeout, CommandTimeout(skyctrl.SetPilotingSource.NAME, timeout))
+        await back.wait()
+
+    def _expect_source(self, source: Source) -> Expectation[bool]:
+        return self._commander.expect(
+            (skyctrl.PilotingSource,), lambda message: True if message.source == source else None
+        )
 
     async def grab(self, axes: int = 0, buttons: int = 0, timeout: float = ANSWER_TIMEOUT) -> None:
         """Grab axes and buttons: they are reported in the state instead of acting.

@@ -42,7 +42,7 @@ _ANGLES = {"roll": "CameraRollDegree", "pitch": "CameraPitchDegree", "yaw": "Cam
 """Parrot's names in the namespace drone-parrot."""
 
 
-class Source(Protocol):
+class MediaSource(Protocol):
     """The drone, or the gateway before it."""
 
     def read_from(self, resource: Resource, offset: int = 0) -> AsyncGenerator[bytes, None]:
@@ -53,7 +53,7 @@ class Source(Protocol):
 
 
 async def copy(
-    source: Source,
+    source: MediaSource,
     resource: Resource,
     folder: Path,
     progress: Callable[[int, int], None] | None = None,
@@ -88,7 +88,9 @@ async def copy(
             await asyncio.sleep(pause)
 
 
-async def _copy(source: Source, resource: Resource, folder: Path, progress: Callable[[int, int], None]) -> Path | None:
+async def _copy(
+    source: MediaSource, resource: Resource, folder: Path, progress: Callable[[int, int], None]
+) -> Path | None:
     directory = folder / resource.date
     if await _on_disk(_is_known, directory, resource):
         return None

@@ -117,7 +117,7 @@ class GuidedMoves:
         self._sticks.let_go()
         self._commander.abort_pending("a move was asked for")
         obsolete = self._moves.begin_to(move)
-        if obsolete is not None and obsolete.answer.token is not None:
+        if obsolete is not None:
             self._commander.cancel(obsolete.answer.token)
         try:
             self._commander.dispatch(move.answer, command, timeout)
@@ -165,13 +165,11 @@ class GuidedMoves:
         """
         journey = self._moves.cancel_to(why)
         if journey is not None:
-            if journey.answer.token is not None:
-                self._commander.cancel(journey.answer.token)
+            self._commander.cancel(journey.answer.token)
             self._commander.send_stop(ardrone3.CancelMoveTo())
         moves = self._moves.cancel_by(why, loop_time())
         for move in moves:
-            if move.answer.token is not None:
-                self._commander.cancel(move.answer.token)
+            self._commander.cancel(move.answer.token)
         if moves:
             self._commander.send_stop(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
         return journey is not None

@@ -1,7 +1,7 @@
 """End a landing by positive gaz (ardrone3.xml 1-0-3), and by a take-off command on request.
 
 Gaz starts nothing on the ground. A TakeOff does, so it is withdrawn when the drone reports that it has landed, and a
-firmware that executes it all the same is made to land again (`Motors.take_off_withdrawn`).
+firmware that executes it all the same is made to land again (`Motors.on_flying_state`).
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from anafi_mav.drone.piloting.motors import Motors
 from anafi_mav.drone.piloting.state import PilotingState
 from anafi_mav.drone.piloting.stick_stream import StickStream
 from anafi_mav.drone.piloting.sticks import PERIOD, Percent
+from anafi_mav.drone.sent_commands import Event, SentCommand, Slot
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout
 
 GAZ_FOR = 1.0
@@ -64,29 +65,26 @@ class LandingEnd:
         answer = self._commander.expect((ardrone3.FlyingStateChanged,), _judge)
         answer.expire_after(timeout, CommandTimeout("the end of the landing", timeout))
         self._motors.landing_doubtful()
+        sent, smart = SentCommand(Slot.LANDING_END), take_off and self._is_modern()
         try:
-            if take_off and self._is_modern():
-                answer.token = self._commander.send(ardrone3.SmartTakeOffLand())
-                self._motors.take_off_against_landing()
+            if take_off:
+                command = ardrone3.SmartTakeOffLand() if smart else ardrone3.TakeOff()
+                sent.answer, answer.token = answer, self._commander.send(command)
+                self._commander.sent.place(sent, loop_time())
+            if smart:
                 # It toggles: were the landing ended by gaz before it arrives, it would begin another one.
                 await asyncio.wait({answer.future}, timeout=SMART_WAIT)
                 self._commander.cancel(answer.token)
-            elif take_off:
-                answer.token = self._commander.send(ardrone3.TakeOff())
-                self._motors.take_off_against_landing()
             await self._hold_gaz(answer.future)
             await answer.wait()
-            if take_off:
-                self._motors.landing_over()
+            sent.apply(Event.EXECUTED)
         except BaseException as error:
-            if answer.token is not None:
-                self._motors.take_off_withdrawn()
+            sent.apply(Event.WITHDRAWN, loop_time())
             if isinstance(error, CommandTimeout):
                 raise CommandRejected(STILL_LANDING) from None
             raise
         finally:
-            if answer.token is not None:  # whatever ended this: it must not arrive on the ground
-                self._commander.cancel(answer.token)
+            self._commander.cancel(answer.token)  # whatever ended this: it must not arrive on the ground
             answer.close()
             self._sticks.centre_after_gaz()
 

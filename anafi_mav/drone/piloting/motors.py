@@ -11,22 +11,17 @@ import math
 from collections.abc import Callable
 
 from anafi_mav.arsdk.codec.wire import Message
-from anafi_mav.arsdk.messages import ardrone3, common
+from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.drone.element import Element
-from anafi_mav.drone.expectation import QUIET, Commander, Expectation, loop_time
+from anafi_mav.drone.expectation import QUIET, Commander, loop_time
 from anafi_mav.drone.piloting.state import MOTORS_OFF, PilotingState, in_state
 from anafi_mav.drone.piloting.stick_stream import StickStream
-from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost
+from anafi_mav.drone.sent_commands import AUTOMATIC, TAKEN_OFF, Phase, SentCommand, Slot
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout
 
 RAMPING_TIMEOUT = 10.0
 """s that the motors may take from their first turn to the take-off."""
-
-TAKE_OFF_MEMORY = 10.0
-"""s after an aborted take-off in which the drone may still carry it out.
-
-Or it already takes off but could not report it.
-"""
 
 LAND_INSISTS = 10.0
 """s for which a Landing is repeated while the motors ramp up or the drone rises: ardrone3.xml 1-0-3 promises a landing
@@ -35,9 +30,6 @@ to a drone that takes off, hovers or flies, and none to one whose motors ramp up
 LAND_MEMORY = 3.0
 """s after a Landing was withdrawn in which the drone may land all the same, and after a landing was to be ended in
 which the reported landing may be over."""
-
-STAYS_DOWN = 3.0
-"""s after LANDED in which a TakeOff that was to end the landing may still be executed."""
 
 STOP_MOTORS_TIMEOUT = 15.0
 """s until propellers that turn near the ground stand still: the way down from half a metre is in it."""
@@ -48,8 +40,6 @@ FORCED_AFTER = 0.3
 EMERGENCY_TIMEOUT = 30.0
 """s that cutting the motors is tried for while the link seems to live but delivers nothing."""
 
-_RISING = frozenset({FlyingState.MOTOR_RAMPING, FlyingState.TAKINGOFF, FlyingState.HOVERING, FlyingState.FLYING})
-_TAKEN_OFF = frozenset({FlyingState.TAKINGOFF, FlyingState.HOVERING, FlyingState.FLYING})
 TURNING = frozenset({FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF})
 """The motors turn and the drone is not in the air."""
 _LANDING = frozenset({FlyingState.LANDING, FlyingState.LANDED, FlyingState.EMERGENCY_LANDING, FlyingState.EMERGENCY})
@@ -73,76 +63,37 @@ class Motors:
         self._flight = flight
         self._sticks = sticks
         self._takeoff_blockers = takeoff_blockers
-        self._launches: set[Expectation[bool]] = set()
-        """Waits of take-offs and hand launches whose command may not have left."""
-        self._may_take_off_until = -math.inf
+        self._sent = commander.sent
         self._may_land_until = -math.inf
         """Until when a Landing that was withdrawn may be reported to have begun."""
         self._doubtful_until = -math.inf
         """Until when the reported LANDING may be over: its end was asked for."""
-        self._withdrawn_until = -math.inf
-        """Until when a TakeOff against a landing that was withdrawn may arrive, or be executed."""
-        self._stays_down_until = -math.inf
-        """Until when motors that start are stopped: no take-off that began after the touchdown is wanted."""
 
     def link_lost(self) -> None:
         """Commands of before do not count for the next connection."""
-        self._may_take_off_until = self._may_land_until = -math.inf
-        self._doubtful_until = self._stays_down_until = self._withdrawn_until = -math.inf
+        self._may_land_until = self._doubtful_until = -math.inf
 
-    def on_flying_state(self, message: ardrone3.FlyingStateChanged) -> None:
-        """Stop what starts after a touchdown although nothing that is wanted starts it."""
+    def on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
+        """Stop motors that a withdrawn command has started after a touchdown."""
         if message.state != FlyingState.LANDING:
             self._doubtful_until = -math.inf
-        if message.state == FlyingState.LANDED and loop_time() < self._withdrawn_until:
-            self._stay_down()
-        if loop_time() >= self._stays_down_until:
+        sent = self._sent.attribute(message, now)
+        if sent is None or not self._sent.is_unwanted(sent, now):
             return
         if message.state == FlyingState.MOTOR_RAMPING:
             self._commander.send_stop_if_connected(ardrone3.UserTakeOff(0))
-        if message.state in _RISING:
-            self._commander.send_stop_if_connected(ardrone3.Landing())
-
-    def take_off_wanted(self) -> None:
-        """Note that a command that starts the motors is about to be sent.
-
-        From now on motors that start are wanted.
-        """
-        self._stays_down_until = self._withdrawn_until = -math.inf
+        self._commander.send_stop_if_connected(ardrone3.Landing())
 
     def landing_doubtful(self) -> None:
         """The landing is about to be ended: until a state is reported, LANDING proves nothing."""
         self._doubtful_until = loop_time() + LAND_MEMORY
-
-    def take_off_against_landing(self) -> None:
-        """A TakeOff was sent against a landing: from LANDED on, what it starts is stopped.
-
-        LANDED and the motors that ramp up may arrive together, before the command that waits has noticed the first.
-        """
-        self._withdrawn_until = math.inf
-
-    def landing_over(self) -> None:
-        """The TakeOff against the landing has done its work in the air."""
-        self._withdrawn_until = -math.inf
-
-    def take_off_withdrawn(self) -> None:
-        """Note that a TakeOff against a landing was withdrawn and may have arrived.
-
-        A drone that has landed must stay down.
-        """
-        self._withdrawn_until = loop_time() + STAYS_DOWN
-        if self._flight.state.flying == FlyingState.LANDED:
-            self._stay_down()
-
-    def _stay_down(self) -> None:
-        self._stays_down_until = self._may_take_off_until = loop_time() + STAYS_DOWN
 
     async def settle_landing(self, timeout: float) -> bool:
         """Return True when a withdrawn Landing has begun all the same; False when it will not.
 
         That is known once the drone has received a later command, and then reports nothing.
         """
-        flies = self._flight.state.flying in _TAKEN_OFF
+        flies = self._flight.state.flying in TAKEN_OFF
         if loop_time() >= self._may_land_until or not flies:
             return self._flight.state.flying == FlyingState.LANDING
         answer = self._commander.expect(
@@ -159,20 +110,17 @@ class Motors:
 
     @property
     def about_to_fly(self) -> bool:
-        return self._flight.state.flying == FlyingState.LANDED and (
-            bool(self._launches)
-            or loop_time() < self._may_take_off_until
-            or self._commander.may_begin(common.Stop, TAKE_OFF_MEMORY)
-        )
+        return self._flight.state.flying == FlyingState.LANDED and self._sent.may_start_motors(loop_time())
 
     async def take_off(self, timeout: float) -> None:
         self._commander.require_link()
         flying = self._flight.state.flying
-        if flying in _TAKEN_OFF:
+        if flying in TAKEN_OFF:
             return
         if flying not in (FlyingState.LANDED, FlyingState.MOTOR_RAMPING):
             raise CommandRejected(in_state(flying))
-        await self._launch(ardrone3.TakeOff(), _TAKEN_OFF, timeout)
+        sent = SentCommand(Slot.LAUNCH, TAKEN_OFF, answered=flying != FlyingState.LANDED)
+        await self._launch(sent, ardrone3.TakeOff(), timeout)
 
     async def hand_launch(self, timeout: float) -> None:
         self._commander.require_link()
@@ -181,44 +129,30 @@ class Motors:
             return
         if flying != FlyingState.LANDED:
             raise CommandRejected(in_state(flying))
-        if self._launches:
+        if self._sent.awaited(Slot.LAUNCH):
             raise CommandRejected("the drone is about to take off")
-        try:
-            await self._launch(ardrone3.UserTakeOff(1), _TAKEN_OFF | {FlyingState.USERTAKEOFF}, timeout)
-        except LinkLost:
-            raise
-        except BaseException:
-            # Given up: the motors of a drone that somebody holds must not start a moment later.
-            self._commander.send_stop_if_connected(ardrone3.UserTakeOff(0))
-            raise
+        # Undone when it fails: the motors of a drone in a hand must not start a moment later.
+        states = TAKEN_OFF | {FlyingState.USERTAKEOFF}
+        sent = SentCommand(Slot.LAUNCH, states, ardrone3.UserTakeOff(0), undo_refused=True)
+        await self._launch(sent, ardrone3.UserTakeOff(1), timeout)
 
-    async def _launch(self, command: Message, up: frozenset[FlyingState], timeout: float) -> None:
-        """Send a command that starts the motors; returns when the drone is in one of these states."""
+    async def _launch(self, sent: SentCommand, command: Message, timeout: float) -> None:
+        """Send a command that starts the motors; return once a target state is reported."""
         self._sticks.silence()
 
         def judge(message: ardrone3.FlyingStateChanged) -> bool | AnafiMavError | None:
-            if message.state in up:
-                return True
             if message.state == FlyingState.MOTOR_RAMPING:
-                answer.expire_after(RAMPING_TIMEOUT, CommandTimeout(command.NAME, RAMPING_TIMEOUT))
-            elif message.state in _MOTORS_CUT:
+                sent.answer.expire_after(RAMPING_TIMEOUT, CommandTimeout(command.NAME, RAMPING_TIMEOUT))
+            elif sent.phase is Phase.REFUSED:
                 return CommandRejected(self._why_on_the_ground("the motors stopped again"))
-            return None
+            return True if sent.phase is Phase.CONFIRMED else None
 
-        answer = self._commander.expect((ardrone3.FlyingStateChanged,), judge)
-        self._commander.dispatch(answer, command, timeout)
-        self._launches.add(answer)
         try:
-            await answer.wait()
-        except CommandRejected:
-            raise
-        except BaseException as error:
-            self._may_take_off_until = loop_time() + TAKE_OFF_MEMORY
-            if isinstance(error, CommandTimeout) and (reasons := self._why_on_the_ground("")):
+            await self._commander.begin(sent, command, (ardrone3.FlyingStateChanged,), judge, timeout)
+        except CommandTimeout:
+            if reasons := self._why_on_the_ground(""):
                 raise CommandRejected(reasons) from None
             raise
-        finally:
-            self._launches.discard(answer)
 
     async def cancel_hand_launch(self, timeout: float) -> None:
         self._commander.require_link()
@@ -280,7 +214,7 @@ class Motors:
                 sent.append(self._commander.deliver(ardrone3.Landing()))
 
         def judge(message: ardrone3.FlyingStateChanged) -> bool | None:
-            if message.state in _TAKEN_OFF:
+            if message.state in TAKEN_OFF:
                 send()
             return True if message.state in _LANDING else None
 
@@ -304,17 +238,13 @@ class Motors:
 
     async def stop_motors(self, *, force: bool) -> None:
         self._commander.require_link()
-        self._commander.abort_pending("the motors are to stop")
+        self._commander.abort_pending("the motors are to stop", *AUTOMATIC, Slot.LAUNCH)
         self._sticks.let_go()
         self._sticks.silence()
-        for launch in self._launches:
-            launch.fail(CommandRejected("the motors are to stop"))
-            if launch.token is not None:
-                self._commander.cancel(launch.token)
         cut: asyncio.Future[None] | None = None
 
         def judge(message: ardrone3.FlyingStateChanged) -> bool | None:
-            if message.state in _TAKEN_OFF:
+            if message.state in TAKEN_OFF:
                 self._commander.send_stop(ardrone3.Landing())
                 if cut is not None:  # from here on it would fall
                     self._commander.withdraw(cut, CommandRejected("the drone has left the ground"))
@@ -332,6 +262,7 @@ class Motors:
                 if self._flight.state.flying == FlyingState.MOTOR_RAMPING:
                     cut = self._commander.deliver(ardrone3.Emergency())
             await answer.wait()
+            self._sent.rule_out()
         finally:
             self._sticks.landings_asked -= 1
             answer.close()
@@ -355,8 +286,7 @@ class Motors:
         try:
             delivery = self._commander.deliver(ardrone3.Landing())
             if not await answer.wait_or_quiet(delivery, ardrone3.Landing.NAME, timeout):
-                self._may_take_off_until = -math.inf
-                self._commander.rule_out(common.Stop)
+                self._sent.rule_out()
         finally:
             answer.close()
 
@@ -365,11 +295,7 @@ class Motors:
         self._sticks.silence()
         cut = self._flight.state.flying in _MOTORS_CUT and not self.about_to_fly
         # Emergency overtakes what waits in the queue: nothing of that may follow it.
-        self._commander.abort_pending("the motors are cut")
-        for launch in self._launches:
-            launch.fail(CommandRejected("the motors are cut"))
-            if launch.token is not None:
-                self._commander.cancel(launch.token)
+        self._commander.abort_pending("the motors are cut", *AUTOMATIC, Slot.LAUNCH)
         answer = self._commander.expect(
             (ardrone3.FlyingStateChanged,), lambda message: True if message.state in _MOTORS_CUT else None
         )
@@ -383,3 +309,4 @@ class Motors:
             answer.close()
         if not said and not cut:
             raise CommandTimeout(ardrone3.Emergency.NAME, QUIET)
+        self._sent.rule_out()

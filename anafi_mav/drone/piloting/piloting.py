@@ -34,6 +34,7 @@ from anafi_mav.drone.piloting.settings import PilotingSettings
 from anafi_mav.drone.piloting.state import REDUCERS, PilotingState
 from anafi_mav.drone.piloting.stick_stream import StickStream
 from anafi_mav.drone.piloting.sticks import Limits, PilotingCommand, percent
+from anafi_mav.drone.sent_commands import Slot
 from anafi_mav.drone.status.home import Home
 from anafi_mav.errors import CommandTimeout, NotSupported
 
@@ -94,7 +95,7 @@ class Piloting(PilotingSettings):
 
     def _on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
         self._moves.on_flying_state(message, now)
-        self._motors.on_flying_state(message)
+        self._motors.on_flying_state(message, now)
 
     def _obeyed(self, order: type[Message]) -> None:
         self._stopping.pop(order, None)
@@ -203,10 +204,6 @@ class Piloting(PilotingSettings):
         `motors.FORCED_AFTER`, never once the drone has left the ground.
         """
         await self._motors.stop_motors(force=force)
-
-    def take_off_wanted(self) -> None:
-        """A command that starts the motors is about to be sent."""
-        self._motors.take_off_wanted()
 
     async def emergency(self) -> None:
         """Cut the motors at once: in the air the drone falls.
@@ -333,7 +330,7 @@ class Piloting(PilotingSettings):
             self._commander.send_stop(ardrone3.StopPilotedPOI())
         self._stop_following()
         self._stop_animation()
-        if state.plan == PlayingState.PLAYING:
+        if state.plan == PlayingState.PLAYING or self._commander.sent.is_executed(Slot.PLAN):
             self._commander.send_stop(common.Pause())
         if self._returns.drop("stopped by hover"):
             self._returns.abort()

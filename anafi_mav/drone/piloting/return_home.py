@@ -122,8 +122,7 @@ class ReturnHome:
             return False
         returning.end(MoveEnd.CANCELED)
         returning.answer.fail(CommandRejected(why))
-        if returning.answer.token is not None:
-            self._commander.cancel(returning.answer.token)
+        self._commander.cancel(returning.answer.token)
         return True
 
     def on_state(self, message: rth.State, now: float) -> None:

@@ -17,7 +17,8 @@ from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.camera.camera_targets import require_free, require_idle, require_storage
 from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect
-from anafi_mav.services.service import Host, Service
+from anafi_mav.services.service import Service
+from anafi_mav.vehicle.base.flight_task import PlainTask, TaskRules
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 
@@ -41,19 +42,17 @@ def panorama_type(wide: float, high: float, available: Container[AnimationType])
     return AnimationType.HORIZONTAL_180_PHOTO_PANORAMA if is_wide else AnimationType.VERTICAL_180_PHOTO_PANORAMA
 
 
-class PanoramaService(Service):
+class PanoramaService(Service, PlainTask):
     """Takes panoramas; the vehicle's flight task while it does."""
 
-    def __init__(self, host: Host) -> None:
-        super().__init__(host)
-        self._is_active = False
-        host.vehicle.helms = (*host.vehicle.helms, self)
+    rules = TaskRules(texts.PANORAMA)
+    mode = FlightMode.HOLD
 
     def actions(self) -> Mapping[int, Action]:
         return {
             dialect.MAV_CMD_PANORAMA_CREATE: Action(
                 self._create,
-                still_holds=lambda: self._is_active and self.host.drone.animations.state.is_running,
+                still_holds=lambda: self._is_active,
                 location=False,
                 altitude=Altitude.UNUSED,
                 effect=Effect.IRREVOCABLE,
@@ -61,23 +60,23 @@ class PanoramaService(Service):
             )
         }
 
-    # Helm.
+    def tick(self, now: float) -> None:
+        if self.host.vehicle.control.active is self and not self._is_active:
+            self.host.vehicle.control.release(self)
+
+    # Flight task.
+
+    @property
+    def _is_active(self) -> bool:
+        return self.host.vehicle.control.active is self and self.host.drone.animations.state.is_running
 
     def end(self) -> list[asyncio.Task[None]]:
         """End this flight task: something else flies the drone now."""
-        if not self._is_active:
-            return []
-        self._is_active = False
-        if not self.host.drone.animations.state.is_running:
-            return []
-        return [self.host.spawn(self._cancel())]
+        return [self.host.spawn(self._cancel())] if self.host.drone.animations.state.is_running else []
 
     async def _cancel(self) -> None:
         with contextlib.suppress(AnafiMavError):
             await self.host.drone.animations.cancel()
-
-    def link_down(self) -> None:
-        self._is_active = False
 
     # The command.
 
@@ -93,11 +92,9 @@ class PanoramaService(Service):
             if await drone.camera.set_mode(CameraMode.PHOTO, id) is not CameraMode.PHOTO:
                 raise Refused(texts.PANORAMA, texts.CAMERA_MODE_KEPT)
             self._require_hovering()
-        await vehicle.take_over()
-        self._require_hovering()
-        await drone.animations.photo_panorama(panorama_type(wide, high, drone.animations.state.available or ()))
-        vehicle.select(FlightMode.HOLD, self)
-        self._is_active = True
+        async with vehicle.control.acquire(self, by=command.right):
+            self._require_hovering()
+            await drone.animations.photo_panorama(panorama_type(wide, high, drone.animations.state.available or ()))
 
     def _require_hovering(self) -> None:
         """Refuse a panorama while something else uses the aircraft or the camera.

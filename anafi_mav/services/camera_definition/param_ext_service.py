@@ -230,6 +230,17 @@ class ParamExtService(Service):
 
     # Writing.
 
+    def denials(self) -> Mapping[int, MessageHandler]:
+        return {dialect.MAVLINK_MSG_ID_PARAM_EXT_SET: self._deny}
+
+    def _deny(self, inbound: Inbound) -> None:
+        """Send the value in effect to a client whose endpoint does not permit the write."""
+        name = inbound.message.param_id
+        if name in self._catalogue.index:
+            self._acknowledge(Write(inbound, name, math.nan, inbound.now), dialect.PARAM_ACK_FAILED)
+        else:
+            self._answer(inbound, name, bytes(VALUE_LENGTH), inbound.message.param_type, dialect.PARAM_ACK_FAILED)
+
     def _set(self, inbound: Inbound) -> None:
         message = inbound.message
         name = message.param_id

@@ -29,9 +29,9 @@ RELATIVE_YAW = dialect.MAV_DO_REPOSITION_FLAGS_RELATIVE_YAW
 async def arm_disarm(vehicle: Vehicle, command: Command) -> None:
     """MAV_CMD_COMPONENT_ARM_DISARM: param1 1 arm, 0 disarm; param2 21196 disarms by force."""
     if command.params[0] == 1.0:
-        await vehicle.takeoff.arm(command.client)
+        await vehicle.takeoff.arm(command.right)
     elif command.params[0] == 0.0:
-        await vehicle.takeoff.disarm(force=command.params[1] == FORCE)
+        await vehicle.takeoff.disarm(command.right, force=command.params[1] == FORCE)
     else:
         raise Refused(texts.ARMING, texts.PARAM1_BINARY, lasting=True)
 
@@ -52,7 +52,7 @@ async def takeoff(vehicle: Vehicle, command: Command) -> None:
 
 async def land(vehicle: Vehicle, command: Command) -> None:
     """MAV_CMD_NAV_LAND: land here; its position is ignored."""
-    await vehicle.land()
+    await vehicle.land(command.right)
 
 
 async def return_to_launch(vehicle: Vehicle, command: Command) -> None:
@@ -96,7 +96,7 @@ async def reposition(vehicle: Vehicle, command: Command) -> None:
     if vehicle.takeoff.rises:
         vehicle.guided.check(where, ato)  # one that is refused replaces none that waits
         await vehicle.takeoff.over(texts.GOTO)
-    await vehicle.guided.reposition(where, ato, heading, speed if speed > 0.0 else None, mode)
+    await vehicle.guided.reposition(where, ato, heading, speed if speed > 0.0 else None, mode, by=command.right)
 
 
 def _require_change_of_mode(vehicle: Vehicle, command: Command) -> None:
@@ -127,7 +127,7 @@ async def terminate(vehicle: Vehicle, command: Command) -> None:
     """MAV_CMD_DO_FLIGHTTERMINATION: param1 1 cuts the motors."""
     if command.params[0] != 1.0:
         raise Refused(texts.TERMINATION, texts.NOT_REVOCABLE, lasting=True)
-    await vehicle.terminate()
+    await vehicle.terminate(command.right)
 
 
 def _effect_of_arm(command: Command) -> Effect:

@@ -17,6 +17,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.service import Service
 from anafi_mav.texts import OperatorText
+from anafi_mav.vehicle.base.flight_task import MAINTENANCE
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
 
@@ -57,7 +58,7 @@ class CalibrationService(Service):
                 progress=ProgressPolicy.FINAL_ONLY,
             ),
             dialect.MAV_CMD_GIMBAL_REQUEST_AXIS_CALIBRATION: Action(
-                lambda command: self._on_ground(texts.CALIBRATION, self._gimbal),
+                lambda command: self._on_ground(command, texts.CALIBRATION, self._gimbal),
                 location=False,
                 altitude=Altitude.UNUSED,
                 effect=Effect.CHANGE,
@@ -80,22 +81,27 @@ class CalibrationService(Service):
         values = [0.0 if math.isnan(value) else value for value in (*command.params, command.x, command.y, command.z)]
         wanted = {index: value for index, value in enumerate(values, 1) if value != 0.0}
         if not wanted:
-            await self.host.vehicle.take_over()  # ends the one that runs
+            await self._acquire(command)  # ends the one that runs
         elif wanted == {2: _MAGNETOMETER}:
-            await self._on_ground(texts.CALIBRATION, self._magnetometer)
+            await self._on_ground(command, texts.CALIBRATION, self._magnetometer)
         elif wanted == {5: _HORIZON}:
-            await self._on_ground(texts.CALIBRATION, self._gimbal)
+            await self._on_ground(command, texts.CALIBRATION, self._gimbal)
         else:
             # MAVSDK takes a refusal alone for a success; it believes the texts.
             self.host.text(Severity.ERROR, texts.CAL_FAILED.fill(error=texts.CALIBRATIONS))
             raise Refused(texts.CALIBRATION, texts.CALIBRATIONS, lasting=True)
 
-    async def _on_ground(self, what: OperatorText, work: Work) -> None:
+    async def _on_ground(self, command: Command, what: OperatorText, work: Work) -> None:
         vehicle = self.host.vehicle
         if not vehicle.on_ground or vehicle.drone.piloting.about_to_fly:
             raise Refused(what, texts.NOT_ON_GROUND)
-        await vehicle.take_over()
+        await self._acquire(command)
         await work()
+
+    async def _acquire(self, command: Command) -> None:
+        """End what flies, or is calibrated."""
+        async with self.host.vehicle.control.acquire(MAINTENANCE, by=command.right):
+            pass
 
     async def _told(
         self, name: str, work: Callable[[], Awaitable[None]], undo: Callable[[], Awaitable[object]]
@@ -180,7 +186,7 @@ class CalibrationService(Service):
         """
         if command.params[0] != _RESTART:
             raise Refused(texts.RESTART, texts.RESTART_ONLY, lasting=True)
-        await self._on_ground(texts.RESTART, self._restart)
+        await self._on_ground(command, texts.RESTART, self._restart)
 
     async def _restart(self) -> None:
         self.host.text(Severity.NOTICE, texts.DRONE_RESTARTS)

@@ -16,6 +16,7 @@ from anafi_mav.clock import Alarm
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.command.command_log import CommandLog, Refusal
 from anafi_mav.services.command.running_actions import RunningAction, RunningActions
 from anafi_mav.services.command_targets import UnsupportedFrame
 from anafi_mav.services.commands import (
@@ -65,6 +66,8 @@ class CommandService(Service):
         """`running`: those of all components of the system."""
         super().__init__(host)
         self._history = CommandHistory()
+        self.log = CommandLog()
+        """Results, for the status of the gateway."""
         self._all = running
         running.histories.append(self._history)
         self._queries: Mapping[int, Query] = {}
@@ -103,6 +106,12 @@ class CommandService(Service):
             dialect.MAVLINK_MSG_ID_COMMAND_CANCEL: self._cancel,
         }
 
+    def denials(self) -> Mapping[int, MessageHandler]:
+        def deny(inbound: Inbound) -> None:
+            self._acknowledge(inbound, inbound.message.command, dialect.MAV_RESULT_DENIED)
+
+        return dict.fromkeys((dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT), deny)
+
     async def settle(self, limit: float = SETTLE) -> None:
         """Wait until running commands have ended after the link is lost, `limit` s at most.
 
@@ -139,13 +148,13 @@ class CommandService(Service):
     ) -> asyncio.Task[None]:
         """Run an action of a message that has no acknowledgement; its refusal is sent as a text."""
         self._all.forget(client, group)  # this client used other means than its newest command
-        return self._spawn(self._explained(work), RunningAction(client, None, is_order, group))
+        return self._spawn(self._explained(work), RunningAction(client, None, group), is_order=is_order)
 
     @property
     def replaced_by_order(self) -> bool:
         """True in an action that a newer order of a client has ended."""
-        running = self._all.current
-        return running is not None and running.replaced_by_order
+        action = self._all.flight.current
+        return action is not None and action.replaced_by_order
 
     def end_others(self, group: ActionGroup = ActionGroup.FLIGHT) -> list[asyncio.Task[None]]:
         """Cancel all older running actions of a group, of every component.
@@ -159,6 +168,7 @@ class CommandService(Service):
         definition: Definition | None = QUERY if id in self._queries else self._actions.get(id)
         if definition is None or not definition.offered(flavour_of(inbound.channel)):
             self._acknowledge(inbound, id, dialect.MAV_RESULT_UNSUPPORTED)
+            self._note(inbound, id, dialect.MAV_RESULT_UNSUPPORTED)
             return
         command = decode(inbound.message, definition, client_of(inbound), flavour_of(inbound.channel))
         if definition is QUERY:
@@ -167,6 +177,7 @@ class CommandService(Service):
                 result = self._queries[id](inbound, command)
             finally:  # whatever went wrong, the client learns that it did
                 self._acknowledge(inbound, id, result)
+                self.log.accept(result)  # an answer, whatever it is: clients try messages that an ANAFI does not have
             return
         self._act(inbound, command)
 
@@ -188,10 +199,11 @@ class CommandService(Service):
             return
         if self._all.is_full(command.group):
             self._acknowledge(inbound, command.id, dialect.MAV_RESULT_TEMPORARILY_REJECTED)
+            self._note(inbound, command.id, dialect.MAV_RESULT_TEMPORARILY_REJECTED, "too many commands wait")
             return
         execution = self._history.begin(command.client, command) if flies else self.host.payload_history.begin(command)
         running = RunningAction(command.client, (inbound, execution), group=command.group)
-        self._spawn(self._execute(inbound, execution), running)
+        self._spawn(self._execute(inbound, execution), running, is_order=True)
 
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:
         command = execution.command
@@ -206,13 +218,13 @@ class CommandService(Service):
         progress = Alarm(report)
         if policy is not None:
             progress.set_in(LATE_PROGRESS_AFTER if policy is ProgressPolicy.LATE else PROGRESS_AFTER)
-        result = dialect.MAV_RESULT_FAILED
+        result, reason = dialect.MAV_RESULT_FAILED, ""
         try:
             async with self.host.payload_history.turn(command.group):
                 await self._actions[command.id].handler(command)
             result = dialect.MAV_RESULT_ACCEPTED
         except AnafiMavError as error:
-            result = self._explain(error)
+            result, reason = self._explain(error), text_of(error)
         except asyncio.CancelledError:
             result = dialect.MAV_RESULT_CANCELLED
             raise
@@ -220,17 +232,28 @@ class CommandService(Service):
             logger.exception("%s: command %d failed", self.host.drone.name, command.id)
         finally:
             progress.cancel()
-            self._finish(inbound, execution, result)
+            self._finish(inbound, execution, result, reason)
 
-    def _finish(self, inbound: Inbound, execution: Execution, result: int) -> None:
+    def _finish(self, inbound: Inbound, execution: Execution, result: int, reason: str = "") -> None:
         """Send the one final acknowledgement of an action."""
         if execution.result == dialect.MAV_RESULT_IN_PROGRESS:
             execution.result, execution.ended = result, self.host.clock.monotonic()
             self._acknowledge(inbound, execution.command.id, result)
+            if result == dialect.MAV_RESULT_ACCEPTED:
+                self.log.accept(result, execution.ended - inbound.now)
+            else:
+                self._note(inbound, execution.command.id, result, reason)
 
-    def _spawn(self, work: Coroutine[Any, Any, None], running: RunningAction) -> asyncio.Task[None]:
+    def _note(self, inbound: Inbound, command: int, result: int, reason: str = "") -> None:
+        """Note a command that was not accepted."""
+        client = inbound.channel.name
+        now = self.host.clock.monotonic()
+        self.log.refuse(Refusal(now, inbound.sysid, inbound.compid, client, command, result, reason))
+
+    def _spawn(self, work: Coroutine[Any, Any, None], running: RunningAction, *, is_order: bool) -> asyncio.Task[None]:
         task = self.host.spawn(work)
-        self._running[task] = self._all.tasks[task] = running
+        self._running[task] = running
+        self._all.add(task, running, is_order=is_order)
         task.add_done_callback(self._done)
         return task
 

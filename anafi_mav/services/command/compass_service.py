@@ -18,6 +18,7 @@ from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.service import Host, Service
+from anafi_mav.vehicle.base.flight_task import MAINTENANCE
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
 
@@ -74,7 +75,8 @@ class CompassService(Service):
         vehicle = self.host.vehicle
         if not vehicle.on_ground or vehicle.drone.piloting.about_to_fly:
             raise Refused(texts.COMPASS_CALIBRATION, texts.NOT_ON_GROUND)
-        await vehicle.take_over()
+        async with vehicle.control.acquire(MAINTENANCE, by=command.right):
+            pass
         self._succeeded = False
         await self.host.drone.calibration.start_magnetometer()
         self._turning = self.host.run_action(command.client, self._turn())

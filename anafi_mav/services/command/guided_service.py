@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 
 from anafi_mav import texts, units
-from anafi_mav.drone.events import FlyingStateChanged, RthHomeType
+from anafi_mav.drone.events import RthHomeType
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
@@ -23,8 +23,8 @@ from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST, check_height, check_
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.base.yaw import DEG_PER_TURN, heading_of
 from anafi_mav.vehicle.guided_flight import Goto
 from anafi_mav.vehicle.vehicle import Vehicle
@@ -54,7 +54,7 @@ def guided_mode(flavour: Flavour) -> FlightMode:
 async def _fly_item(host: Host, inbound: Inbound) -> None:
     item, flavour = inbound.message, flavour_of(inbound.channel)
     scale = 1e7 if item.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT else 1.0
-    vehicle = host.vehicle
+    vehicle, by = host.vehicle, Right(client_of(inbound), Extent.COMMANDED)
     result = dialect.MAV_MISSION_ERROR
     try:
         ato = height_in_frame(vehicle, item.z, item.frame)
@@ -68,9 +68,9 @@ async def _fly_item(host: Host, inbound: Inbound) -> None:
             if vehicle.takeoff.rises:
                 vehicle.guided.check(where, ato)
                 await vehicle.takeoff.over(texts.GOTO)
-            await vehicle.guided.reposition(where, ato, None, mode=guided_mode(flavour))
+            await vehicle.guided.reposition(where, ato, None, mode=guided_mode(flavour), by=by)
         else:
-            await change_altitude(vehicle, ato, flavour)
+            await change_altitude(vehicle, ato, flavour, by)
         result = dialect.MAV_MISSION_ACCEPTED
     except UnsupportedFrame:
         result = dialect.MAV_MISSION_UNSUPPORTED_FRAME
@@ -85,18 +85,18 @@ async def _fly_item(host: Host, inbound: Inbound) -> None:
         host.send(dialect.MAVLink_mission_ack_message(inbound.sysid, inbound.compid, result), inbound.channel)
 
 
-async def change_altitude(vehicle: Vehicle, ato: float, flavour: Flavour) -> None:
+async def change_altitude(vehicle: Vehicle, ato: float, flavour: Flavour, by: Right) -> None:
     """Go to a height (m above take-off): at the target of a move under way, else here."""
     goto = vehicle.guided.goto
     if goto is None:
-        await vehicle.guided.reposition(None, ato, None, mode=guided_mode(flavour))
+        await vehicle.guided.reposition(None, ato, None, mode=guided_mode(flavour), by=by)
     else:
         check_height(vehicle, ato)
         move = vehicle.drone.piloting.move
         # MAVProxy says it as a command and as an item at once, and means one move. If nothing comes of that, the newer
         # order stands for itself.
         if goto.at_height(ato) != goto or move is None or not await move.under_way():
-            await vehicle.guided.go(goto.at_height(ato))
+            await vehicle.guided.go(goto.at_height(ato), by=by)
 
 
 def _effect_of_pause(command: Command) -> Effect:
@@ -105,13 +105,6 @@ def _effect_of_pause(command: Command) -> Effect:
 
 class GuidedService(Service):
     """Changes the flight under way."""
-
-    def __init__(self, host: Host) -> None:
-        super().__init__(host)
-        self._paused: tuple[Goto, int] | None = None
-        """Target of the drone when a pause was commanded, and the vehicle's `orders` count then."""
-        self._mission_paused: int | None = None
-        """The vehicle's `orders` count when a mission was paused."""
 
     def actions(self) -> Mapping[int, Action]:
         return {
@@ -135,16 +128,6 @@ class GuidedService(Service):
     def item_commands(self) -> Mapping[int, MessageHandler]:
         return {_ITEM_GOTO: self._item, _ITEM_ALTITUDE: self._item}
 
-    def link_down(self) -> None:
-        self._paused = self._mission_paused = None
-
-    def subscriptions(self) -> Subscriptions:
-        return {FlyingStateChanged: self._on_flying_state}
-
-    def _on_flying_state(self, message: FlyingStateChanged, now: float) -> None:
-        if not self.host.vehicle.in_air:
-            self._paused = self._mission_paused = None  # the next flight's heights count from elsewhere
-
     def _item(self, inbound: Inbound) -> None:
         """Carry out a mission item that belongs to no mission, and acknowledge it with MISSION_ACK.
 
@@ -152,17 +135,6 @@ class GuidedService(Service):
         change of altitude (conformance D1-D3, item 141).
         """
         self.host.run_action(client_of(inbound), _fly_item(self.host, inbound))
-
-    @property
-    def _interrupted(self) -> Goto | None:
-        """Target of the move that a pause stopped; None when commanded otherwise since."""
-        goto, orders = self._paused or (None, 0)
-        return goto if orders == self.host.vehicle.orders else None
-
-    @property
-    def _mission_interrupted(self) -> bool:
-        """True when a pause stopped a mission, and nothing else was commanded since."""
-        return self.host.vehicle.mission.paused and self._mission_paused == self.host.vehicle.orders
 
     async def _change_speed(self, command: Command) -> None:
         """MAV_CMD_DO_CHANGE_SPEED: param1 SPEED_TYPE, param2 m/s.
@@ -190,7 +162,7 @@ class GuidedService(Service):
         else:
             vehicle.climb_speed = wanted
         if (goto := vehicle.guided.goto) is not None:
-            await vehicle.guided.go(goto)
+            await vehicle.guided.go(goto, by=command.right)
 
     async def _change_altitude(self, command: Command) -> None:
         """MAV_CMD_DO_CHANGE_ALTITUDE: param1 height in m, param2 MAV_FRAME.
@@ -202,7 +174,7 @@ class GuidedService(Service):
         if not math.isfinite(frame):
             raise Refused(texts.ALTITUDE_CHANGE, texts.PARAM2_FRAME, lasting=True)
         ato = height_in_frame(vehicle, command.params[0], int(frame))
-        await change_altitude(vehicle, ato, command.flavour)
+        await change_altitude(vehicle, ato, command.flavour, command.right)
 
     async def _turn(self, command: Command) -> None:
         """Run MAV_CMD_CONDITION_YAW: turn to a heading or by an angle.
@@ -224,10 +196,10 @@ class GuidedService(Service):
         now = attitude.yaw * units.DEG_PER_RAD
         turn = heading_of(angle, 0.0 if math.isnan(way) else way, relative == 1.0, now)
         if (goto := vehicle.guided.goto) is not None:
-            await vehicle.guided.go(goto.with_heading((now + turn) * units.RAD_PER_DEG))
+            await vehicle.guided.go(goto.with_heading((now + turn) * units.RAD_PER_DEG), by=command.right)
         else:
             await vehicle.guided.turn(
-                turn * units.RAD_PER_DEG, rate if rate > 0.0 else None, guided_mode(command.flavour)
+                turn * units.RAD_PER_DEG, rate if rate > 0.0 else None, guided_mode(command.flavour), command.right
             )
 
     async def _pause_or_continue(self, command: Command) -> None:
@@ -239,23 +211,17 @@ class GuidedService(Service):
         """
         vehicle = self.host.vehicle
         if command.params[0] == 0.0:
-            goto = vehicle.guided.goto or self._interrupted
-            mission = vehicle.mission.flying or self._mission_interrupted
             await vehicle.hold(guided_mode(command.flavour), command.right, pause=True)
-            self._paused = None if goto is None else (goto, vehicle.orders)
-            self._mission_paused = vehicle.orders if mission else None
         elif command.params[0] == 1.0:
-            goto = self._interrupted
-            if self._mission_interrupted:
+            task = vehicle.interrupted
+            if isinstance(task, Goto):
+                await vehicle.guided.go(task, by=command.right)
+            elif task is vehicle.mission and vehicle.mission.paused:
                 await vehicle.set_mode(FlightMode.MISSION, command.right)
-                return
-            if goto is None and vehicle.paused:
-                vehicle.paused = False  # setpoints may fly it again
-                return
-            if goto is None:
+            elif vehicle.control.paused:
+                vehicle.control.resume()  # setpoints may fly it again
+            else:
                 raise Refused(texts.CONTINUE, texts.NOTHING_PAUSED)
-            await vehicle.guided.go(goto)
-            self._paused = None
         else:
             raise Refused(texts.PAUSE, texts.PARAM1_BINARY, lasting=True)
 

@@ -10,7 +10,7 @@ import asyncio
 import contextlib
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from anafi_mav import geo, texts, units
 from anafi_mav.drone import events
@@ -23,10 +23,10 @@ from anafi_mav.services.service import Host, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.bounds import SLOWEST, check_height, check_on_earth, check_place
+from anafi_mav.vehicle.base.flight_task import STEERING, Needs, PlainTask, TaskRules
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
-from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.base.velocity_loop import VelocityController, tilt_limit
@@ -57,100 +57,100 @@ Sticks are ignored during an orbit, so the nose stays free.
 """
 
 
-class OrbitService(Service):
+@dataclass
+class _Orbit:
+    """One orbit, from the way to the circle on."""
+
+    lap: Lap
+    cruise: float | None
+    """The vehicle's cruise speed when the orbit's was last decided: a change of it changes the orbit's."""
+    approach: asyncio.Task[None] | None = None
+    controller: VelocityController | None = None
+    """None on the way to the circle."""
+
+
+class OrbitService(Service, PlainTask):
     """Flies circles; the vehicle's flight task while it does."""
+
+    rules = TaskRules(texts.ORBIT, needs=Needs.NO_DESCENT | Needs.IN_AIR | Needs.FIX | STEERING)
+    mode = FlightMode.ORBIT
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._lap: Lap | None = None
-        self._approaching: asyncio.Task[None] | None = None
-        self._controller: VelocityController | None = None
-        self._cruise: float | None = None
-        """The vehicle's cruise speed when the orbit's was last decided: a change of it changes the orbit's."""
-        host.vehicle.helms = (*host.vehicle.helms, self)
+        self._orbit: _Orbit | None = None
 
     @property
     def circle(self) -> Circle | None:
         """Return the circle that is flown, or flown to; None without one."""
-        return None if self._lap is None else self._lap.circle
+        return None if self._orbit is None else self._orbit.lap.circle
 
     def actions(self) -> Mapping[int, Action]:
         return {
-            dialect.MAV_CMD_DO_ORBIT: Action(self._orbit, location=True, altitude=Altitude.AMSL, effect=Effect.CHANGE)
+            dialect.MAV_CMD_DO_ORBIT: Action(
+                self._fly_orbit, location=True, altitude=Altitude.AMSL, effect=Effect.CHANGE
+            )
         }
 
     def streams(self) -> Mapping[int, MessageStream]:
         return {dialect.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: MessageStream(self._status, every=0.8)}
 
-    # Helm.
+    # Flight task.
 
     def end(self) -> list[asyncio.Task[None]]:
         """End this flight task: something else flies the drone now."""
-        lap, self._lap, self._controller = self._lap, None, None
-        approaching, self._approaching = self._approaching, None
-        if lap is None:
+        orbit, self._orbit = self._orbit, None
+        if orbit is None:
             return []
-        self.host.vehicle.forget_mode()
         with contextlib.suppress(LinkLost):
             self.host.drone.piloting.pilot(None)
-        if approaching is None or approaching is asyncio.current_task():
+        if orbit.approach is None or orbit.approach is asyncio.current_task():
             return []
-        approaching.cancel()
-        return [approaching]
+        orbit.approach.cancel()
+        return [orbit.approach]
 
     def link_down(self) -> None:
-        self._lap = self._controller = None
-        if self._approaching is not None:
-            self._approaching.cancel()
-            self._approaching = None
+        orbit, self._orbit = self._orbit, None
+        if orbit is not None and orbit.approach is not None:
+            orbit.approach.cancel()
 
     # The command.
 
-    async def _orbit(self, command: Command) -> None:
+    async def _fly_orbit(self, command: Command) -> None:
         """Fly MAV_CMD_DO_ORBIT: param1 radius in m, + clockwise; param2 m/s; param3 yaw; param4 rad.
 
         param3 is the yaw behaviour, param4 the angle to fly. The centre is the drone's position unless it is set, z
         is AMSL in every frame but ArduPilot's clients'. ACCEPTED when the drone is on its way to the circle, or on
         it.
         """
-        vehicle = self.host.vehicle
+        vehicle, control, by = self.host.vehicle, self.host.vehicle.control, command.right
         circle = self._described(command)
+        control.check(self, by)
         here = vehicle.place
-        if not vehicle.in_air:
-            raise Refused(texts.ORBIT, texts.NOT_IN_AIR)
-        if (descent := vehicle.descent) is not None:
-            raise Refused(texts.ORBIT, descent)
         if here is None:
             raise Refused(texts.ORBIT, texts.NO_FIX)
-        if vehicle.drone.controller.pilot_acquired_control:
-            raise Refused(texts.ORBIT, texts.PILOT)
-        if vehicle.sticks_follow_camera:
-            raise Refused(texts.ORBIT, texts.STICKS_FOLLOW_CAMERA)
-        if vehicle.roll.sign is RollSign.INVERTED:
-            raise Refused(texts.ORBIT, texts.ROLL_INVERTED)
         start = entry(circle, here)
         for point in outline(circle, here):
             check_place(vehicle, point)
-        circle, self._cruise = self._held_back(circle), vehicle.cruise_speed
+        orbit = _Orbit(Lap(self._held_back(circle)), vehicle.cruise_speed)
+        circle = orbit.lap.circle
         bearing = _bearing(circle.centre, start)
         off = abs(geo.distance(*circle.centre.point, *here.point) - circle.radius)
-        if off > ON_IT or abs((vehicle.drone.piloting.state.altitude or 0.0) - circle.height) > ON_IT:
-            await vehicle.guided.go(Goto(start, circle.height, heading_at(circle, bearing), None, FlightMode.HOLD))
-            move = vehicle.drone.piloting.move
-            self._lap = Lap(circle)
-            vehicle.select(FlightMode.ORBIT, self)
-            if move is not None:
-                self._approaching = self.host.spawn(self._approach(move, self._lap))
-                return
-        else:
-            await vehicle.take_over()
-            await vehicle.drone.piloting.cancel_return_home()
-            if not vehicle.in_air or vehicle.returning:
-                raise Refused(texts.ORBIT, vehicle.activity)
-            vehicle.drone.piloting.hover()  # ends a move of ours, which would ignore sticks
-            self._lap = Lap(circle)
-            vehicle.select(FlightMode.ORBIT, self)
-        self._begin()
+        is_away = off > ON_IT or abs((vehicle.drone.piloting.state.altitude or 0.0) - circle.height) > ON_IT
+        if is_away:
+            check_place(vehicle, start, start=here)
+        async with control.acquire(self, by=by) as grant:
+            if is_away:
+                await vehicle.guided.move(
+                    Goto(start, circle.height, heading_at(circle, bearing), None, FlightMode.HOLD)
+                )
+            else:
+                vehicle.drone.piloting.hover()  # ends a move of ours, which would ignore sticks
+            self._orbit = orbit
+            grant.begin()
+            if is_away and (move := vehicle.drone.piloting.move) is not None:
+                orbit.approach = self.host.spawn(self._approach(move, orbit))
+            else:
+                self._begin(orbit)
 
     def _described(self, command: Command) -> Circle:
         vehicle, piloting = self.host.vehicle, self.host.drone.piloting.state
@@ -204,20 +204,20 @@ class OrbitService(Service):
         self.host.text(Severity.NOTICE, text)
         return replace(circle, speed=most)
 
-    async def _approach(self, move: Move, lap: Lap) -> None:
+    async def _approach(self, move: Move, orbit: _Orbit) -> None:
         """Circle when the move there has ended well."""
         end = await move.result()
-        if self._lap is not lap:
+        if self._orbit is not orbit:
             return
-        self._approaching = None
+        orbit.approach = None
         if end is MoveEnd.DONE:
-            self._begin()
+            self._begin(orbit)
         else:
             self.host.text(Severity.WARNING, texts.ORBIT_ABORTED.fill(end=end.value))
-            self.host.vehicle.select(FlightMode.HOLD)
+            self.host.vehicle.control.release(self)
 
-    def _begin(self) -> None:
-        self._controller = VelocityController(self.host.vehicle.offboard.motion)
+    def _begin(self, orbit: _Orbit) -> None:
+        orbit.controller = VelocityController(self.host.vehicle.offboard.motion)
         self._fly(self.host.clock.monotonic())
 
     # Flying.
@@ -226,33 +226,28 @@ class OrbitService(Service):
         return dict.fromkeys((events.SpeedChanged, events.AttitudeChanged), lambda message, now: self._fly(now))
 
     def _fly(self, now: float) -> None:
-        vehicle, lap, controller = self.host.vehicle, self._lap, self._controller
-        if lap is None or controller is None:
+        vehicle, orbit = self.host.vehicle, self._orbit
+        if orbit is None or orbit.controller is None or not vehicle.control.keeps(self):
             return
-        if vehicle.cruise_speed != self._cruise:
-            self._cruise = vehicle.cruise_speed
+        lap = orbit.lap
+        if vehicle.cruise_speed != orbit.cruise:
+            orbit.cruise = vehicle.cruise_speed
             lap.circle = self._held_back(replace(lap.circle, speed=vehicle.cruise_speed or DEFAULT_SPEED))
         limits = vehicle.drone.piloting.limits
         demand = None if vehicle.place is None else lap.demand(vehicle.offboard.motion)
-        sticks = None if demand is None or limits is None else controller.sticks(demand, limits, now)
-        if vehicle.drone.controller.pilot_acquired_control:
-            self._give_up(texts.PILOT, Severity.WARNING)
-        elif vehicle.sticks_follow_camera:
-            self._give_up(texts.STICKS_FOLLOW_CAMERA, Severity.WARNING)
-        elif vehicle.roll.sign is RollSign.INVERTED:
-            self._give_up(texts.ROLL_INVERTED, Severity.WARNING)
-        elif sticks is None:
-            self._give_up(texts.POSITION_UNKNOWN, Severity.WARNING)
+        sticks = None if demand is None or limits is None else orbit.controller.sticks(demand, limits, now)
+        if sticks is None:
+            self._stop(texts.POSITION_UNKNOWN, Severity.WARNING)
         elif lap.done:
-            self._give_up(texts.ORBIT_DONE, Severity.INFO)
+            self._stop(texts.ORBIT_DONE, Severity.INFO)
         else:
             vehicle.drone.piloting.pilot(sticks)
 
-    def _give_up(self, why: OperatorText, severity: Severity) -> None:
-        self.host.vehicle.select(FlightMode.HOLD)
+    def _stop(self, why: OperatorText, severity: Severity) -> None:
+        self.host.vehicle.control.release(self)
         with contextlib.suppress(LinkLost):
             self.host.drone.piloting.hover()
-        self.host.text(severity, texts.ORBIT_ENDED.fill(reason=why))
+        self.host.text(severity, texts.TASK_ENDED.fill(what=texts.ORBIT, reason=why))
 
     def _status(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
         """ORBIT_EXECUTION_STATUS: while it lasts, the way to the circle included."""

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import ActionGroup, CommandHistory, Execution
+from anafi_mav.vehicle.base.flight_actions import FlightAction, FlightActions
 
 MAX_WAITING = 32
 """Actions of one group that run one after another: a drone that answers none of them takes seconds for each."""
@@ -25,17 +26,17 @@ class RunningAction:
     client: Hashable
     answer: tuple[Inbound, Execution] | None
     """Client and command to acknowledge; None for messages without acknowledgement."""
-    is_order: bool = True
-    """A client has commanded it; neither the gateway began it, nor a stream of setpoints."""
     group: ActionGroup = ActionGroup.FLIGHT
-    replaced_by_order: bool = False
-    """A newer order has ended it."""
 
 
 class RunningActions:
     """Running actions of one system, and the histories of its components."""
 
-    def __init__(self) -> None:
+    def __init__(self, flight: FlightActions | None = None) -> None:
+        """`flight`: the actions of the vehicle, whose control ends those that fly."""
+        self.flight = flight or FlightActions()
+        self.flight.on_begun(self.forget)
+        self.flight.on_replaced(self._supersede)
         self.tasks: dict[asyncio.Task[None], RunningAction] = {}
         """In the sequence of their arrival, which is not that of their first steps."""
         self.histories: list[CommandHistory] = []
@@ -46,6 +47,11 @@ class RunningActions:
         task = asyncio.current_task()
         return None if task is None else self.tasks.get(task)
 
+    def add(self, task: asyncio.Task[None], running: RunningAction, *, is_order: bool) -> None:
+        """Note an action that begins."""
+        self.tasks[task] = running
+        self.flight.add(task, FlightAction(running.client, is_order, flies=running.group is ActionGroup.FLIGHT))
+
     def is_full(self, group: ActionGroup) -> bool:
         """Return True when a group whose actions run in order takes no further one."""
         return group.in_order and sum(one.group is group for one in self.tasks.values()) >= MAX_WAITING
@@ -55,18 +61,22 @@ class RunningActions:
 
         Their senders get CANCELLED. A newer action than the calling one continues: it will replace this one.
         """
+        if group is ActionGroup.FLIGHT:
+            return self.flight.end_older()
         task, current = asyncio.current_task(), self.current
         older = itertools.takewhile(lambda other: other is not task, self.tasks)
         others = [other for other in older if self.tasks[other].group is group]
         for other in others:
-            if current is not None and current.is_order:
-                self.tasks[other].replaced_by_order = True
             other.cancel()
-        for history in self.histories:
-            history.supersede(None if current is None else current.client, group)
+        self._supersede(None if current is None else current.client, group)
         return others
 
-    def forget(self, client: Hashable, group: ActionGroup) -> None:
+    def _supersede(self, client: Hashable, group: ActionGroup = ActionGroup.FLIGHT) -> None:
+        """Note in all components that an action of this client has replaced those of all others."""
+        for history in self.histories:
+            history.supersede(client, group)
+
+    def forget(self, client: Hashable, group: ActionGroup = ActionGroup.FLIGHT) -> None:
         """Forget this client's newest action of a group in all components."""
         for history in self.histories:
             history.forget(client, group)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import enum
 import struct
+from collections import Counter
 from collections.abc import Awaitable, Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
@@ -28,7 +29,8 @@ DATA = 239
 MAX_CLIENTS = 32
 """Clients whose sessions are kept: as many as channels.
 
-More would be made-up addresses; the one that has been silent longest is dropped.
+More would be made-up addresses: one of the channel with most clients is dropped, the one that has been silent longest.
+One that writes a file is not.
 """
 MAX_SESSIONS = 4
 """Files that one client may have open: MAVProxy's parameters, mission and a transfer by hand are three."""
@@ -233,6 +235,10 @@ class _Client:
     """The last request of `_KEPT` and its answer, which a repetition gets again."""
     seen: float = 0.0
 
+    @property
+    def is_writing(self) -> bool:
+        return any(session.state is State.WRITING for session in self.sessions.values())
+
 
 @dataclass(frozen=True)
 class FtpRequest:
@@ -277,13 +283,24 @@ def format_reply(
     return (header + data).ljust(PAYLOAD, b"\0")
 
 
+def protected(payload: bytes) -> bytes | None:
+    """Return the answer to a request that its sender may not make; None when it is no request."""
+    request = parse(payload)
+    if request is None or request.opcode >= ACK:
+        return None
+    error = bytes((FileError.FILE_PROTECTED,))
+    return format_reply(request, NAK, error, seq=request.seq + 1, session=request.session, offset=request.offset)
+
+
 class FtpServer:
     """The sessions of all clients of one component.
 
     A client's sessions are its own: no other can reach them.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, channel_of: Callable[[Hashable], Hashable] = lambda who: None) -> None:
+        """`channel_of`: the channel of a client; by default all are of one."""
+        self._channel_of = channel_of
         self._clients: dict[Hashable, _Client] = {}
         """In the sequence of their last request."""
 
@@ -303,8 +320,9 @@ class FtpServer:
         client = self._clients.pop(who, None) or _Client()
         self._clients[who] = client
         client.seen = now
-        if len(self._clients) > MAX_CLIENTS:
-            self._drop(next(iter(self._clients)))
+        if len(self._clients) > MAX_CLIENTS and not self._make_room(who):
+            del self._clients[who]
+            return self._reply(client, request, FileError.NO_SESSIONS_AVAILABLE)
         if client.kept is not None:
             if client.kept[0] == request:
                 return client.kept[1]
@@ -403,6 +421,15 @@ class FtpServer:
         if request.opcode in _KEPT and answer is not FileError.INVALID_SESSION:
             client.kept = (request, reply)
         return reply
+
+    def _make_room(self, newest: Hashable) -> bool:
+        """Drop a client in place of this one; return False when all write files."""
+        counts = Counter(self._channel_of(who) for who in self._clients)
+        silent = [who for who, client in self._clients.items() if who != newest and not client.is_writing]
+        if not silent:
+            return False
+        self._drop(max(silent, key=lambda who: counts[self._channel_of(who)]))  # the first of equals: silent longest
+        return True
 
     def _drop(self, who: Hashable) -> None:
         client = self._clients.pop(who)

@@ -20,9 +20,9 @@ from anafi_mav.services.commands import Command
 from anafi_mav.services.component_metadata import COMPRESSED, GENERAL
 from anafi_mav.services.files import FileError, FileRefused, FileTree, Folder, Query, ServedFile, absolute
 from anafi_mav.services.flavours import FLAVOURS, Flavour, flavour_of
-from anafi_mav.services.ftp.ftp import FtpServer, Wait
+from anafi_mav.services.ftp.ftp import FtpServer, Wait, protected
 from anafi_mav.services.paced_sender import PacedSender
-from anafi_mav.services.service import Host, MessageHandler, Request, Service, client_of
+from anafi_mav.services.service import Host, MessageHandler, Request, Service, channel_of, client_of
 from anafi_mav.vehicle.base.severity import Severity
 
 logger = logging.getLogger(__name__)
@@ -45,7 +45,7 @@ class FtpService(Service):
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._server = FtpServer()
+        self._server = FtpServer(channel_of)
         self._sender = PacedSender(host)
         self._next_look = 0.0
         self._files: Mapping[str, ServedFile] = {}
@@ -73,6 +73,14 @@ class FtpService(Service):
 
     def messages(self) -> Mapping[int, MessageHandler]:
         return {dialect.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: self._receive}
+
+    def denials(self) -> Mapping[int, MessageHandler]:
+        def deny(inbound: Inbound) -> None:
+            answer = protected(bytes(inbound.message.payload))
+            if answer is not None:
+                self.host.send(_message(answer, inbound), inbound.channel)
+
+        return {dialect.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: deny}
 
     def requests(self) -> Mapping[int, Request]:
         return {

@@ -21,6 +21,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.stall import STALL
 from anafi_mav.services.command_targets import height, place
 from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect, ProgressPolicy
+from anafi_mav.services.dropped_inputs import InputStream
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.gimbal import gimbal_messages, mount, targets
 from anafi_mav.services.gimbal.control import NO_CLIENT, Answer, ClientId, GimbalControl, Heartbeats
@@ -32,7 +33,8 @@ from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.refusal import Refused, Unsupported
+from anafi_mav.vehicle.base.refusal import Refused, Unsupported, reason_of
+from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
@@ -59,8 +61,8 @@ class GimbalService(Service):
         self._motion = GimbalMotion(host, self._heartbeats, self._roi)
         self._mount_mode = dialect.MAV_MOUNT_MODE_MAVLINK_TARGETING
         """Of MOUNT_CONFIGURE: decides what a MOUNT_CONTROL means."""
-        self._mount_place: tuple[ClientId, GeoPoint, float] | None = None
-        """Sender, place and height (m above take-off) of the newest MOUNT_CONTROL that is still to be looked at."""
+        self._mount_place: tuple[Inbound, GeoPoint, float] | None = None
+        """The newest MOUNT_CONTROL that is still to be looked at, its place and height (m above take-off)."""
         self._mount_look: asyncio.Task[None] | None = None
         self._ticked = math.inf
         self._status: tuple[object, ...] = ()
@@ -139,7 +141,10 @@ class GimbalService(Service):
                 from_pictures=True,
             ),
             dialect.MAVLINK_MSG_ID_MOUNT_ORIENTATION: MessageStream(
-                lambda vehicle, times: gimbal_messages.mount_orientation(gimbal(vehicle), times), attitude, every=0.2
+                lambda vehicle, times: gimbal_messages.mount_orientation(gimbal(vehicle), times),
+                attitude,
+                every=0.2,
+                spared=True,
             ),
             dialect.MAVLINK_MSG_ID_MOUNT_STATUS: MessageStream(
                 lambda vehicle, times: gimbal_messages.mount_status(gimbal(vehicle), self._mount_mode), attitude
@@ -296,23 +301,29 @@ class GimbalService(Service):
         self._stream(inbound, message.gimbal_device_id, target)
 
     def _stream(self, inbound: Inbound, device: float, target: GimbalTarget | OperatorText) -> None:
-        """Carry out the target of a message, which has no acknowledgement: a refusal is a text."""
-        client, reason = (inbound.sysid, inbound.compid), None
+        """Carry out the target of a message; a refusal is a text to its sender.
+
+        Zero rates of a client that may not move the gimbal are not refused: they are those of centred sticks.
+        """
+        client = (inbound.sysid, inbound.compid)
         if not targets.is_device(device):
-            reason = texts.NO_SUCH_GIMBAL.fill(number=device)
-        elif isinstance(target, str):
-            reason = target
-        elif not self._control.allows(client):
-            reason = self._objection(client)
-        elif self._motion.is_calibrating:
-            reason = texts.GIMBAL_CALIBRATES
-        if reason is not None or isinstance(target, str):
-            self.host.warn_throttled(texts.REFUSED.fill(what=texts.GIMBAL, reason=reason))
-            return
-        try:
-            self._motion.stream(client, target)
-        except AnafiMavError as error:
-            self.host.warn_throttled(texts.from_below(error))
+            self._drop(inbound, texts.NO_SUCH_GIMBAL.fill(number=device))
+        elif isinstance(target, OperatorText):
+            self._drop(inbound, target)
+        elif not self._control.allows(client) or self._motion.is_calibrating:
+            if not target.is_zero_rate:
+                allowed = self._control.allows(client)
+                self._drop(inbound, texts.GIMBAL_CALIBRATES if allowed else self._objection(client))
+        else:
+            try:
+                self._motion.stream(client, target, lambda reason: self._drop(inbound, reason))
+            except AnafiMavError as error:
+                self._drop(inbound, reason_of(error))
+            else:
+                self.host.use_input(client_of(inbound), InputStream.GIMBAL)
+
+    def _drop(self, inbound: Inbound, reason: OperatorText) -> None:
+        self.host.drop_input(client_of(inbound), InputStream.GIMBAL, reason)
 
     # Regions of interest.
 
@@ -335,7 +346,7 @@ class GimbalService(Service):
 
     async def _look(self, command: Command, where: GeoPoint, ato: float) -> None:
         self._require_control(command.client)
-        region = self._roi.prepare()
+        region = self._roi.prepare(command.right)
         await self._motion.rest()
         await self._roi.look_at(region, where, ato)
 
@@ -347,7 +358,7 @@ class GimbalService(Service):
     async def _look_at_number(self, command: Command, system: float) -> None:
         self._require_control(command.client)
         self._roi.position_of(system)
-        region = self._roi.prepare()
+        region = self._roi.prepare(command.right)
         await self._motion.rest()
         await self._roi.look_at_system(region, system)
 
@@ -385,14 +396,15 @@ class GimbalService(Service):
         pitch, roll, yaw = offsets
         if any(abs(value) > targets.WIDEST for value in offsets):
             raise Refused(texts.ROI, texts.GIMBAL_ANGLE, lasting=True)
-        if vehicle.mission.flying:
+        if vehicle.control.active is vehicle.mission:
             raise Refused(texts.ROI, texts.GIMBAL_OF_MISSION)
         goto, here = vehicle.guided.goto, vehicle.place
         if goto is None or here is None or piloting.altitude is None:
             raise Refused(texts.ROI, texts.ROI_NO_WAYPOINT)
         self._motion.require_ready()
         bearing, elevation = mount.direction(here, goto.place, goto.ato - piloting.altitude)
-        await vehicle.guided.go(goto.with_heading(units.wrap_pi(bearing + yaw * units.RAD_PER_DEG)))
+        turned = goto.with_heading(units.wrap_pi(bearing + yaw * units.RAD_PER_DEG))
+        await vehicle.guided.go(turned, by=command.right)
         ahead = {Axis.PITCH: elevation * units.DEG_PER_RAD + pitch, Axis.ROLL: roll, Axis.YAW: 0.0}
         await self._move(command, targets.read(mount.HORIZON, ahead, {}))
 
@@ -453,21 +465,21 @@ class GimbalService(Service):
         """MOUNT_CONFIGURE has no acknowledgement; it decides what the next MOUNT_CONTROL means."""
         mode, client = inbound.message.mount_mode, (inbound.sysid, inbound.compid)
         if not self._control.allows(client):
-            self.host.warn_throttled(texts.REFUSED.fill(what=texts.GIMBAL, reason=self._objection(client)))
+            self._drop(inbound, self._objection(client))
             return
         if mode == dialect.MAV_MOUNT_MODE_NEUTRAL:
             self._stream(inbound, targets.DEVICES[0], GimbalTarget(neutral=True))
         if mode in mount.MESSAGE_MODES:
             self._mount_mode = mode
         else:
-            self._warn_of_mode(mode)
+            self._drop(inbound, texts.GIMBAL_MODE.fill(mode=mode))
 
     def _mount_controlled(self, inbound: Inbound) -> None:
         """MOUNT_CONTROL: cdeg of pitch, roll, yaw; or degE7 and cm above home of a place."""
         message = inbound.message
         if self._mount_mode == dialect.MAV_MOUNT_MODE_GPS_POINT:
             where = GeoPoint(message.input_a / 1e7, message.input_b / 1e7)
-            self._mount_place = (inbound.sysid, inbound.compid), where, message.input_c / 100.0
+            self._mount_place = inbound, where, message.input_c / 100.0
             if self._mount_look is None or self._mount_look.done():
                 self._mount_look = self.host.run_action(client_of(inbound), self._look_for_mount())
         elif self._mount_mode == dialect.MAV_MOUNT_MODE_MAVLINK_TARGETING:
@@ -478,33 +490,32 @@ class GimbalService(Service):
             }
             self._stream(inbound, targets.DEVICES[0], targets.read(mount.HORIZON, angles, {}))
         else:
-            self._warn_of_mode(self._mount_mode)
-
-    def _warn_of_mode(self, mode: int) -> None:
-        reason = texts.GIMBAL_MODE.fill(mode=mode)
-        self.host.warn_throttled(texts.REFUSED.fill(what=texts.GIMBAL, reason=reason))
+            self._drop(inbound, texts.GIMBAL_MODE.fill(mode=self._mount_mode))
 
     async def _look_for_mount(self) -> None:
         """Look at the newest place of MOUNT_CONTROL, which may arrive often; at the same place once.
 
         A stream of them never ends what flies the drone, which would begin again with each command of a client.
         """
-        task = asyncio.current_task()
+        task, inbound = asyncio.current_task(), None
         try:
             while self._mount_place is not None:
-                client, where, ato = self._mount_place
+                inbound, where, ato = self._mount_place
                 self._mount_place = None
+                client = (inbound.sysid, inbound.compid)
                 if not self._control.allows(client):
                     raise Refused(texts.ROI, self._objection(client))
                 if not self._roi.is_locked_on(where, ato):
-                    region = self._roi.prepare()
+                    region = self._roi.prepare(Right(client, Extent.COMMANDED))
                     vehicle = self.host.vehicle
                     if not self._roi.is_active and (vehicle.mode not in HOVERING or vehicle.overridable):
                         raise Refused(texts.ROI, texts.DRONE_FLIES)
                     await self._motion.rest()
                     await self._roi.look_at(region, where, ato)
+                self.host.use_input(client_of(inbound), InputStream.REGION)
         except AnafiMavError as error:
-            self.host.warn_throttled(error.text if isinstance(error, Refused) else texts.from_below(error))
+            if inbound is not None:
+                self.host.drop_input(client_of(inbound), InputStream.REGION, reason_of(error))
         finally:
             if self._mount_look is task:
                 self._mount_look = self._mount_place = None

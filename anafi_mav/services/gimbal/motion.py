@@ -11,7 +11,7 @@ import asyncio
 import contextlib
 import math
 from collections.abc import Callable, Mapping
-from typing import TypedDict
+from typing import TypeAlias, TypedDict
 
 from anafi_mav import texts
 from anafi_mav.drone import Aim, GimbalAttitude, GimbalState
@@ -23,7 +23,8 @@ from anafi_mav.services.gimbal.rates import MESSAGE_SILENCE, GimbalRates
 from anafi_mav.services.gimbal.roi import RegionOfInterest
 from anafi_mav.services.gimbal.targets import GimbalTarget
 from anafi_mav.services.service import Host
-from anafi_mav.vehicle.base.refusal import Refused, Unsupported
+from anafi_mav.texts import OperatorText
+from anafi_mav.vehicle.base.refusal import Refused, Unsupported, reason_of
 from anafi_mav.vehicle.base.severity import Severity
 
 STOPS = 4
@@ -55,6 +56,10 @@ def _by_axis(aims: Mapping[Axis, Aim]) -> _ByAxis:
     return {"yaw": aims.get(Axis.YAW), "pitch": aims.get(Axis.PITCH), "roll": aims.get(Axis.ROLL)}
 
 
+Drop: TypeAlias = "Callable[[OperatorText], None]"
+"""Receives the reason for which the target of a message is not carried out."""
+
+
 class GimbalMotion:
     """The movement of one vehicle's gimbal."""
 
@@ -72,7 +77,7 @@ class GimbalMotion:
         """Sender of the newest target; None: the drone aims the gimbal."""
         self._command: asyncio.Task[None] | None = None
         """The command that has not been answered yet, or what frees the gimbal from a region for a message."""
-        self._waiting: tuple[ClientId, GimbalTarget] | None = None
+        self._waiting: tuple[ClientId, GimbalTarget, Drop] | None = None
         """The newest target of a message, while the gimbal is freed for it."""
         self._halt: asyncio.Task[None] | None = None
         """Stops the gimbal or resets its orientation, for a message or by itself."""
@@ -158,23 +163,28 @@ class GimbalMotion:
                 self._command = None
                 self._zeros = STOPS if target.is_zero_rate else 0
 
-    def stream(self, client: ClientId, target: GimbalTarget) -> None:
-        """Carry out the target of a message, without waiting."""
-        target = target.on(self._gimbal.axes or frozenset())
+    def stream(self, client: ClientId, target: GimbalTarget, drop: Drop) -> None:
+        """Carry out the target of a message, without waiting.
+
+        `drop` receives the reason when that fails later. Raises `Unsupported` when the gimbal has none of its axes.
+        """
+        named, target = target, target.on(self._gimbal.axes or frozenset())
         if target.is_empty:
-            return
+            if named.is_zero_rate:
+                return
+            raise Unsupported(texts.GIMBAL, texts.NO_GIMBAL if self._gimbal.axes is None else texts.NO_SUCH_AXIS)
         self._client = client
         if self._roi.holds_gimbal:
             is_freeing = self._waiting is not None
-            self._waiting = client, target
+            self._waiting = client, target, drop
             if not is_freeing:
                 if self._command is not None:
                     self._command.cancel()  # a newer target replaces it
                 self._command = self._host.spawn(self._free())
             return
-        self._apply(client, target)
+        self._apply(client, target, drop)
 
-    def _apply(self, client: ClientId, target: GimbalTarget) -> None:
+    def _apply(self, client: ClientId, target: GimbalTarget, drop: Drop) -> None:
         now = self._host.clock.monotonic()
         if target.neutral:
             is_repeated = self.is_neutral and now - self._neutral_at < MESSAGE_SILENCE
@@ -183,7 +193,7 @@ class GimbalMotion:
                 self._begin()
                 self._rates.replace_by_angles()
                 self.is_neutral, self._reference = True, None
-                self._halt = self._host.spawn(self._reset())
+                self._halt = self._host.spawn(self._reset(drop))
             return
         self.is_neutral = False
         if target.is_zero_rate:
@@ -215,18 +225,19 @@ class GimbalMotion:
                 waiting, self._command, self._waiting = self._waiting, None, None
                 self._apply(*waiting)
         except AnafiMavError as error:
-            self._host.warn_throttled(texts.from_below(error))
+            if self._waiting is not None:
+                self._waiting[2](reason_of(error))
         finally:
             if self._command is task:
                 self._command = self._waiting = None
 
-    async def _reset(self) -> None:
+    async def _reset(self, drop: Drop) -> None:
         task = asyncio.current_task()
         try:
             self._reference = await self._host.drone.gimbal.reset_orientation()
         except AnafiMavError as error:
             self.is_neutral = False
-            self._host.warn_throttled(texts.from_below(error))
+            drop(reason_of(error))
         finally:
             if self._halt is task:
                 self._halt = None

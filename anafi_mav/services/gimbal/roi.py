@@ -16,10 +16,13 @@ from anafi_mav.drone.events import PilotedPOIV2, PoiMode, PoiStatus
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.service import Host
+from anafi_mav.services.system_position import SystemPosition
 from anafi_mav.vehicle.base.bounds import amsl_to_ato, check_on_earth
+from anafi_mav.vehicle.base.flight_task import Needs, PlainTask, TaskRules
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, reason_of
+from anafi_mav.vehicle.base.requester import By
 from anafi_mav.vehicle.base.severity import Severity
 
 MAX_SYSTEMS = 64
@@ -45,17 +48,6 @@ def _holds(status: PoiStatus | None, mode: PoiMode | None) -> bool:
     return status in _LOOKING and mode != PoiMode.FREE_GIMBAL
 
 
-@dataclass(frozen=True)
-class SystemPosition:
-    """Position of another system, as its GLOBAL_POSITION_INT reported it last."""
-
-    place: GeoPoint
-    amsl: float
-    """m."""
-    at: float
-    """s, monotonic."""
-
-
 @dataclass
 class Region:
     """One attempt to look at places.
@@ -65,14 +57,20 @@ class Region:
 
     mode: PoiMode
     """Relation of the gimbal to the place that is wanted."""
+    by: By | None = None
+    """Requester; None: it was found."""
     is_confirmed: bool = False
     """The drone has reported it."""
     freeing: asyncio.Task[None] | None = None
     """Frees the gimbal; one task for all targets that wait for it."""
 
 
-class RegionOfInterest:
+class RegionOfInterest(PlainTask):
     """The region of interest of one vehicle: one of its flight tasks."""
+
+    rules = TaskRules(texts.ROI, needs=Needs.NO_DESCENT | Needs.IN_AIR, keeps_below=True)
+    mode = None
+    """The drone looks there in any hovering mode."""
 
     def __init__(self, host: Host) -> None:
         self._host = host
@@ -80,8 +78,8 @@ class RegionOfInterest:
         """The region in force; None as soon as its end is commanded."""
         self._prepared: Region | None = None
         """The newest region that is about to begin, while earlier movements end."""
-        host.vehicle.helms = (*host.vehicle.helms, self)
         self._systems: dict[int, SystemPosition] = {}
+        """What systems of other gateways and autopilots have reported."""
         self._system: int | None = None
         """The system that is looked at; None: a place, or nothing."""
         self._looked: SystemPosition | None = None
@@ -111,19 +109,16 @@ class RegionOfInterest:
         """True while a region is in force or begins, and its end is not commanded."""
         return self._region is not None
 
-    def prepare(self) -> Region:
+    def prepare(self, by: By) -> Region:
         """Return an attempt for `look_at`; a newer one, or `stop`, withdraws it.
 
         Raises `Refused` when no region can begin: landing, return, mission, ground.
         """
         vehicle = self._host.vehicle
-        if (descent := vehicle.descent) is not None:
-            raise Refused(texts.ROI, descent)
-        if vehicle.mission.flying or vehicle.mode is FlightMode.MISSION:
+        if vehicle.control.active is vehicle.mission or vehicle.mode is FlightMode.MISSION:
             raise Refused(texts.ROI, texts.GIMBAL_OF_MISSION)
-        if not vehicle.in_air:
-            raise Refused(texts.ROI, texts.NOT_IN_AIR)
-        self._prepared = Region(PoiMode.LOCKED_GIMBAL)
+        vehicle.control.check(self, by)
+        self._prepared = Region(PoiMode.LOCKED_GIMBAL, by)
         return self._prepared
 
     async def look_at(self, region: Region, where: GeoPoint, ato: float) -> None:
@@ -137,33 +132,42 @@ class RegionOfInterest:
         self.forget_system()
         if is_locked:
             return
-        if self._region is None:
-            await self._take_over()
-            self._require_prepared(region)
-        self._region, self._prepared = region, None  # no await from the checks to the start
-        await self._start(region, where, ato)
+        if self._region is not None or region.by is None:
+            self._region, self._prepared = region, None
+            await self._start(region, where, ato)
+        else:
+            await self._begin_region(region, region.by, where, ato)
         region.is_confirmed = True
+
+    async def _begin_region(self, region: Region, by: By, where: GeoPoint, ato: float) -> None:
+        """Acquire the drone for a region. Raises `Refused` when it does not hover then."""
+        vehicle = self._host.vehicle
+        async with vehicle.control.acquire(self, by=by) as grant:
+            if vehicle.drone.piloting.moving:
+                await vehicle.drone.piloting.stop()
+            if (reason := vehicle.lacking(self.rules.needs)) is not None:
+                raise Refused(texts.ROI, reason)
+            self._require_prepared(region)
+            self._region, self._prepared = region, None  # no await from the checks to the start
+            grant.begin()
+            await self._start(region, where, ato)
 
     def _require_prepared(self, region: Region) -> None:
         if self._prepared is not region:
             raise Refused(texts.ROI, texts.MISSION_DISPLACED)
 
-    async def _take_over(self) -> None:
-        """End what flies the drone. Raises `Refused` when it does not hover then."""
-        vehicle = self._host.vehicle
-        await vehicle.take_over()
-        if vehicle.drone.piloting.moving:
-            await vehicle.drone.piloting.stop()
-        await vehicle.drone.piloting.cancel_return_home()
-        if not vehicle.in_air or vehicle.returning:
-            raise Refused(texts.ROI, vehicle.activity)
-
     def position_of(self, system: float) -> SystemPosition:
         """Return the position of another system. Raises `Refused` without a recent one."""
-        seen = self._systems.get(int(system)) if math.isfinite(system) else None
+        seen = self._newest(int(system)) if math.isfinite(system) else None
         if seen is None or self._host.clock.monotonic() - seen.at > POSITION_OLD:
             raise Refused(texts.ROI, texts.ROI_NO_SYSTEM.fill(system=system))
         return seen
+
+    def _newest(self, system: int) -> SystemPosition | None:
+        """Return the newest position of another system; None: unknown, or it is this one."""
+        if system == self._host.sysid:
+            return None
+        return self._host.position_of(system) or self._systems.get(system)
 
     async def look_at_system(self, region: Region, system: float) -> None:
         """Look at another system, and follow it as far as it reports its position."""
@@ -174,7 +178,8 @@ class RegionOfInterest:
 
     async def stop(self) -> None:
         """Look at nothing in particular."""
-        self._region = self._prepared = None
+        self._prepared = None
+        self._drop_region()
         self.forget_system()
         await self._host.drone.poi.stop()
 
@@ -223,8 +228,13 @@ class RegionOfInterest:
             await self._host.drone.poi.start(where.latitude, where.longitude, ato, region.mode)
         except BaseException:
             if self._region is region:
-                self._region = None
+                self._drop_region()
             raise
+
+    def _drop_region(self) -> None:
+        """The region is over, and nothing is to be sent for it."""
+        self._region = None
+        self._host.vehicle.control.release(self)
 
     # The flight task.
 
@@ -243,6 +253,9 @@ class RegionOfInterest:
         state = self._host.drone.poi.state
         if state.status in _LOOKING:
             self._region = Region(state.mode or PoiMode.LOCKED_GIMBAL, is_confirmed=True)
+            control = self._host.vehicle.control
+            if control.active is control.below:  # no task: a plan looks at places of its own
+                control.adopt(self, keeps_below=True)
 
     def forget_system(self) -> None:
         """Follow no system any longer; the drone looks at its last place."""
@@ -274,12 +287,12 @@ class RegionOfInterest:
         if region is None or not region.is_confirmed or region.freeing is not None or self._update is not None:
             return
         if self._host.drone.poi.state.status not in _LOOKING:
-            self._region = None  # the drone, or another controller, has ended it
+            self._drop_region()  # the drone, or another controller, has ended it
             self.forget_system()
             return
         if self._system is None or self._looked is None:
             return
-        seen = self._systems.get(self._system, self._looked)
+        seen = self._newest(self._system) or self._looked
         is_lost = now - seen.at > POSITION_OLD
         if is_lost and not self._is_lost:
             self._host.text(Severity.WARNING, texts.ROI_LOST.fill(system=self._system))

@@ -1,1 +1,1 @@
-"""Services that a ground station expects: identity, banner, time, shell, tunes."""
+"""Services that a ground station expects: identity, banner, time, shell, tunes, keys."""

@@ -1,4 +1,4 @@
-"""Gateway, drone and firmware as texts for each client.
+"""Gateway, drone, firmware and dangerous settings as texts for each client.
 
 Sent to each client once after its first message, after a reconnection, and on request. Mission Planner takes the
 firmware from a text that begins like ArduCopter's (conformance D3, F 149).
@@ -6,6 +6,7 @@ firmware from a text that begins like ArduCopter's (conformance D3, F 149).
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Hashable, Mapping
 
 from anafi_mav import __version__, texts
@@ -18,6 +19,9 @@ from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Host, Query, Service, client_of
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.failsafe_settings import warnings_of
+
+logger = logging.getLogger(__name__)
 
 GONE = 30.0
 """s of silence after which a client counts as a new one, for example when restarted."""
@@ -58,6 +62,8 @@ class BannerService(Service):
     A station that has just found a vehicle does not show texts yet.
     """
 
+    hears_observers = True
+
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._heard: dict[Hashable, tuple[float, Channel]] = {}
@@ -69,6 +75,8 @@ class BannerService(Service):
         return {dialect.MAV_CMD_DO_SEND_BANNER: self._banner}
 
     def link_up(self) -> None:
+        for text in self._failsafe_warnings():  # the clients get theirs with the banner
+            logger.warning("%s: %s", self.host.drone.name, text)
         now = self.host.clock.monotonic()
         self._due = {channel: now + GREET_AFTER for heard, channel in self._heard.values() if now - heard <= GONE}
 
@@ -106,10 +114,13 @@ class BannerService(Service):
         if self.host.drone.controller.present:
             for text in PILOT_IN_CONTROL:
                 self.host.text(Severity.WARNING, text, channel)
-        for text in self.host.vehicle.standing_warnings:
+        for text in (*self.host.vehicle.standing_warnings, *self._failsafe_warnings()):
             self.host.text(Severity.WARNING, text, channel)
         for text in banner(self.host.drone, flavour_of(channel)):
             self.host.text(Severity.INFO, text, channel)
+
+    def _failsafe_warnings(self) -> list[OperatorText]:
+        return [warning.text for warning in warnings_of(self.host.drone, self.host.failsafe_limits)]
 
     def _banner(self, inbound: Inbound, command: Command) -> int:
         self._due.pop(inbound.channel, None)

@@ -57,6 +57,8 @@ class MediaFolder:
             resource = find(listing, path)
             if resource.size > MAX_SIZE:
                 raise FileRefused(FileError.FAIL, texts.FILE_TOO_LARGE)
+            if not resource.size:  # the drone has not reported it, and a client would end at once
+                raise FileRefused(FileError.FAIL, texts.FILE_OF_UNKNOWN_SIZE)
             return _OpenFile(self._drone, resource)
 
         return when_listed(self._drone, opened)

@@ -10,10 +10,11 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.stall import STALL
 from anafi_mav.services.service import Host, Service
-from anafi_mav.vehicle.base.link_loss import GcsWatch, LossAction
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import reason_of
+from anafi_mav.vehicle.base.requester import Source
 from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.link_loss import GcsWatch, LossAction
 from anafi_mav.vehicle.vehicle import Landed
 
 
@@ -61,11 +62,11 @@ class LinkLossService(Service):
         vehicle = self.host.vehicle
         try:
             if action is LossAction.HOLD:
-                await vehicle.hold()
+                await vehicle.hold(FlightMode.HOLD, Source.LOST_LINK)
             elif action is LossAction.LAND:
-                await vehicle.land()
+                await vehicle.land(Source.LOST_LINK)
             else:
-                await vehicle.return_home()
+                await vehicle.return_home(Source.LOST_LINK)
         except AnafiMavError as error:
             self.host.text(
                 Severity.CRITICAL, texts.STATION_LOST_FAILED.fill(action=action.name.lower(), error=reason_of(error))

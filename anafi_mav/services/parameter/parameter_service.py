@@ -275,6 +275,9 @@ class ParameterService(Service):
             made[key] = packed_file(listed.values(), int(numbers.get("start", "0")), count)
         return made[key]
 
+    def denials(self) -> Mapping[int, MessageHandler]:
+        return {dialect.MAVLINK_MSG_ID_PARAM_SET: self._deny}
+
     # Reading.
 
     def _request_list(self, inbound: Inbound) -> None:
@@ -433,6 +436,12 @@ class ParameterService(Service):
                 texts.PARAMETER_NOT_SET.fill(name=name_of(inbound.message.param_id), reason=why),
                 inbound.channel,
             )
+
+    def _deny(self, inbound: Inbound) -> None:
+        """Send the error and the value in effect: the endpoint does not permit the write."""
+        self._error(inbound, dialect.MAV_PARAM_ERROR_PERMISSION_DENIED)
+        if name_of(inbound.message.param_id) in self._lists[flavour_of(inbound.channel).name].index:
+            self._answer(inbound)
 
     def _error(self, inbound: Inbound, error: int) -> None:
         message: Any = inbound.message

@@ -18,9 +18,11 @@ from anafi_mav.services.parameter.parameter import Limits, Parameter, bounds, cu
 from anafi_mav.services.parameter.parameter_codec import ParamType
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.base.bounds import LOWEST
-from anafi_mav.vehicle.base.link_loss import LossAction
 from anafi_mav.vehicle.base.move_heading import MoveHeading
+from anafi_mav.vehicle.base.requester import Source
+from anafi_mav.vehicle.flight_policy import BY_NUMBER, NUMBERS
 from anafi_mav.vehicle.joystick_override import Override
+from anafi_mav.vehicle.link_loss import LossAction
 from anafi_mav.vehicle.offboard.stream import GUIDED_TIMEOUT, LONGEST_TIMEOUT, SHORTEST_TIMEOUT
 from anafi_mav.vehicle.return_end import LONGEST_WAIT, SHORTEST_WAIT, EndOfReturn
 
@@ -375,6 +377,23 @@ CONTROLLER_BUTTONS = Parameter(
     source=events.GrabState.NAME,
     models="behind a Skycontroller",
 )
+PILOT_SWITCH = Parameter(
+    "ANF_SC_OFFBOARD",
+    ParamType.INT32,
+    "Aircraft is the Skycontroller pilot's or the programs'",
+    read=lambda host: NUMBERS[host.vehicle.pilot_switch.state],
+    write=lambda host, value: host.vehicle.pilot_switch.request(BY_NUMBER[int(value)]),
+    values={0: "Pilot: programs only stop, land and return", 1: "Program", 2: "Automatic"},
+    polled=True,
+    present=lambda drone: drone.controller.present,
+    group=CONTROLLER,
+    long="Automatic: a stick and a command take the aircraft from each other. Program: sticks and piloting source are "
+    "kept for programs until the pilot moves a stick, which sets Pilot. Pilot: flight commands, setpoints and sticks "
+    "of clients are refused; Hold, pause, Land, Return and disarm are not.",
+    default=2,
+    source="anafi_ros skycontroller/offboard",
+    models="behind a Skycontroller",
+)
 MODEL = Parameter(
     "ANF_MODEL",
     ParamType.INT32,
@@ -452,7 +471,7 @@ async def _set_climb_speed(host: Host, value: float) -> None:
 async def _go_on(host: Host) -> None:
     """A move under way changes its speed, as it does for MAV_CMD_DO_CHANGE_SPEED."""
     if (goto := host.vehicle.guided.goto) is not None:
-        await host.vehicle.guided.go(goto)
+        await host.vehicle.guided.go(goto, by=Source.GATEWAY)
 
 
 def _climb_limits(host: Host) -> Limits | None:
@@ -691,6 +710,7 @@ NATIVE: tuple[Parameter, ...] = (
     GIMBAL_SPEED,
     CONTROLLER_WHEELS,
     CONTROLLER_BUTTONS,
+    PILOT_SWITCH,
     MODEL,
     TAKEOFF_HEIGHT,
     HAND_LAUNCH,

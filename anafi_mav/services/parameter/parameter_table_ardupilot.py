@@ -36,9 +36,9 @@ from anafi_mav.services.parameter.parameter_table import (
 from anafi_mav.services.parameter.parameter_table_fence import FENCE_ARDUPILOT
 from anafi_mav.services.parameter.parameter_table_setup import SETUP_ARDUPILOT
 from anafi_mav.services.service import Host
-from anafi_mav.vehicle.base.link_loss import LossAction
 from anafi_mav.vehicle.base.move_heading import MoveHeading
 from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.link_loss import LossAction
 from anafi_mav.vehicle.return_end import EndOfReturn
 from anafi_mav.vehicle.takeoff import AUTO_DISARM
 

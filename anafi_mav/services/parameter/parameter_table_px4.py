@@ -45,7 +45,7 @@ from anafi_mav.services.parameter.parameter_table_setup import SETUP_PX4
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.base.move_heading import MoveHeading
 from anafi_mav.vehicle.base.refusal import Refused
-from anafi_mav.vehicle.base.silence import SILENCE
+from anafi_mav.vehicle.offboard.silence import SILENCE
 from anafi_mav.vehicle.return_end import LONGEST_WAIT, EndOfReturn
 from anafi_mav.vehicle.takeoff import AUTO_DISARM
 

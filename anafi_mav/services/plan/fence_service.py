@@ -22,6 +22,7 @@ from anafi_mav.services.service import Host, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, reason_of
+from anafi_mav.vehicle.base.requester import Source
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.fence.fence_watch import CEILING, EVERYTHING, FLOOR, FenceWatch, Reaction, Sight, State
@@ -121,7 +122,7 @@ class FenceService(Service):
             airborne=not vehicle.on_ground and vehicle.flying_state is not None,
             flying=vehicle.in_air and vehicle.mode is not FlightMode.RETURN,
             steering=not own_way and state.plan != PlayingState.PLAYING,
-            orders=vehicle.orders,
+            orders=vehicle.control.epoch,
         )
 
     def _look(self, now: float) -> None:
@@ -148,7 +149,7 @@ class FenceService(Service):
         elif controller.pilot_has_source or controller.pilot_acquired_control:
             # A person flies, or can at once: nothing of ours acts against him.
             self.host.text(Severity.CRITICAL, texts.FENCE_PILOT.fill(reason=verdict.text))
-            self._watch.done(self.host.vehicle.orders)
+            self._watch.done(self.host.vehicle.control.epoch)
         else:
             self.host.text(Severity.CRITICAL, texts.FENCE_BREACH.fill(action=action.value, reason=verdict.text))
             # In its turn: what is newer replaces it.
@@ -161,11 +162,11 @@ class FenceService(Service):
                 case Reaction.RETURN:
                     await self._return_or_hold()
                 case Reaction.LAND:
-                    await vehicle.land()
+                    await vehicle.land(Source.FENCE)
                 case Reaction.TERMINATE:
-                    await vehicle.terminate()
+                    await vehicle.terminate(Source.FENCE)
                 case _:
-                    await vehicle.hold()
+                    await vehicle.hold(FlightMode.HOLD, Source.FENCE)
         except AnafiMavError as error:
             self.host.text(Severity.ERROR, texts.FENCE_ACTION_FAILED.fill(action=action.value, error=reason_of(error)))
             self._not_done()
@@ -173,7 +174,7 @@ class FenceService(Service):
             self._not_done()
             raise
         else:
-            self._watch.done(vehicle.orders)
+            self._watch.done(vehicle.control.epoch)
 
     def _not_done(self) -> None:
         """The action has failed, or something newer has ended it."""
@@ -181,10 +182,10 @@ class FenceService(Service):
 
     async def _return_or_hold(self) -> None:
         try:
-            await self.host.vehicle.return_home()
+            await self.host.vehicle.return_home(Source.FENCE)
         except AnafiMavError as error:
             self.host.text(Severity.ERROR, texts.FENCE_NO_RETURN.fill(error=reason_of(error)))
-            await self.host.vehicle.hold()
+            await self.host.vehicle.hold(FlightMode.HOLD, Source.FENCE)
 
     # Telling.
 

@@ -23,6 +23,7 @@ from anafi_mav.services.plan.mission_items import from_wire
 from anafi_mav.services.plan.plan_transfer import PlanKind
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.fence.plan_items import PlanFault, PlanItem
+from anafi_mav.vehicle.mission.texts import FIRST_LABEL
 
 _HEADED = frozenset(
     {
@@ -43,11 +44,6 @@ _RESULTS = {
 }
 
 _NOTHING = TranslationReport((), (), ())
-
-
-FIRST_LABEL = 1
-"""The number of our item 0 in texts. On a station's map item 0 is home, whether or not it is sent to the vehicle
-(QGroundControl FirmwarePlugin::sendHomePositionToVehicle): seq + 1 for PX4's clients, seq for ArduPilot's."""
 
 
 def offset(flavour: Flavour) -> int:
@@ -77,22 +73,23 @@ class Examined:
     neutral: tuple[Item, ...]
     report: TranslationReport
 
-    def words(self, first: int) -> OperatorText:
-        """Return a text on how the mission is flown, with item numbers beginning at `first`."""
+    @property
+    def words(self) -> OperatorText:
+        """A text on how the mission is flown."""
         if not self.items:
             return texts.NO_MISSION_STORED
         report = self.report
         words = texts.MISSION_ITEMS.fill(count=len(self.items))
         if report.stepped:
-            words = texts.MISSION_STEPS.fill(mission=words, steps=_some(report.stepped, first))
+            words = texts.MISSION_STEPS.fill(mission=words, steps=_some(report.stepped))
         if report.approximations:
-            words = texts.MISSION_APPROXIMATE.fill(mission=words, losses=_some(report.approximations, first))
+            words = texts.MISSION_APPROXIMATE.fill(mission=words, losses=_some(report.approximations))
         return words
 
 
-def _some(losses: Sequence[Loss], first: int) -> str:
+def _some(losses: Sequence[Loss]) -> str:
     loss = losses[0]
-    where = "" if loss.item is None else f"item {loss.item + first}: "
+    where = "" if loss.item is None else f"item {loss.item + FIRST_LABEL}: "
     more = f" and {len(losses) - 1} more" if len(losses) > 1 else ""
     return f"{where}{loss.what}{more}"
 

@@ -6,8 +6,10 @@ The list itself is `plan_service`'s, how it is flown `vehicle.mission.flight`'s.
 
 from __future__ import annotations
 
+import asyncio
 import math
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Coroutine, Hashable, Mapping
+from typing import Any
 
 from anafi_mav import texts
 from anafi_mav.mavlink import dialect
@@ -15,15 +17,15 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, effect_of_mode
 from anafi_mav.services.flavours import Flavour, flavour_of
-from anafi_mav.services.plan.mission_kind import FIRST_LABEL, offset
+from anafi_mav.services.plan.mission_kind import offset
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.stream import MessageStream, Times
-from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
-from anafi_mav.vehicle.mission.progress import MAVLINK_STATES, State
+from anafi_mav.vehicle.mission.machine import MAVLINK_STATES, State
 from anafi_mav.vehicle.mission.record import MissionRecord
 from anafi_mav.vehicle.vehicle import Vehicle
 
@@ -49,12 +51,7 @@ class MissionService(Service):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._flight = host.vehicle.mission
-        self._flight.news = self._tell
-        self._flight.reached = self._tell_reached
-        self._flight.say = self._say
-        self._flight.first_number = lambda client: FIRST_LABEL
-        self._flight.spawn = host.spawn
-        self._flight.keeper.write = self._remember
+        self._flight.attach(self)
         self._saved = -math.inf
         self._unsaved = False
         self._sent: Mapping[bool, tuple[int, ...]] = {}
@@ -84,7 +81,7 @@ class MissionService(Service):
     def link_up(self) -> None:
         memory = self.host.memory
         kept = memory.settings.get(RECORD)
-        record = MissionRecord.read(kept, self._flight.progress.items)
+        record = MissionRecord.read(kept, self._flight.machine.mission.items)
         if kept is not None and record is None:
             self.host.text(Severity.WARNING, texts.MISSION_RECORD_IGNORED.fill(path=memory.path))
         self._flight.link_up(record)
@@ -98,7 +95,7 @@ class MissionService(Service):
 
     def state_changed(self) -> None:
         self._flight.on_vehicle()
-        self._tell()
+        self.mission_changed()
 
     def tick(self, now: float) -> None:
         if self._unsaved and now - self._saved >= SAVE_EVERY:
@@ -128,22 +125,24 @@ class MissionService(Service):
             raise Refused(texts.CURRENT_ITEM, texts.PARAM1_ITEM, lasting=True)
         if math.isnan(item) or item == KEEP:
             if anew == 1.0:
-                await flight.reset(command.client)
+                await flight.reset(command.right)
             return
-        await flight.choose(command.client, _ours(int(item), command.client))
+        await flight.choose(command.right, _ours(int(item), command.client))
 
     def _set_current(self, inbound: Inbound) -> None:
         """MISSION_SET_CURRENT: MISSION_CURRENT answers it, or a text."""
         client = client_of(inbound)
         self._sent = {}
-        self.host.run_action(client, self._flight.choose(client, _ours(inbound.message.seq, client)))
+        self.host.run_action(
+            client, self._flight.choose(Right(client, Extent.COMMANDED), _ours(inbound.message.seq, client))
+        )
 
     # What is told.
 
     def _current(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
         return dialect.MAVLink_mission_current_message(*_fields(vehicle)[times.flavour.zero_home])
 
-    def _tell(self) -> None:
+    def mission_changed(self) -> None:
         """Send MISSION_CURRENT to the clients for whom a field has changed.
 
         For a new item a HEARTBEAT follows. QGroundControl takes an item for flown to when a HEARTBEAT in mode Mission
@@ -161,21 +160,23 @@ class MissionService(Service):
             return None if its == before.get(flavour.zero_home) else dialect.MAVLink_mission_current_message(*its)
 
         self.host.send_by_flavour(changed)
-        current = vehicle.mission.progress.current
+        current = vehicle.mission.machine.progress.current
         if vehicle.mode is FlightMode.MISSION and current != self._sent_item:
             self.host.send_heartbeat()
         self._sent_item = current
 
-    def _tell_reached(self, item: int) -> None:
+    def item_reached(self, item: int) -> None:
+        """Send MISSION_ITEM_REACHED."""
         self.host.send_by_flavour(lambda flavour: dialect.MAVLink_mission_item_reached_message(item + offset(flavour)))
 
-    def _say(self, severity: Severity, text: Callable[[int], OperatorText]) -> None:
-        """A text to all, with the items' numbers as maps show them."""
-        self.host.text(severity, text(FIRST_LABEL))
+    def run_mission(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        """Run in the background, until the link goes down."""
+        return self.host.spawn(work)
 
     # What outlives the gateway.
 
-    def _remember(self, record: MissionRecord | None) -> None:
+    def store_record(self, record: MissionRecord | None) -> None:
+        """Store the record for a restarted gateway: at once when the mission is not flown."""
         settings = self.host.memory.settings
         if record is None:
             if settings.pop(RECORD, None) is None:
@@ -194,20 +195,21 @@ class MissionService(Service):
 
 def _fields(vehicle: Vehicle) -> Mapping[bool, tuple[int, ...]]:
     """Return the fields of MISSION_CURRENT by `Flavour.zero_home` of its receivers."""
-    progress, ids = vehicle.mission.progress, vehicle.plan_ids
-    there = progress.state is not State.NONE
-    mode = IN_MISSION_MODE if vehicle.mode is FlightMode.MISSION else NOT_IN_MISSION_MODE
+    machine, ids = vehicle.mission.machine, vehicle.plan_ids
+    there, current = machine.rest is not State.NO_MISSION, machine.progress.current
+    in_mission = vehicle.mode is FlightMode.MISSION and not machine.is_paused
+    mode = IN_MISSION_MODE if in_mission else NOT_IN_MISSION_MODE
     same = (
-        len(progress.items) if there else NO_TOTAL,
-        MAVLINK_STATES[progress.state],
+        len(machine.mission.items) if there else NO_TOTAL,
+        MAVLINK_STATES[machine.rest],
         mode if there else 0,
         ids.get(dialect.MAV_MISSION_TYPE_MISSION, 0),
         ids.get(dialect.MAV_MISSION_TYPE_FENCE, 0),
         ids.get(dialect.MAV_MISSION_TYPE_RALLY, 0),
     )
     # ArduPilot is at home, its item 0, until the mission begins or a client sets another one.
-    behind_home = progress.current + 1 if there and not progress.is_untouched else 0
-    return {False: (progress.current if there else 0, *same), True: (behind_home, *same)}
+    behind_home = current + 1 if there and not machine.is_untouched else 0
+    return {False: (current if there else 0, *same), True: (behind_home, *same)}
 
 
 def _first_number(client: Hashable) -> int:

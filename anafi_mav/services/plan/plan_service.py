@@ -37,6 +37,13 @@ logger = logging.getLogger(__name__)
 
 _ITEMS = (dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT)
 
+_CHANGES = (
+    dialect.MAVLINK_MSG_ID_MISSION_COUNT,
+    dialect.MAVLINK_MSG_ID_MISSION_CLEAR_ALL,
+    dialect.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST,
+)
+"""Messages that begin a change of a list."""
+
 
 class _ChannelPeer(Peer, frozen=True):
     """A client and the way to it."""
@@ -68,6 +75,17 @@ class PlanService(Service):
 
     def messages(self) -> Mapping[int, MessageHandler]:
         return dict.fromkeys(MESSAGES, self._receive)
+
+    def denials(self) -> Mapping[int, MessageHandler]:
+        """A client whose endpoint does not permit a change gets MISSION_ACK."""
+
+        def deny(inbound: Inbound) -> None:
+            answer = dialect.MAVLink_mission_ack_message(
+                inbound.sysid, inbound.compid, dialect.MAV_MISSION_DENIED, inbound.message.mission_type
+            )
+            self.host.send(answer, inbound.channel)
+
+        return dict.fromkeys((*_CHANGES, *_ITEMS), deny)
 
     def files(self) -> Mapping[str, ServedFile]:
         return {
@@ -229,19 +247,22 @@ class PlanService(Service):
     def _changed(self, kind: int) -> None:
         """Put an uploaded plan in force and notify all clients."""
         mission = self.host.vehicle.mission
-        if kind == MissionKind.mission_type and self._protocol.transfers[kind].opaque_id == mission.identity:
+        if (
+            kind == MissionKind.mission_type
+            and self._protocol.transfers[kind].opaque_id == mission.machine.mission.identity
+        ):
             mission.taken_again()
         self._take(kind)
-        self.host.vehicle.mission.news()
+        mission.outlet.mission_changed()
 
     def _take(self, kind: int) -> None:
         vehicle, transfer = self.host.vehicle, self._protocol.transfers[kind]
         items, identity = transfer.items, transfer.opaque_id
         vehicle.plan_ids[kind] = identity
         if kind == MissionKind.mission_type:
-            if identity != vehicle.mission.identity:
+            if identity != vehicle.mission.machine.mission.identity:
                 examined = self._mission.examined(items)
-                vehicle.mission.say(Severity.INFO, examined.words)
+                self.host.text(Severity.INFO, examined.words)
                 vehicle.mission.take(examined.neutral, identity)
         elif kind == FenceKind.mission_type:
             if items != vehicle.fence.items:

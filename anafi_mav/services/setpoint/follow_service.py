@@ -5,13 +5,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 
-from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.dropped_inputs import InputStream
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.setpoint.target_messages import sighting
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 
 
@@ -22,6 +23,7 @@ class FollowService(Service):
         super().__init__(host)
         self._flight = host.vehicle.follow
         self._flight.warn_throttled = host.warn_throttled
+        self._flight.drop = self._drop
 
     def messages(self) -> Mapping[int, MessageHandler]:
         return {dialect.MAVLINK_MSG_ID_FOLLOW_TARGET: self._target}
@@ -30,8 +32,14 @@ class FollowService(Service):
         return self._flight.subscriptions()
 
     def _target(self, inbound: Inbound) -> None:
-        seen = sighting(inbound.message)
-        if not isinstance(seen, str):
-            self._flight.receive(client_of(inbound), seen)
-        elif self._flight.engaged:
-            self.host.warn_throttled(texts.TARGET_IGNORED.fill(reason=seen))
+        if not self._flight.engaged:
+            return  # the message names no drone: others may follow its sender
+        client, seen = client_of(inbound), sighting(inbound.message)
+        reason = seen if isinstance(seen, OperatorText) else self._flight.receive(client, seen)
+        if reason is None:
+            self.host.use_input(client, InputStream.TARGET)
+        else:
+            self._drop(client, reason)
+
+    def _drop(self, client: Hashable, reason: OperatorText) -> None:
+        self.host.drop_input(client, InputStream.TARGET, reason)

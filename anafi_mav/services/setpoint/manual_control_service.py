@@ -8,13 +8,15 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Mapping
 
-from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.dropped_inputs import InputStream
 from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
+from anafi_mav.services.setpoint.stick_intent import StickIntent
 from anafi_mav.services.setpoint.stick_messages import RcChannels, manual_sticks
-from anafi_mav.vehicle.base.silence import SILENCE
+from anafi_mav.vehicle.manual_flight import Sticks
+from anafi_mav.vehicle.offboard.silence import SILENCE
 
 MAX_CLIENTS = 8
 """Clients whose channels are remembered."""
@@ -26,10 +28,9 @@ class ManualControlService(Service):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._flight = host.vehicle.manual
-        self._flight.warn_throttled = host.warn_throttled
-        self._flight.run_action = host.run_action
         self._channels: dict[Hashable, tuple[RcChannels, float]] = {}
         """By client, and when they were last said."""
+        self._intent = StickIntent()
 
     def messages(self) -> Mapping[int, MessageHandler]:
         return {
@@ -39,24 +40,35 @@ class ManualControlService(Service):
 
     def link_down(self) -> None:
         self._channels.clear()
+        self._intent.forget()
 
     def _manual_control(self, inbound: Inbound) -> None:
         sticks = manual_sticks(inbound.message)
         if isinstance(sticks, str):
-            self.host.warn_throttled(texts.MANUAL_CONTROL_IGNORED.fill(reason=sticks))
+            self.host.drop_input(client_of(inbound), InputStream.STICKS, sticks)
         elif sticks is not None:
-            self._flight.receive(client_of(inbound), sticks, overrides=flavour_of(inbound.channel).joystick_overrides)
+            self._fly(inbound, sticks)
 
     def _override(self, inbound: Inbound) -> None:
         client, now = client_of(inbound), self.host.clock.monotonic()
         before, at = self._channels.pop(client, (RcChannels(), -math.inf))
         channels = (before if now - at < SILENCE else RcChannels()).after(inbound.message)
         if isinstance(channels, str):
-            self.host.warn_throttled(texts.RC_OVERRIDE_IGNORED.fill(reason=channels))
+            self.host.drop_input(client, InputStream.STICKS, channels)
         elif channels.released:
             self._flight.silent(client)
         else:
             self._channels[client] = (channels, now)
             if len(self._channels) > MAX_CLIENTS:
                 del self._channels[next(iter(self._channels))]
-            self._flight.receive(client, channels.sticks, overrides=flavour_of(inbound.channel).joystick_overrides)
+            self._fly(inbound, channels.sticks)
+
+    def _fly(self, inbound: Inbound, sticks: Sticks) -> None:
+        """Pass sticks on; those that a person means and that are not flown are reported."""
+        client = client_of(inbound)
+        is_meant = self._intent.is_meant(client, sticks, inbound.now)
+        reason = self._flight.receive(client, sticks, overrides=flavour_of(inbound.channel).joystick_overrides)
+        if reason is None:
+            self.host.use_input(client, InputStream.STICKS)
+        elif is_meant:
+            self.host.drop_input(client, InputStream.STICKS, reason)

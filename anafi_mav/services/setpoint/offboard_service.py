@@ -5,13 +5,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Callable, Hashable, Mapping
 from typing import Any
 
-from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.dropped_inputs import InputStream
 from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.setpoint.offboard_echo import STREAMS
@@ -32,7 +31,7 @@ class OffboardService(Service):
         super().__init__(host)
         self._flight = host.vehicle.offboard
         self._flight.warn_throttled = host.warn_throttled
-        self._flight.run_action = partial(host.run_action, is_order=False)
+        self._flight.drop = self._drop
 
     def capabilities(self) -> int:
         return (
@@ -56,13 +55,18 @@ class OffboardService(Service):
 
     def _takes(self, read: Callable[[Any], Setpoint | OperatorText]) -> MessageHandler:
         def take(inbound: Inbound) -> None:
-            setpoint = read(inbound.message)
+            client, setpoint = client_of(inbound), read(inbound.message)
             if isinstance(setpoint, OperatorText):
-                objection: OperatorText | None = setpoint
+                reason: OperatorText | None = setpoint
             else:
                 guided = flavour_of(inbound.channel).guided_setpoints
-                objection = self._flight.receive(client_of(inbound), setpoint, guided=guided)
-            if objection is not None:
-                self.host.warn_throttled(texts.REFUSED.fill(what=texts.SETPOINT, reason=objection))
+                reason = self._flight.receive(client, setpoint, guided=guided)
+            if reason is None:
+                self.host.use_input(client, InputStream.SETPOINT)
+            else:
+                self._drop(client, reason)
 
         return take
+
+    def _drop(self, client: Hashable, reason: OperatorText) -> None:
+        self.host.drop_input(client, InputStream.SETPOINT, reason)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from anafi_mav.drone.events import Message
@@ -54,6 +54,9 @@ REPEATED = 0.1
 
 VIDEO_BELOW = 0.1
 """s. A pose that is requested more often than ten times a second is one that events cannot give."""
+
+SMALL_LINE = 5000.0
+"""bytes/s of a budget below which messages are left out that repeat another one. All streams of a drone take 2000."""
 
 LONGEST = 2**31 - 1
 """us. An interval is reported as an INT32; a longer one is reported as the largest INT32."""
@@ -101,7 +104,7 @@ class MessageService(Service):
         """
         self._table, self._requests = streams, requests
         defaults = {id: stream.every for id, stream in streams.items() if stream.every is not None}
-        self._intervals = Streams(defaults, without=lambda channel: flavour_of(channel).unstreamed)
+        self._intervals = Streams(defaults, without=self._unstreamed, pace=lambda channel: channel.pace)
         for id, stream in streams.items():
             self._tracker.register(id, (id,))
             for event in stream.updates:
@@ -280,6 +283,13 @@ class MessageService(Service):
                 logger.error("%s: message %d cannot be made: %r", self.host.drone.name, id, error)
         return True
 
+    def _unstreamed(self, channel: Channel) -> Collection[int]:
+        """Return the messages that a channel does not get by default."""
+        filtered = {id for id in self._table if not channel.can_stream(id)}
+        if channel.bytes_per_second is not None and channel.bytes_per_second < SMALL_LINE:
+            filtered |= {id for id, stream in self._table.items() if stream.spared}
+        return flavour_of(channel).unstreamed | filtered
+
     def _data_stream(self, inbound: Inbound) -> None:
         """REQUEST_DATA_STREAM, from clients of flavours with `data_streams`."""
         if not flavour_of(inbound.channel).data_streams:
@@ -287,7 +297,7 @@ class MessageService(Service):
         request = inbound.message
         rate = request.req_message_rate if request.start_stop else 0
         for id in data_streams.members(request.req_stream_id):
-            if id in self._table:
+            if id in self._table and inbound.channel.can_stream(id):
                 self._ask(inbound.channel, id, 1.0 / rate if rate else None)
 
     def _ask(self, channel: Channel, id: int, interval: float | None, *, wants_pictures: bool = False) -> None:
@@ -317,6 +327,8 @@ class MessageService(Service):
         stream = self._table.get(int(id)) if id == int(id) else None
         if stream is None:
             return dialect.MAV_RESULT_UNSUPPORTED
+        if not inbound.channel.can_stream(int(id)):
+            return dialect.MAV_RESULT_DENIED
         times = self._times_for(inbound.channel, int(id)).for_flavour(flavour_of(inbound.channel))
         message = stream.build(self.host.vehicle, times)
         return dialect.MAV_RESULT_TEMPORARILY_REJECTED if message is None else message
@@ -334,6 +346,8 @@ class MessageService(Service):
         id, interval = command.params[0], command.params[1]
         if id not in self._table:
             return dialect.MAV_RESULT_UNSUPPORTED
+        if not inbound.channel.can_stream(int(id)):  # what is accepted would have no effect
+            return dialect.MAV_RESULT_DENIED
         if math.isnan(interval) or interval == 0:
             self._intervals.reset(inbound.channel, int(id))
             self._sources.request(inbound.channel, int(id), wanted=False)
@@ -366,6 +380,8 @@ class MessageService(Service):
         if int(id) in self._table:
             asked = self._intervals.interval(inbound.channel, int(id))
             source = self._source(inbound.channel, int(id))
+            if asked is not None and inbound.channel.pace is not None:
+                asked *= inbound.channel.pace.slowdown
             microseconds = -1 if asked is None else min(round(max(asked, source) * 1e6), LONGEST)
         return dialect.MAVLink_message_interval_message(int(id), microseconds)
 

@@ -296,17 +296,21 @@ _POSITION = (events.GpsLocationChanged, events.AltitudeChanged, events.SpeedChan
 STREAMS: Mapping[int, MessageStream] = {
     dialect.MAVLINK_MSG_ID_ATTITUDE: MessageStream(attitude, (events.AttitudeChanged,), every=0.1, from_pictures=True),
     dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: MessageStream(
-        attitude_quaternion, (events.AttitudeChanged,), every=0.1, from_pictures=True
+        attitude_quaternion, (events.AttitudeChanged,), every=0.1, from_pictures=True, spared=True
     ),
     dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: MessageStream(
         global_position_int, _POSITION, every=0.2, from_pictures=True
     ),
     dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: MessageStream(
-        local_position_ned, _POSITION, every=0.2, from_pictures=True
+        local_position_ned, _POSITION, every=0.2, from_pictures=True, spared=True
     ),
     dialect.MAVLINK_MSG_ID_ODOMETRY: MessageStream(odometry, (events.AttitudeChanged, *_POSITION), from_pictures=True),
     dialect.MAVLINK_MSG_ID_ALTITUDE: MessageStream(
-        altitude, (events.AltitudeChanged, events.AltitudeAboveGroundChanged), every=0.2, from_pictures=True
+        altitude,
+        (events.AltitudeChanged, events.AltitudeAboveGroundChanged),
+        every=0.2,
+        from_pictures=True,
+        spared=True,
     ),
     dialect.MAVLINK_MSG_ID_VFR_HUD: MessageStream(
         vfr_hud, (events.SpeedChanged, events.AltitudeChanged), every=0.2, from_pictures=True

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
 from anafi_mav.arsdk.messages.ardrone3 import MotorError, WarningLevel
 from anafi_mav.arsdk.messages.common import FlightPlanComponent
-from anafi_mav.sim.world.quirks import Quirk
+from anafi_mav.sim.world.quirks import Quirk, Scramble
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Faults:
     """The live video shows nothing, as while a camera changes its mode; its sessions stay open."""
     storage_full: bool = False
     """No room for a photo more."""
-    quirks: frozenset[Quirk] = frozenset()
+    quirks: frozenset[Quirk | Scramble] = frozenset()
     """Ways in which this firmware differs from the simulated one."""
     untold: frozenset[str] = frozenset()
     """Names of events that this firmware does not send, at once, telemetry included: what is not written down another

@@ -7,7 +7,9 @@ contradict each other, a quirk is the other reading, so that a controller can be
 from __future__ import annotations
 
 import enum
+import re
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 from anafi_mav.errors import ConfigError
 
@@ -62,16 +64,34 @@ class Quirk(enum.Enum):
     ROLL_INVERTED = ("roll-inverted", "AttitudeChanged.roll is positive with the left wing down")
 
 
+@dataclass(frozen=True)
+class Scramble:
+    """The quirk with a number: events late, twice and in another order (`scramble`)."""
+
+    seed: int
+
+
 QUIRKS = {quirk.value: quirk for quirk in Quirk}
-"""Quirks by name."""
+"""Quirks without a number, by name."""
+
+SCRAMBLE = "scramble:SEED"
+"""Form of the name of a `Scramble`."""
+
+EXPECTED = f"{', '.join(QUIRKS)}, {SCRAMBLE}"
+"""Names for a help text or an error."""
 
 
-def named(names: Iterable[str], key_path: str) -> frozenset[Quirk]:
+def named(names: Iterable[str], key_path: str) -> frozenset[Quirk | Scramble]:
     """Return the quirks with these names.
 
     Raises `ConfigError` at `key_path` for an unknown name.
     """
-    for name in (names := tuple(names)):
-        if name not in QUIRKS:
-            raise ConfigError(key_path, f"expected one of {', '.join(QUIRKS)}, got {name[:60]!r}")
-    return frozenset(QUIRKS[name] for name in names)
+    return frozenset(_named(name, key_path) for name in names)
+
+
+def _named(name: str, key_path: str) -> Quirk | Scramble:
+    if name in QUIRKS:
+        return QUIRKS[name]
+    if seed := re.fullmatch(r"scramble:([0-9]{1,9})", name):
+        return Scramble(int(seed[1]))
+    raise ConfigError(key_path, f"expected one of {EXPECTED}, got {name[:60]!r}")

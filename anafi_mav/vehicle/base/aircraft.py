@@ -11,21 +11,22 @@ from __future__ import annotations
 import asyncio
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Mapping
 
 from anafi_mav import texts
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import FlyingState, PilotingStyleStyle
 from anafi_mav.texts import OperatorText
+from anafi_mav.vehicle.base.control import Control
+from anafi_mav.vehicle.base.flight_task import Needs
 from anafi_mav.vehicle.base.flying import AIRBORNE, ON_GROUND
 from anafi_mav.vehicle.base.geo_point import GeoPoint, point_of
 from anafi_mav.vehicle.base.height import HeightReference
-from anafi_mav.vehicle.base.helm import Helm
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.move_heading import MoveHeading
-from anafi_mav.vehicle.base.right import Right
-from anafi_mav.vehicle.base.roll_sign import RollCheck
+from anafi_mav.vehicle.base.requester import By
+from anafi_mav.vehicle.base.roll_sign import RollCheck, RollSign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.fence_watch import FenceWatch, OutsideFence
 
@@ -34,13 +35,6 @@ POSITION_OLD = 3.0
 
 LOCATIONS_MISSED = 3
 """A drone that reports its location more rarely (a slowed simulator) may miss as many."""
-
-STOP_WAIT = 0.5
-"""s that a stopping command waits for the action that it replaces.
-
-An action that has not ended by then can send nothing.
-"""
-
 
 _ACTIVITIES: Mapping[FlyingState | None, OperatorText] = {
     FlyingState.LANDED: texts.ON_GROUND,
@@ -87,13 +81,7 @@ class Aircraft(ABC):
         self.text = text
         self.changed = changed
         """Notifies that mode, armed state or health may have changed."""
-        self.helms: tuple[Helm, ...] = ()
-        """Flight tasks that need continuous setpoints or stick input; at most one is active."""
-        self.mode_client: Hashable = None
-        """Client that chose the selected mode by name or number; None for modes selected otherwise."""
-        self.paused = False
-        """A client has paused: setpoints of every client are ignored until a command or another mode ends it."""
-        self._selected = FlightMode.HOLD
+        self.control = Control(self)
         self._clock = clock
         self._located_at = -math.inf
         """When the newest GPS location arrived."""
@@ -149,11 +137,6 @@ class Aircraft(ABC):
     @abstractmethod
     def mode(self) -> FlightMode:
         """The present flight mode of the drone."""
-
-    @property
-    def selected(self) -> FlightMode:
-        """The mode that was selected; `mode` is the one that the drone flies."""
-        return self._selected
 
     @property
     def position_is_old(self) -> bool:
@@ -212,6 +195,21 @@ class Aircraft(ABC):
         """
         return self.drone.piloting.state.style == PilotingStyleStyle.CAMERA_OPERATED
 
+    def lacking(self, needs: Needs) -> OperatorText | None:
+        """Return the first condition that is not met, as the reason of a refusal; None: all are."""
+        drone = self.drone
+        if Needs.NO_DESCENT in needs and (descent := self.descent) is not None:
+            return descent
+        unmet: tuple[tuple[Needs, bool, OperatorText], ...] = (
+            (Needs.IN_AIR, not self.in_air, texts.NOT_IN_AIR),
+            (Needs.FIX, self.place is None, texts.NO_FIX),
+            (Needs.NO_PILOT, drone.controller.pilot_acquired_control, texts.PILOT),
+            (Needs.LIMITS, drone.piloting.limits is None, texts.TILT_UNKNOWN),
+            (Needs.PLAIN_STICKS, self.sticks_follow_camera, texts.STICKS_FOLLOW_CAMERA),
+            (Needs.ROLL_SIGN, self.roll.sign is RollSign.INVERTED, texts.ROLL_INVERTED),
+        )
+        return next((reason for need, is_unmet, reason in unmet if need in needs and is_unmet), None)
+
     def prearm_problems(self) -> list[OperatorText]:
         """Return the reasons why the drone would not take off, in sentences; empty without any."""
         problems: list[OperatorText] = []
@@ -237,42 +235,12 @@ class Aircraft(ABC):
     # What everybody who flies it needs. Each verb returns when the drone confirmed, or raises.
 
     @abstractmethod
-    async def take_over(self, limit: float | None = None) -> None:
-        """Replace the action under way, and wait for its end: `limit` s at most.
-
-        From now on the replaced action sends only commands that stop something, and after the wait nothing at all.
-        Without the wait an aborted move could cancel the one that follows it. Raises `Refused` while the motors are
-        being cut.
-        """
-
-    @abstractmethod
-    async def hold(self, mode: FlightMode = FlightMode.HOLD, by: Right | None = None) -> None:
+    async def hold(self, mode: FlightMode, by: By) -> None:
         """Stop and hover, in mode Hold, Guided or Position.
 
-        A landing or return continues unless `by` ends it.
+        A landing or return continues unless `by` may end it.
         """
 
     @abstractmethod
-    async def terminate(self) -> None:
+    async def terminate(self, by: By) -> None:
         """Cut the motors, if the configuration allows it at all."""
-
-    def select(self, mode: FlightMode, helm: Helm | None = None) -> None:
-        """Select a mode; it stays selected until the next selection.
-
-        Ends every flight task that flies by setpoints or stick input, except the one passed.
-        """
-        self.end_helms(helm)
-        self._selected, self.mode_client = mode, None
-        self.paused = False
-        self.changed()
-
-    def forget_mode(self) -> None:
-        """Forget the selected mode: until another one is selected, the vehicle holds."""
-        self._selected, self.mode_client = FlightMode.HOLD, None
-
-    def end_helms(self, helm: Helm | None = None) -> list[asyncio.Task[None]]:
-        """End every flight task (setpoints, stick input) except the one passed.
-
-        Returns the tasks that are about to end.
-        """
-        return [task for one in self.helms if one is not helm for task in one.end()]

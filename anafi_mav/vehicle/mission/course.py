@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 from anafi_mav.plans.translation.translate import Cursor, FlightPlanFile, GatewayStep
 
 
+@dataclass(frozen=True)
 class Course:
-    """The remaining parts of a mission, beginning with the one that is flown.
+    """The remaining parts of a mission, beginning with the one that is flown."""
 
-    The rest that was too long to be laid out at once follows them.
-    """
-
-    def __init__(
-        self, parts: Iterable[FlightPlanFile | GatewayStep] = (), rest: Cursor | None = None, later: int | None = None
-    ) -> None:
-        self.parts = [*parts]
-        self.rest = rest
-        self.later = later
-        """The item behind all this, which is not flown without another word."""
+    parts: tuple[FlightPlanFile | GatewayStep, ...] = ()
+    rest: Cursor | None = None
+    """Where the mission continues behind the parts, when it was too long to be laid out at once."""
+    later: int | None = None
+    """The item behind all this, which is not flown without a client's command."""
 
     @property
     def over(self) -> bool:
-        """Nothing is left that is flown without another word."""
+        """True when no remaining part starts by itself."""
         return not self.parts and self.rest is None
 
     @property
@@ -32,22 +28,23 @@ class Course:
         return len(self.parts) > 1 or self.rest is not None or any(isinstance(part, GatewayStep) for part in self.parts)
 
     @property
+    def first(self) -> int | None:
+        """The item that the first part begins with; None when no part starts by itself."""
+        if not self.parts:
+            return None if self.rest is None else self.rest.item
+        head = self.parts[0]
+        return head.item if isinstance(head, GatewayStep) else head.origins[0]
+
+    @property
     def following(self) -> int | None:
         """The item behind the part that is flown; None: nothing follows."""
-        item = self._first_of(self.parts[1:])
+        item = self.without_first().first
         return self.later if item is None else item
 
-    def part_over(self) -> int | None:
-        """The first part is flown. Returns the item that follows without another word."""
-        del self.parts[:1]
-        return self._first_of(self.parts)
+    def without_first(self) -> Course:
+        """Return the course once its first part is flown."""
+        return replace(self, parts=self.parts[1:])
 
-    def end_with_this_part(self) -> None:
-        """The drone may fly on with the file that it has; what follows is not begun."""
-        self.later = self.following
-        self.parts, self.rest = self.parts[:1], None
-
-    def _first_of(self, parts: list[FlightPlanFile | GatewayStep]) -> int | None:
-        if not parts:
-            return None if self.rest is None else self.rest.item
-        return parts[0].item if isinstance(parts[0], GatewayStep) else parts[0].origins[0]
+    def ending_with_this_part(self) -> Course:
+        """Return the course of a drone without a link: its file. The parts behind it do not start."""
+        return Course(self.parts[:1], later=self.following)

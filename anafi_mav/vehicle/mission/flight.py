@@ -1,221 +1,385 @@
-"""Flies a mission: the shell around the cores `progress` and `plans.translation.translate`.
+"""Flies a mission: performs the effects of `MissionMachine`, which decides.
 
 What the drone can fly by itself it flies from a file (`FlightPlanFile`); what it cannot, the gateway flies between
-two files (`Step`). The drone says which line it has executed, and nothing else counts. Whatever takes the drone over
-stops the mission, and nothing but a client's word lets it go on.
+two files (`FlyItem`). The drone reports which line it has executed, and nothing else counts. Another flight task, a
+landing or a return pauses the mission, and only a client's command resumes it.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Coroutine, Hashable, Sequence
-from typing import Any
+from collections.abc import Coroutine, Hashable, Sequence
+from typing import Any, Protocol
 
 from anafi_mav import texts
+from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import events
-from anafi_mav.drone.events import FlyingState, Message, PlayingState
-from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
+from anafi_mav.drone.events import AlertState, FlyingState, ForcedLandingReason, Message, PlayError, PlayingState
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import FlightPlanFile
-from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.flight_task import Needs, PlainTask, TaskRules
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import DroneRefused, Refused, not_ready, reason_of, text_of
+from anafi_mav.vehicle.base.right import Right
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.mission.course import Course
+from anafi_mav.vehicle.mission.effects import (
+    Acquire,
+    Announce,
+    DroneReport,
+    Effect,
+    Failure,
+    FlyItem,
+    MissionAttempt,
+    Persist,
+    Prepare,
+    Prepared,
+    Reached,
+    Release,
+    Select,
+    SendText,
+    StartFile,
+    Suspend,
+    Work,
+)
 from anafi_mav.vehicle.mission.files import FilesOnDrone
-from anafi_mav.vehicle.mission.path import WayPoint, check_path, lay_out, way_points
-from anafi_mav.vehicle.mission.progress import ENDINGS, MissionProgress, State
-from anafi_mav.vehicle.mission.record import Keeper, MissionRecord
+from anafi_mav.vehicle.mission.machine import PROOF, MissionMachine, State
+from anafi_mav.vehicle.mission.path import check_path, lay_out
+from anafi_mav.vehicle.mission.record import MissionRecord
 from anafi_mav.vehicle.mission.steps import fly_step
-from anafi_mav.vehicle.mission.texts import beginning, refusal
-from anafi_mav.vehicle.mission.waits import ARM_WAIT, PROOF, ArmWait, EndWatch, StoreWait
+from anafi_mav.vehicle.mission.store_wait import StoreWait
+from anafi_mav.vehicle.mission.texts import FIRST_LABEL, beginning, refusal
 
 _LANDING = (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING)
 
 
-class MissionFlight:
+class MissionOutlet(Protocol):
+    """Clients and memory, as a mission that is flown needs them."""
+
+    def mission_changed(self) -> None:
+        """Send MISSION_CURRENT, if it has changed."""
+
+    def item_reached(self, item: int) -> None:
+        """Report an item as reached."""
+
+    def store_record(self, record: MissionRecord | None) -> None:
+        """Store the record for a restarted gateway; None: delete it."""
+
+    def run_mission(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        """Run in the background, until the link goes down."""
+
+
+class MissionFlight(PlainTask):
     """Flies the mission of one vehicle; its flight task in mode Mission."""
 
-    def __init__(self, vehicle: Aircraft) -> None:
-        self.progress = MissionProgress()
-        self.identity = 0
-        """The opaque id of the mission."""
-        self.news: Callable[[], None] = lambda: None
-        """Says that MISSION_CURRENT has changed."""
-        self.reached: Callable[[int], None] = lambda item: None
-        """Says that an item is done."""
-        self.say: Callable[[Severity, Callable[[int], OperatorText]], None] = lambda severity, text: None
-        """A text to everybody; it is made from what they call item 0."""
-        self.first_number: Callable[[Hashable], int] = lambda client: 0
-        """Returns the number that a client gives item 0."""
-        self.spawn: Callable[[Coroutine[Any, Any, None]], asyncio.Task[None]] | None = None
-        """Runs something until the link goes down."""
-        self.keeper = Keeper()
-        """Remembers what is needed to know the drone's plan again."""
-        self._vehicle = vehicle
-        self._course = Course()
-        self._uid = ""
-        """Of the file that the drone flies, or flew last."""
-        self._left: tuple[FlightPlanFile, int, dict[int, int]] | None = None
-        """The drone has it paused, and the mission is to begin elsewhere next: file, last line, jumps."""
-        self._starting: tuple[FlightPlanFile, int] | None = None
-        """File that the drone is commanded to begin, and the line before; None also once withdrawn."""
-        self._taken_meanwhile = False
-        """While it was asked, the same mission was uploaded again."""
-        self._files = FilesOnDrone(vehicle.drone.flight_plan)
+    rules = TaskRules(texts.MISSION, needs=Needs.NO_PILOT)
+    mode = FlightMode.MISSION
+
+    def __init__(self, vehicle: Aircraft, clock: Clock) -> None:
+        self.machine = MissionMachine()
         self.storing = StoreWait()
-        self._arming = ArmWait(self._lapsed)
-        self._beginning = False
-        """Taken over by ourselves."""
-        self._running: asyncio.Task[None] | None = None
-        """Task of the gateway between two files."""
-        self._end_watch = EndWatch(vehicle, self.progress, self._ended)
-        self._may_end_late = False
-        """True while a report of the last line completes a mission that was paused because the drone stopped its plan.
+        self._vehicle = vehicle
+        self._clock = clock
+        self._files = FilesOnDrone(vehicle.drone.flight_plan)
+        self._alarm = Alarm(self._on_alarm)
+        self._outlet: MissionOutlet | None = None
+        self._background: asyncio.Task[None] | None = None
+        """Runs the machine's work when no command of a client does."""
 
-        Nothing has been played since, so that such a report is of that flight.
-        """
+    def attach(self, outlet: MissionOutlet) -> None:
+        """Report to clients and memory from now on."""
+        self._outlet = outlet
 
-    # What clients ask for.
+    @property
+    def outlet(self) -> MissionOutlet:
+        assert self._outlet is not None, "attached by the service, without which no client requests a mission"
+        return self._outlet
+
+    # Requests of clients.
 
     def take(self, items: Sequence[Item], identity: int) -> None:
-        """Another mission was uploaded, or none any more.
-
-        One that is flown is stopped: it is not the mission now.
-        """
-        if identity == self.identity:
-            return
-        known, self.identity = self.identity != 0, identity
-        why = texts.MISSION_REPLACED if items else texts.MISSION_CLEARED
-        flown, starting, self._starting = self.flying, self._starting is not None, None
-        if flown:
-            self._stop(why)
-        elif starting and self._running is not None:  # what it began for was answered long ago
-            self._vehicle.text(Severity.WARNING, texts.MISSION_NOT_STARTED.fill(reason=why))
-        if flown or starting:
-            self._suspend(starting=starting)
-            self._vehicle.select(FlightMode.HOLD)
-        self.progress.take(items)
-        self._left, self._course = None, Course()
-        self._drop_pending()
-        if known:  # else it has just been read, and what was kept of it has not been looked at
-            self.keeper.forget()
+        """Fly another mission from now on, or (no items) none. One that is flown is stopped."""
+        if identity != self.machine.mission.identity:
+            self._handle(self.machine.upload(items, identity, self._now))
 
     def taken_again(self) -> None:
-        """The same mission was uploaded once more.
+        """The same mission was uploaded once more: a flight continues, else it is a new mission."""
+        self._handle(self.machine.upload_again())
 
-        One that is flown goes on undisturbed; else it is a new one.
-        """
-        starting, current = self._starting, self.progress.current
-        if starting is not None:
-            leg, line = starting
-            current, self._taken_meanwhile = leg.origins[line + 1], True
-        if starting is not None or self.progress.state is State.ACTIVE:
-            self.say(Severity.INFO, lambda first: texts.MISSION_SAME.fill(item=current + first))
-            return
-        self._anew()
-
-    def _anew(self) -> None:
-        """Nothing of it has been flown, but for a file that the drone has paused."""
-        self._leave()
-        self.progress.take(self.progress.items)
-        self.keeper.forget()
-
-    def _leave(self) -> None:
-        """Remember the paused file before the mission begins elsewhere.
-
-        Another controller may still let the drone resume it.
-        """
-        progress = self.progress
-        if progress.state is State.PAUSED and progress.leg is not None:
-            self._left = progress.leg, progress.line, dict(progress.jumps)
-
-    async def engage(self, client: Hashable, item: int | None = None) -> None:
+    async def engage(self, by: Right, item: int | None = None) -> None:
         """Begin mode Mission, resume it or fly it from an item on; returns when the drone flies it.
 
         On the ground and disarmed it waits until this client arms. Raises `Refused`, or the error by which the drone
         refused.
         """
         await self.storing.over()
-        progress, vehicle = self.progress, self._vehicle
-        if progress.state is State.NONE:
+        machine, vehicle = self.machine, self._vehicle
+        if not self.there:
             raise Refused(texts.MISSION, texts.NO_MISSION)
-        if progress.state is State.ACTIVE and item is None:
-            return  # it is flown, and goes on without a jolt
+        if machine.flying and item is None:
+            return  # it is flown, and is not interrupted
         self._require_freedom()
         if vehicle.armed:
-            chosen = item is not None
-            await self._begin(progress.first if item is None else item, self.first_number(client), anew=chosen)
+            attempt = machine.attempt(item)
+            await self._work(Prepare(attempt), by)
+            self._require_same(attempt)
             return
         if problems := vehicle.prearm_problems():
             raise not_ready(problems)
-        await vehicle.take_over()
-        vehicle.select(FlightMode.MISSION, self)
-        self._arming.begin(client)
+        async with vehicle.control.acquire(self, by=by):
+            pass
+        self._handle(machine.await_arm(by.client, self._now))
+        if machine.state is not State.AWAIT_ARM:
+            raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
 
-    async def choose(self, client: Hashable, item: int) -> None:
-        """Make an item the current one; a mission that is flown goes on there."""
+    async def choose(self, by: Right, item: int) -> None:
+        """Make an item the current one; a mission that is flown, or about to be, continues there."""
         await self.storing.over()
-        if self.progress.state is State.NONE:
+        if not self.there:
             raise Refused(texts.CURRENT_ITEM, texts.NO_MISSION)
-        if not 0 <= item < len(self.progress.items):
-            number = item + self.first_number(client)
-            raise Refused(texts.CURRENT_ITEM, texts.NO_SUCH_ITEM.fill(number=number), lasting=True)
-        if self.progress.state is State.ACTIVE:
-            await self.engage(client, item)
+        if not 0 <= item < len(self.machine.mission.items):
+            raise Refused(texts.CURRENT_ITEM, texts.NO_SUCH_ITEM.fill(number=item + FIRST_LABEL), lasting=True)
+        if self.machine.flying or self.machine.state in (State.PREPARING, State.TAKING_OVER, State.STARTING):
+            await self.engage(by, item)
         else:
-            self._leave()
-            self.progress.choose(item)
-            self._keep()
-            self.news()
+            self._handle(self.machine.choose(item))
 
-    async def reset(self, client: Hashable) -> None:
-        """Reset every jump counter; the current item stays.
-
-        After the end the mission begins again.
-        """
-        progress = self.progress
-        if progress.state is State.COMPLETE:
-            await self.choose(client, 0)
-        elif progress.jumps and not progress.ending:
-            await self.choose(client, progress.current)
+    async def reset(self, by: Right) -> None:
+        """Reset every jump counter; the current item stays. After the end the mission begins again."""
+        progress = self.machine.progress
+        if self.machine.rest is State.COMPLETE:
+            await self.choose(by, 0)
+        elif progress.jumps and not self.ending:
+            await self.choose(by, progress.current)
 
     def armed(self, client: Hashable) -> None:
-        """A client has armed: what waited for that begins."""
-        if self._arming.ends_with(client):
-            self._run(self._begin_and_report(self.first_number(client)))
+        """A client has armed: the mission that waits for that begins."""
+        self._handle(self.machine.armed(client, storing=self.storing.is_active))
+
+    # The state, for others.
 
     @property
     def there(self) -> bool:
-        """There is a mission."""
-        return self.progress.state is not State.NONE
+        """True when a mission is stored."""
+        return bool(self.machine.mission.items)
 
     @property
     def flying(self) -> bool:
-        """It is flown."""
-        return self.progress.state is State.ACTIVE
+        """True while the mission is flown."""
+        return self.machine.flying
 
     @property
     def paused(self) -> bool:
-        """It was begun and stopped."""
-        return self.progress.state is State.PAUSED
+        """True when the mission was begun and stopped."""
+        return self.machine.rest is State.PAUSED
 
     @property
     def ending(self) -> bool:
-        """A landing or a return that begins now is the plan's own."""
-        return self.progress.ending
+        """True when a landing or a return that begins now is the plan's own."""
+        return self.machine.ending
+
+    @property
+    def owns_descent(self) -> bool:
+        return self.ending
 
     @property
     def returns(self) -> bool:
-        """A return that begins now is that of the mission's last item, done already or about to be."""
-        drone = self._vehicle.drone
-        by_plan = drone.home.state.reason == events.ReturnReason.FLIGHTPLAN and drone.flight_plan.state.uid == self._uid
-        return self.progress.ending or (by_plan and self.progress.returned)
+        """True when a return that begins now is that of the mission's last item."""
+        drone, machine = self._vehicle.drone, self.machine
+        by_plan = drone.home.state.reason == events.ReturnReason.FLIGHTPLAN
+        same = drone.flight_plan.state.uid == machine.progress.uid
+        return machine.ending or (by_plan and same and machine.returned)
 
-    # The beginning.
+    # Effects.
+
+    @property
+    def _now(self) -> float:
+        return self._clock.monotonic()
+
+    def _handle(self, effects: Sequence[Effect]) -> None:
+        """Perform effects; work among them is done in the background."""
+        if (work := self._perform(effects)) is not None:
+            self._background = self.outlet.run_mission(self._report_failure(work))
+
+    def _perform(self, effects: Sequence[Effect]) -> Work | None:
+        """Perform effects at once; return the one that takes time, the last one of any event."""
+        vehicle, work = self._vehicle, None
+        for effect in effects:
+            match effect:
+                case Select():
+                    if vehicle.control.active is not self:
+                        vehicle.control.adopt(self)
+                case Release():
+                    self._release()
+                case Suspend():
+                    self._suspend(starting=effect.starting)
+                case SendText():
+                    vehicle.text(effect.severity, effect.text)
+                case Announce():
+                    returns = vehicle.drone.flight_plan.state.returns_on_disconnect
+                    text = beginning(effect.item, effect.resumes, stepped=effect.stepped, returns=returns)
+                    vehicle.text(Severity.INFO, text)
+                case Reached():
+                    self.outlet.item_reached(effect.item)
+                case Persist():
+                    self.outlet.store_record(effect.record)
+                case _:
+                    work = effect
+        if (deadline := self.machine.deadline()) is None:
+            self._alarm.cancel()
+        elif deadline != self._alarm.at:
+            self._alarm.set(deadline)
+        if self._outlet is not None:
+            self._outlet.mission_changed()
+        return work
+
+    def _release(self) -> None:
+        """Leave mode Mission, if it is the mode: another flight task may be active by now."""
+        self._cancel_background()
+        self._vehicle.control.release(self)
+
+    def _cancel_background(self) -> list[asyncio.Task[None]]:
+        task = self._background
+        if task is None or task.done() or task is asyncio.current_task():
+            return []
+        task.cancel()
+        return [task]
+
+    def _suspend(self, *, starting: bool) -> None:
+        """Command the drone to pause its file. A landing or a return of its own is not disturbed."""
+        vehicle = self._vehicle
+        if starting or (vehicle.flying_state not in _LANDING and not vehicle.returning):
+            with contextlib.suppress(LinkLost):
+                vehicle.drone.flight_plan.suspend()
+
+    # Work.
+
+    async def _report_failure(self, work: Work) -> None:
+        """Do work whose failure the machine has reported as a text: no command waits for it."""
+        with contextlib.suppress(AnafiMavError):
+            await self._work(work)
+
+    async def _work(self, work: Work | None, by: Right | None = None) -> None:
+        """Do the machine's work until the drone flies. The gateway's items are flown in background.
+
+        `by`: the client that requests it; None: the mission goes on by itself, or its client has armed.
+        """
+        while work is not None:
+            attempt = work.attempt
+            try:
+                effects = await self._result_of(work, by)
+            except CommandTimeout as error:
+                self._handle(self.machine.withdrawn(attempt, _failure(error), self._now))
+                raise
+            except AnafiMavError as error:
+                self._handle(self.machine.failed(attempt, _failure(error), self._now))
+                self._require_same(attempt)
+                raise
+            except BaseException:
+                self._handle(self.machine.withdrawn(attempt, None, self._now))
+                raise
+            work = self._perform(effects)
+            if isinstance(work, FlyItem):
+                self._handle([work])
+                return
+
+    async def _result_of(self, work: Work, by: Right | None) -> list[Effect]:
+        """Do one piece of work; return the effects of its result."""
+        machine, attempt = self.machine, work.attempt
+        match work:
+            case Prepare():
+                if attempt.unattended:
+                    await self.storing.over()
+                held = machine.holds(attempt)  # not if a new mission was stored meanwhile, which has its own attempt
+                effects = machine.prepared(attempt, await self._prepare(attempt)) if held else []
+            case Acquire():
+                effects = await self._acquire(attempt, by, resumes=work.resumes)
+            case StartFile():
+                await self._start(work.uid, work.line)
+                return machine.confirmed(attempt)
+            case FlyItem():
+                await fly_step(self._vehicle, attempt.mission.items[work.item])
+                return machine.item_flown(attempt)
+        if not effects:
+            self._require_same(attempt)
+            raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
+        return effects
+
+    async def _prepare(self, attempt: MissionAttempt) -> Prepared:
+        """Lay out the parts, check them, and load the first file, without disturbing the flight."""
+        vehicle, plan, items = self._vehicle, self._vehicle.drone.flight_plan, attempt.mission.items
+        progress, course, line = self.machine.progress, attempt.course, -1
+        resumes = course is None and self._resumes(attempt)
+        if resumes:
+            course, line = progress.course, progress.line
+        elif course is None:
+            course = await self._laid_out(items, attempt.item, attempt)
+        elif not course.parts and course.rest is not None:
+            course = await self._laid_out(items, course.rest, attempt)
+        if attempt.course is None or course is not attempt.course:
+            await check_path(vehicle, course.parts, line)
+        head = course.parts[0]
+        if resumes or not isinstance(head, FlightPlanFile):
+            return Prepared(course, progress.uid if resumes else "", line, resumes)
+        if attempt.course is None and plan.state.playing == PlayingState.PAUSED:
+            await plan.stop()  # some firmware may take no file while another one is paused (GroundSDK stops first)
+        leg, uid, line = await self._files.beginning_with(head, items)
+        return Prepared(Course((leg, *course.parts[1:]), course.rest, course.later), uid, line)
+
+    async def _laid_out(self, items: Sequence[Item], first: Any, attempt: MissionAttempt) -> Course:
+        parts, rest = await lay_out(self._vehicle, items, first, attempt.jumps)
+        return Course(tuple(parts), rest)
+
+    def _resumes(self, attempt: MissionAttempt) -> bool:
+        """The drone hovers, with the rest of what is to be flown in its memory."""
+        machine, progress, plan = self.machine, self.machine.progress, self._vehicle.drone.flight_plan.state
+        paused = plan.playing == PlayingState.PAUSED and plan.uid == progress.uid
+        whole = progress.leg is not None and progress.course.later is None
+        same = machine.rest is State.PAUSED and attempt.item == progress.current and attempt.jumps == progress.jumps
+        return same and whole and paused and self._vehicle.in_air
+
+    async def _acquire(self, attempt: MissionAttempt, by: Right | None, *, resumes: bool) -> list[Effect]:
+        """Acquire control, and hover; return the effects of the grant.
+
+        Without a client the mission has control since its mode was chosen. A mission that was replaced meanwhile
+        does not become active.
+        """
+        control = self._vehicle.control
+        if by is None and control.active is not self:
+            raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
+        async with contextlib.nullcontext() if by is None else control.acquire(self, by=by):
+            await self._stop(resumes=resumes)
+            if by is None and control.active is not self:
+                raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
+            if not (effects := self.machine.granted(attempt)):
+                self._require_same(attempt)
+                raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
+        return effects
+
+    async def _stop(self, *, resumes: bool) -> None:
+        """End the moves, a commanded return and another plan; check the drone again."""
+        vehicle, plan = self._vehicle, self._vehicle.drone.flight_plan
+        if vehicle.in_air:
+            await vehicle.drone.piloting.stop()
+            await vehicle.drone.piloting.cancel_return_home()
+        if not resumes and plan.state.playing not in (None, PlayingState.STOPPED):
+            await plan.stop()
+        self._require_freedom()
+        if not vehicle.armed:
+            raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
+
+    async def _start(self, uid: str, line: int) -> None:
+        """Command the drone to fly a file, or to resume it; returns when it does."""
+        plan = self._vehicle.drone.flight_plan
+        goes_on = plan.state.returns_on_disconnect is False if plan.starts_anywhere else None
+        try:
+            await plan.start(uid, line + 1 if plan.starts_anywhere else 0, continue_on_disconnect=goes_on)
+        except CommandRejected as error:
+            raise DroneRefused(refusal(plan.state, error)) from error
 
     def _require_freedom(self) -> None:
         vehicle = self._vehicle
@@ -223,415 +387,96 @@ class MissionFlight:
             raise Refused(texts.MISSION, texts.LANDS)
         if vehicle.returning_by_itself:
             raise Refused(texts.MISSION, texts.RETURNS_BY_ITSELF)
-        if vehicle.drone.controller.pilot_acquired_control:
-            raise Refused(texts.MISSION, texts.PILOT)
+        if (reason := vehicle.lacking(self.rules.needs)) is not None:
+            raise Refused(texts.MISSION, reason)
         if not vehicle.in_air and not vehicle.on_ground:
             raise Refused(texts.MISSION, vehicle.activity)
 
-    def _resumes(self, item: int) -> bool:
-        """The drone hovers, with the rest of what is to be flown in its memory."""
-        progress, plan = self.progress, self._vehicle.drone.flight_plan.state
-        paused = plan.playing == PlayingState.PAUSED and plan.uid == self._uid
-        whole = progress.leg is not None and self._course.later is None
-        same = progress.state is State.PAUSED and item == progress.current
-        return same and whole and paused and self._vehicle.in_air
-
-    async def _begin(self, item: int, number: int, *, anew: bool = False, waited: bool = False) -> None:
-        """Fly from an item on.
-
-        Nothing is disturbed before all is known to be good. `number` is that of the first item.
-
-        With the loop reset (keyword) every loop has all its repetitions before it, else those that were left when the
-        mission was stopped. `waited`: the flight task was acquired when the mode was chosen, and the drone has stood
-        since.
-        """
-        vehicle, progress, plan = self._vehicle, self.progress, self._vehicle.drone.flight_plan
-        items, resumes, uid = progress.items, self._resumes(item), self._uid
-        jumps = {} if anew else progress.jumps
-        if resumes:
-            course, line = self._course, progress.line
-        else:
-            course, line = Course(*await lay_out(vehicle, items, item, number, jumps)), -1
-        await check_path(vehicle, course.parts, line, number)
-        head = course.parts[0]
-        if not resumes and isinstance(head, FlightPlanFile):
-            if plan.state.playing == PlayingState.PAUSED:
-                await plan.stop()  # some firmware may take no file while another one is paused (GroundSDK stops first)
-            head, uid, line = await self._files.beginning_with(head, items)
-            course.parts[0] = head
-        self._beginning = True
-        try:
-            if not waited:
-                await vehicle.take_over()
-            if vehicle.in_air:
-                await vehicle.drone.piloting.stop()
-                await vehicle.drone.piloting.cancel_return_home()
-            if not resumes and plan.state.playing not in (None, PlayingState.STOPPED):
-                await plan.stop()
-        finally:
-            self._beginning = False
-        self._require_freedom()
-        if progress.items is not items or not vehicle.armed:
-            raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
-        vehicle.select(FlightMode.MISSION, self)
-        self._left, self._course = None, course
-        if not resumes:
-            progress.jumps = {**jumps}
-        try:
-            if isinstance(head, FlightPlanFile):
-                await self._play(head, uid, line)
-                self._require_same(items)
-            else:
-                progress.fly(head.item)
-                self._run(self._go_on())
-        except BaseException as error:
-            if progress.state is not State.ACTIVE:
-                vehicle.select(FlightMode.HOLD)
-                if self._taken_meanwhile and progress.items is items:
-                    self._anew()
-                    self.news()
-            if isinstance(error, CommandRejected):
-                self._require_same(items)
-            raise
-        self._announce(resumes)
-
-    def _require_same(self, items: Sequence[Item]) -> None:
-        if self.progress.items is not items:
+    def _require_same(self, attempt: MissionAttempt) -> None:
+        if self.machine.mission is not attempt.mission:
             why = texts.MISSION_REPLACED_MEANWHILE if self.there else texts.MISSION_CLEARED_MEANWHILE
             raise Refused(texts.MISSION, why)
 
-    async def _play(self, leg: FlightPlanFile, uid: str, line: int) -> None:
-        """Begin a file, or go on with it; returns when the drone flies it."""
-        plan = self._vehicle.drone.flight_plan
-        goes_on = plan.state.returns_on_disconnect is False if plan.starts_anywhere else None
-        self._uid, self._starting, self._taken_meanwhile = uid, (leg, line), False
-        try:
-            await plan.start(uid, line + 1 if plan.starts_anywhere else 0, continue_on_disconnect=goes_on)
-            if self._starting is not None:
-                self.progress.begin(leg, line)
-        except CommandRejected as error:
-            raise DroneRefused(refusal(plan.state, error)) from error
-        finally:
-            self._starting = None
-        self._keep()
-        self.news()
-
-    async def _begin_and_report(self, number: int) -> None:
-        """Begin the mission after the wait for arming; failures are sent as texts.
-
-        The command that chose it was answered long ago.
-        """
-        try:
-            await self.storing.over()
-            await self._begin(self.progress.first, number, waited=True)
-        except AnafiMavError as error:
-            self._vehicle.text(Severity.ERROR, text_of(error))
-            if self._is_chosen_only:
-                self._vehicle.select(FlightMode.HOLD)
-
-    @property
-    def _is_chosen_only(self) -> bool:
-        """The mode is Mission, and nothing of the mission is flown."""
-        return self._vehicle.selected is FlightMode.MISSION and not self.flying
-
-    def _announce(self, resumes: bool) -> None:
-        """Announce the item that is flown, and the drone's behaviour without the gateway."""
-        current, stepped = self.progress.current, self._course.stepped
-        returns = self._vehicle.drone.flight_plan.state.returns_on_disconnect
-        self.say(Severity.INFO, lambda first: beginning(current + first, resumes, stepped=stepped, returns=returns))
-
-    # From part to part.
-
-    async def _go_on(self) -> None:
-        """Fly what follows: the steps that come next, and then the file behind them."""
-        progress = self.progress
-        try:
-            while not self._course.over:
-                rest = self._course.rest
-                if not self._course.parts and rest is not None:
-                    self._course = Course(*await lay_out(self._vehicle, progress.items, rest, 0))
-                    await check_path(self._vehicle, self._course.parts, -1, 0)
-                head = self._course.parts[0]
-                if isinstance(head, FlightPlanFile):
-                    leg, uid, line = await self._files.beginning_with(head, progress.items)
-                    self._course.parts[0] = leg
-                    await self._play(leg, uid, line)
-                    return  # it says itself when it ends
-                progress.fly(head.item)
-                self._keep()
-                self.news()
-                await fly_step(self._vehicle, progress.items[head.item])
-                progress.did(head.done)
-                for item in head.done:
-                    self.reached(item)
-                self._part_over()
-        except AnafiMavError as error:
-            self._break_off(reason_of(error))
-        else:
-            self._finish()
-
-    def _leg_over(self) -> None:
-        """The drone has flown a whole file."""
-        self._part_over()
-        if (following := self._course.later) is not None:
-            self._course.later = None
-            self.progress.current = following
-            self._break_off(texts.MISSION_LINK_LOST)
-            self.progress.choose(following, anew=False)
-            self._keep()
-            self.news()
-        elif not self._course.over:
-            self._run(self._go_on())
-        else:
-            self._finish()
-
-    def _part_over(self) -> None:
-        """Make the following part the current item.
-
-        When the mission is paused before that part begins, the part before is not flown again.
-        """
-        following = self._course.part_over()
-        if following is not None:
-            self.progress.fly(following)
-            self._keep()
-            self.news()
-
-    def _finish(self) -> None:
-        self._complete()
-        self._vehicle.select(FlightMode.HOLD)
-        self.news()
-
-    def _complete(self) -> None:
-        self._left = None
-        self.progress.finish()
-        self.keeper.forget()
-        self.say(Severity.INFO, lambda first: texts.MISSION_COMPLETE)
-
-    def _stopped_by_drone(self) -> None:
-        """Pause the mission: the drone has stopped its plan, as far as its reports go."""
-        self._break_off(texts.MISSION_STOPPED)
-        stopped = self._vehicle.drone.flight_plan.state.playing == PlayingState.STOPPED
-        self._may_end_late = stopped and self._course.following is None
-
-    def _break_off(self, why: OperatorText) -> None:
-        """Stop the mission for a reason that no client has commanded."""
-        if self.progress.state is State.ACTIVE:
-            self._stop(why)
-            self._vehicle.select(FlightMode.HOLD)
-
-    def _stop(self, why: OperatorText | None) -> None:
-        progress = self.progress
-        progress.stop()
-        self._may_end_late = False
-        current, severity = progress.current, Severity.INFO if why is None else Severity.WARNING
-        if not self._beginning:
-
-            def paused(first: int) -> OperatorText:
-                if why is None:
-                    return texts.MISSION_PAUSED.fill(item=current + first)
-                return texts.MISSION_PAUSED_REASON.fill(item=current + first, reason=why)
-
-            self.say(severity, paused)
-        self._end_watch.end()
-        self._keep()
-        self.news()
-
-    def _run(self, work: Coroutine[Any, Any, None]) -> None:
-        assert self.spawn is not None, "set by the service, without which nobody asks for a mission"
-        task = self._running = self.spawn(work)
-
-        def done(ended: asyncio.Task[None]) -> None:
-            if self._running is ended:
-                self._running = None
-
-        task.add_done_callback(done)
-
-    # What the drone reports.
+    # What the drone reports, and time.
 
     def subscriptions(self) -> Subscriptions:
         """Return the handlers of what reports how far the drone's plan is."""
+        machine = self.machine
         return {
             events.MavlinkFilePlayingStateChanged: self._on_playing,
-            events.MissionItemExecuted: lambda message, now: self._executed(message.idx),
-            events.WaypointSkipped: self._on_skipped,
+            events.MissionItemExecuted: lambda message, now: self._handle(machine.executed(message.idx)),
+            events.WaypointSkipped: lambda message, now: self._handle(machine.skipped(message.item)),
             **dict.fromkeys(PROOF, self._on_position),
         }
 
-    def _on_position(self, message: Message, now: float) -> None:
-        self._end_watch.on_position(type(message))
-
-    def _on_skipped(self, message: events.WaypointSkipped, now: float) -> None:
-        item = self.progress.skip(message.item)
-        if item is not None:
-            self.say(Severity.WARNING, lambda first: texts.MISSION_OUT_OF_REACH.fill(item=item + first))
-
     def _on_playing(self, message: events.MavlinkFilePlayingStateChanged, now: float) -> None:
-        progress = self.progress
-        if message.state == PlayingState.PLAYING:
-            self._end_watch.end()
-            self._may_end_late = False
-            if self._starting is not None:
-                (leg, line), self._starting = self._starting, None
-                progress.begin(leg, line)
-                self.news()
-            elif message.filepath != self._uid:
-                if progress.state is State.ACTIVE:
-                    self._break_off(texts.MISSION_OTHER_PLAN)
-                else:
-                    self._vehicle.text(Severity.NOTICE, texts.OTHER_PLAN)
-            elif progress.state is not State.ACTIVE:
-                # Not by us, but it flies, and who looks at the mission has to see that.
-                self._leave()
-                if self._left is None:
-                    self._vehicle.text(Severity.NOTICE, texts.OTHER_PLAN)
-                    return
-                self._vehicle.select(FlightMode.MISSION, self)
-                (leg, line, jumps), self._left = self._left, None
-                progress.begin(leg, line)
-                progress.jumps = jumps
-                self.say(Severity.NOTICE, lambda first: texts.MISSION_RESUMED_ELSEWHERE)
-                self.news()
-        elif self._starting is None and progress.state is State.ACTIVE and progress.leg is not None:
-            if progress.leg_done:
-                self._leg_over()
-            elif progress.ending and progress.at_last_line and message.state == PlayingState.STOPPED:
-                self._end_watch.begin()
-            elif self._vehicle.drone.controller.pilot_acquired_control:
-                self._break_off(texts.MISSION_PILOT)
-            elif message.state == PlayingState.STOPPED and (last := self._last_way_point(progress.leg)) is not None:
-                self._end_watch.begin(last)
-            else:
-                self._stopped_by_drone()
+        match message.state:
+            case PlayingState.PLAYING:
+                self._handle(self.machine.playing(message.filepath))
+                self._require_control()
+            case PlayingState.PAUSED | PlayingState.STOPPED:
+                stopped = message.state == PlayingState.STOPPED
+                self._handle(self.machine.halted(stopped=stopped, report=self._report(), now=self._now))
 
-    def _last_way_point(self, leg: FlightPlanFile) -> WayPoint | None:
-        """Return the way point that a file ends at.
+    def _require_control(self) -> None:
+        """Suspend a mission that the drone begins while another task, or none, is active."""
+        if self._vehicle.control.active is self:
+            return
+        if self.machine.flying:
+            self._perform(self.machine.control_lost(self._now))
+        elif self.machine.has_withdrawn_start:
+            self._suspend(starting=True)
 
-        Returns None while other way points are left, or when the file ends with a landing or a return.
-        """
-        progress = self.progress
-        points, left = [*way_points(leg)], [*way_points(leg, progress.line)]
-        if progress.items[leg.origins[-1]].command in ENDINGS or len(left) > 1 or not points:
-            return None
-        return points[-1]
-
-    def _executed(self, line: int) -> None:
-        progress, leg = self.progress, self.progress.leg
-        paused = self._may_end_late and self._starting is None and progress.state is State.PAUSED
-        late = paused and leg is not None and line == len(leg.origins) - 1
-        if late:
-            progress.begin(leg, progress.line)
-        done = progress.executed(line)
-        for item in done:
-            self.reached(item)
-        if done:
-            self._keep()
-        if late:
-            self._may_end_late = False
-            self._complete()  # and no other mode: another flight task may be active by now
-        self.news()
-        if self._end_watch.running and progress.leg_done:  # it has said so late
-            self._end_watch.end()
-            self._leg_over()
+    def _on_position(self, message: Message, now: float) -> None:
+        if self.machine.state is State.ENDING:
+            self._handle(self.machine.reported(self._report(), type(message)))
 
     def on_vehicle(self) -> None:
         """Landing, return or flying state have changed."""
-        self._end_watch.look()
+        if self.machine.state is State.ENDING:
+            self._handle(self.machine.reported(self._report()))
 
-    def _ended(self, begun: bool) -> None:
-        """Handle a plan that the drone has stopped without reporting its last line.
+    def _on_alarm(self) -> None:
+        self._handle(self.machine.timeout(self._report()))
 
-        `begun`: the plan has been flown all the same.
-        """
-        if begun:
-            if (leg := self.progress.leg) is not None:
-                self._executed(len(leg.origins) - 1)
-            self._leg_over()
-        else:
-            self._stopped_by_drone()
-
-    # Helm.
-
-    def end(self) -> list[asyncio.Task[None]]:
-        """Something else flies now: the mission is paused."""
-        self._drop_pending()
-        ended = []
-        if self._running is not None and self._running is not asyncio.current_task():
-            self._running.cancel()
-            ended.append(self._running)
-            self._running = None
-            if self._is_chosen_only:
-                self._vehicle.forget_mode()
-        if self.progress.state is State.ACTIVE:
-            self._stop(None)
-            self._suspend()
-        return ended
-
-    def _suspend(self, *, starting: bool = False) -> None:
-        """The drone is not to fly its file any more.
-
-        A landing or a return of its own is not disturbed.
-
-        `starting`: it has been asked to begin it and has not said that it does, so no landing or return is that
-        file's.
-        """
-        vehicle = self._vehicle
-        if starting or (vehicle.flying_state not in _LANDING and not vehicle.returning):
-            with contextlib.suppress(LinkLost):
-                vehicle.drone.flight_plan.suspend()
-
-    def _lapsed(self) -> None:
-        self._vehicle.select(FlightMode.HOLD)
-        self._vehicle.text(
-            Severity.WARNING, texts.MISSION_NOT_STARTED.fill(reason=texts.NOT_ARMED_WITHIN.fill(seconds=ARM_WAIT))
+    def _report(self) -> DroneReport:
+        vehicle, drone = self._vehicle, self._vehicle.drone
+        alerts, returning = drone.alerts.state, drone.home.state.returning
+        pilot = drone.controller.pilot_acquired_control
+        forced = alerts.forced_landing not in (None, ForcedLandingReason.NONE)
+        alert = alerts.alert not in (None, AlertState.NONE)
+        plan_error = drone.flight_plan.state.error not in (None, PlayError.NONE)
+        down = vehicle.flying_state in (FlyingState.LANDING, FlyingState.LANDED)
+        return DroneReport(
+            pilot=pilot,
+            is_in_trouble=not vehicle.in_air or returning or pilot or alert or forced or plan_error,
+            lands_or_returns=not forced and (down or (vehicle.returning and not vehicle.returning_by_itself)),
+            place=vehicle.place,
+            ato=drone.piloting.state.altitude,
         )
 
-    def _drop_pending(self) -> None:
-        """Withdraw a mission that waits for arming, so that the mode no longer shows it."""
-        if self._arming.end():
-            self._vehicle.forget_mode()
+    # Flight task.
+
+    def end(self) -> list[asyncio.Task[None]]:
+        """Another flight task is active now: the mission is paused."""
+        ended = self._cancel_background()
+        if effects := self.machine.control_lost(self._now):
+            self._perform(effects)
+        return ended
 
     # The link.
 
     def link_down(self) -> None:
         """The drone may fly on with the file that it has. What the gateway flies itself ends here."""
-        self._arming.end()
-        self._end_watch.end()
-        self._starting, self._running, self._may_end_late = None, None, False
-        self._course.end_with_this_part()
-        if self.progress.state is State.ACTIVE:
-            self.progress.stop()
+        self.machine.link_down()
+        self._alarm.cancel()
 
     def link_up(self, record: MissionRecord | None) -> None:
-        """The drone is back, or it is another gateway's: is it our mission that it flies?"""
-        progress, plan = self.progress, self._vehicle.drone.flight_plan.state
-        if progress.leg is None and record is not None and record.mission == self.identity:
-            leg, plays = record.leg, plan.uid == record.uid
-            if not (plays or self._vehicle.in_air):
-                return
-            self._uid, self._course = record.uid, Course([leg], later=record.next)
-            self.keeper.found(record)
-            progress.begin(leg, record.line)
-            progress.jumps = dict(record.jumps)
-            progress.stop()
-        if progress.state is not State.PAUSED or progress.leg is None:
-            return
-        plays = plan.uid == self._uid and plan.playing == PlayingState.PLAYING
-        later = self._course.later
-        if progress.leg_done and later is not None:
-            progress.current = later
-        current = progress.current
-        if plays:
-            progress.begin(progress.leg, progress.line)
-            self._vehicle.select(FlightMode.MISSION, self)
-            self.say(Severity.NOTICE, lambda first: texts.MISSION_FOUND_FLYING.fill(item=current + first))
-        elif progress.leg_done and later is None:
-            progress.begin(progress.leg, progress.line)
-            progress.finish()
-            self.keeper.forget()
-            self.say(Severity.INFO, lambda first: texts.MISSION_COMPLETE)
-        else:
-            self.say(Severity.NOTICE, lambda first: texts.MISSION_FOUND_PAUSED.fill(item=current + first))
-        self.news()
+        """The drone is connected again, or to a new gateway: look if it flies our mission."""
+        plan = self._vehicle.drone.flight_plan.state
+        plays, in_air = plan.playing == PlayingState.PLAYING, self._vehicle.in_air
+        self._handle(self.machine.link_up(record, plan.uid, plays=plays, in_air=in_air))
 
-    def _keep(self) -> None:
-        self.keeper.keep(self.identity, self._uid, self.progress, self._course.following)
+
+def _failure(error: AnafiMavError) -> Failure:
+    return Failure(text_of(error), reason_of(error))

@@ -19,6 +19,7 @@ from anafi_mav.vehicle.base.bounds import check_estimate, check_place
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.fence.fence_watch import OutsideFence
+from anafi_mav.vehicle.mission.texts import FIRST_LABEL
 
 BREATH = 20
 """Way points after which others get their turn: a large polygon takes a while."""
@@ -63,30 +64,27 @@ def _start(vehicle: Aircraft) -> Start:
 
 
 async def lay_out(
-    vehicle: Aircraft, items: Sequence[Item], first: int | Cursor, number: int, jumps: Mapping[int, int] | None = None
+    vehicle: Aircraft, items: Sequence[Item], first: int | Cursor, jumps: Mapping[int, int] | None = None
 ) -> tuple[list[FlightPlanFile | GatewayStep], Cursor | None]:
     """Return the parts flown from an item on, starting at the drone's position, and the rest.
 
     Raises `Refused`.
 
-    `number` is the client's number of the first item, `jumps` how often which jump was taken before. In a thread: 5
-    000 items take half a second.
+    `jumps`: how often which jump was taken before. In a thread: 5 000 items take half a second.
     """
     start, version = _start(vehicle), vehicle.drone.flight_plan.version
     try:
         flight = await asyncio.to_thread(translate, items, 1 if version == 1 else 2, start, first, {**(jumps or {})})
     except PlanError as error:
-        what = texts.MISSION if error.item is None else texts.ITEM.fill(number=error.item + number)
+        what = texts.MISSION if error.item is None else texts.ITEM.fill(number=error.item + FIRST_LABEL)
         raise Refused(what, texts.from_below(error.problem)) from error
     if not flight.parts:
         raise Refused(texts.MISSION, texts.MISSION_OVER)
-    _check_estimates(vehicle, items, flight.parts, number)
+    _check_estimates(vehicle, items, flight.parts)
     return [*flight.parts], flight.rest
 
 
-def _check_estimates(
-    vehicle: Aircraft, items: Sequence[Item], parts: Sequence[FlightPlanFile | GatewayStep], number: int
-) -> None:
+def _check_estimates(vehicle: Aircraft, items: Sequence[Item], parts: Sequence[FlightPlanFile | GatewayStep]) -> None:
     """Raise `Refused` if an item's AMSL height may be below ground because AMSL is an estimate."""
     if not vehicle.height.estimated:
         return
@@ -96,7 +94,7 @@ def _check_estimates(
                 try:
                     check_estimate(vehicle, point.ato)
                 except Refused as error:
-                    raise Refused(texts.ITEM.fill(number=point.item + number), error.reason) from error
+                    raise Refused(texts.ITEM.fill(number=point.item + FIRST_LABEL), error.reason) from error
 
 
 def lines_of(leg: FlightPlanFile) -> list[str]:
@@ -118,23 +116,23 @@ def way_points(leg: FlightPlanFile, after: int = -1) -> Iterator[WayPoint]:
             yield WayPoint(item, place, float(columns[_HEIGHT]), radius if radius > 0.0 else ACCEPTANCE)
 
 
-async def check_path(vehicle: Aircraft, parts: Sequence[FlightPlanFile | GatewayStep], after: int, number: int) -> None:
+async def check_path(vehicle: Aircraft, parts: Sequence[FlightPlanFile | GatewayStep], after: int) -> None:
     """Raise `Refused` if a way point, or the straight way to it, is where the drone may not be.
 
-    `after` is the line of the first file after which it is flown, `number` the client's number of the first item.
+    `after` is the line of the first file after which it is flown.
     """
     where, seen = vehicle.place, 0
     for part in parts:
         if isinstance(part, FlightPlanFile):
             for point in way_points(part, after):
-                _check(vehicle, where, point, number)
+                _check(vehicle, where, point)
                 where, seen = point.place, seen + 1
                 if seen % BREATH == 0:
                     await asyncio.sleep(0)
         after = -1
 
 
-def _check(vehicle: Aircraft, start: GeoPoint | None, point: WayPoint, number: int) -> None:
+def _check(vehicle: Aircraft, start: GeoPoint | None, point: WayPoint) -> None:
     ceiling = vehicle.drone.piloting.state.max_altitude
     try:
         check_place(vehicle, point.place, start=start)
@@ -143,4 +141,4 @@ def _check(vehicle: Aircraft, start: GeoPoint | None, point: WayPoint, number: i
             raise Refused(texts.HEIGHT, reason, lasting=True)
         vehicle.fence.check_height(point.ato)
     except (Refused, OutsideFence) as error:
-        raise Refused(texts.ITEM.fill(number=point.item + number), error.reason, lasting=True) from error
+        raise Refused(texts.ITEM.fill(number=point.item + FIRST_LABEL), error.reason, lasting=True) from error

@@ -1,4 +1,4 @@
-"""Progress of a mission: current item, finished items and state. No I/O.
+"""Progress of a mission: current item, finished items, and the drone's file. No I/O.
 
 The drone reports the lines of its file that it has executed; a `FlightPlanFile` maps them to items of the mission. An
 item is done when the drone has reported it, or when the gateway has flown it itself, and never because time or other
@@ -7,103 +7,57 @@ items passed.
 
 from __future__ import annotations
 
-import enum
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from anafi_mav import mav_enums
 from anafi_mav.plans.plan import DO_JUMP, Item
 from anafi_mav.plans.translation.translate import FlightPlanFile
+from anafi_mav.vehicle.mission.course import Course
 from anafi_mav.vehicle.mission.payload_items import PayloadItems
+from anafi_mav.vehicle.mission.record import MissionRecord
 
 ENDINGS = (mav_enums.MAV_CMD_NAV_LAND, mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)
-"""Items that end in a landing or a return, which is the plan's own and no take-over of the drone's."""
+"""Items that end in a landing or a return, which is the plan's own and does not interrupt the mission."""
 
 
-class State(enum.Enum):
-    NONE = "no mission stored"
-    READY = "not begun"
-    ACTIVE = "the drone flies the mission"
-    PAUSED = "begun and then stopped"
-    COMPLETE = "flown completely"
+class Mission:
+    """The items of one upload. Compared by identity."""
+
+    def __init__(self, items: Sequence[Item] = (), identity: int = 0) -> None:
+        self.items = tuple(items)
+        self.identity = identity
+        """Opaque id; 0 before any mission was read."""
+        self.payload = PayloadItems(self.items)
 
 
-class Event(enum.Enum):
-    TAKE = "a mission is uploaded"
-    CLEAR = "the mission is deleted"
-    CHOOSE = "a client sets the current item"
-    BEGIN = "the drone starts or resumes the mission"
-    STOP = "the drone stops flying the mission"
-    FINISH = "the last item is completed"
-
-
-TRANSITIONS: dict[State, dict[Event, State]] = {
-    State.NONE: {Event.TAKE: State.READY, Event.CLEAR: State.NONE},
-    State.READY: {
-        Event.TAKE: State.READY,
-        Event.CLEAR: State.NONE,
-        Event.CHOOSE: State.READY,
-        Event.BEGIN: State.ACTIVE,
-    },
-    State.ACTIVE: {
-        Event.TAKE: State.READY,
-        Event.CLEAR: State.NONE,
-        Event.BEGIN: State.ACTIVE,
-        Event.STOP: State.PAUSED,
-        Event.FINISH: State.COMPLETE,
-    },
-    State.PAUSED: {
-        Event.TAKE: State.READY,
-        Event.CLEAR: State.NONE,
-        Event.CHOOSE: State.PAUSED,
-        Event.BEGIN: State.ACTIVE,
-    },
-    State.COMPLETE: {
-        Event.TAKE: State.READY,
-        Event.CLEAR: State.NONE,
-        Event.CHOOSE: State.READY,
-        Event.BEGIN: State.ACTIVE,
-    },
-}
-"""A missing pair cannot occur: an active mission is stopped before another item begins."""
-
-MAVLINK_STATES = {
-    State.NONE: mav_enums.MISSION_STATE_NO_MISSION,
-    State.READY: mav_enums.MISSION_STATE_NOT_STARTED,
-    State.ACTIVE: mav_enums.MISSION_STATE_ACTIVE,
-    State.PAUSED: mav_enums.MISSION_STATE_PAUSED,
-    State.COMPLETE: mav_enums.MISSION_STATE_COMPLETE,
-}
-
-
+@dataclass(frozen=True)
 class MissionProgress:
-    """One mission, and how far it is."""
+    """How far a mission is."""
 
-    def __init__(self) -> None:
-        self.state = State.NONE
-        self.items: tuple[Item, ...] = ()
-        self._payload = PayloadItems()
-        self.current = 0
-        """The item that is flown, or will be when it goes on."""
-        self.leg: FlightPlanFile | None = None
-        """The file that the drone flies, or flew last; None: none since the mission or its current item was chosen."""
-        self.line = -1
-        """Of it, the one that was executed last."""
-        self.jumps: dict[int, int] = {}
-        """Items that jump, and how often each was done since the mission or its current item was chosen."""
-        self._chosen = False
-        """A client has set the current item since the mission was uploaded."""
-        self._skipped: set[int] = set()
-        """Lines that the drone has left out."""
+    current: int = 0
+    """The item that is flown, or will be when the mission continues."""
+    leg: FlightPlanFile | None = None
+    """The file that the drone flies, or flew last; None: none since the mission or its current item was chosen."""
+    uid: str = ""
+    """The drone's name of that file."""
+    line: int = -1
+    """The line of that file that was executed last."""
+    course: Course = field(default_factory=Course)
+    """What remains, beginning with the part that is flown."""
+    jumps: Mapping[int, int] = field(default_factory=dict)
+    """Items that jump, and how often each was done since the mission or its current item was chosen."""
+    chosen: bool = False
+    """A client has set the current item since the mission was uploaded."""
+    skipped: frozenset[int] = frozenset()
+    """Lines of the file that the drone has left out."""
+    left: MissionProgress | None = None
+    """Progress in a file that the drone has paused, when the mission is to begin elsewhere next.
 
-    @property
-    def is_untouched(self) -> bool:
-        """True while the mission has not begun and no client has set its current item."""
-        return self.state is State.READY and not self._chosen
-
-    @property
-    def first(self) -> int:
-        """The item that a start begins with: the current one, and the first again after the end."""
-        return 0 if self.state is State.COMPLETE else self.current
+    Another controller may still let the drone resume it.
+    """
+    kept: MissionRecord | None = None
+    """The record that was stored last for a restarted gateway."""
 
     @property
     def leg_done(self) -> bool:
@@ -111,118 +65,53 @@ class MissionProgress:
         return self.leg is not None and self.line == len(self.leg.origins) - 1
 
     @property
-    def ending(self) -> bool:
-        """The drone is at the item that lands or returns: that it does so is no surprise."""
-        leg = self.leg
-        if self.state is not State.ACTIVE or leg is None or self.leg_done:
-            return False
-        return self.items[leg.origins[self.line + 1]].command in ENDINGS
-
-    @property
-    def returned(self) -> bool:
-        """The drone has executed the whole file, and its last line was a return."""
-        leg = self.leg
-        if leg is None or not self.leg_done or self.state not in (State.ACTIVE, State.COMPLETE):
-            return False
-        return self.items[leg.origins[-1]].command == mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH
-
-    @property
-    def needs_gimbal(self) -> bool:
-        """True while the mission is flown and an item to come needs the gimbal."""
-        return self.state is State.ACTIVE and self._payload.needs_gimbal(self.current, self.jumps)
-
-    @property
-    def needs_camera(self) -> bool:
-        """True while the mission is flown and an item to come needs the camera."""
-        return self.state is State.ACTIVE and self._payload.needs_camera(self.current, self.jumps)
-
-    @property
     def at_last_line(self) -> bool:
         """All but one line of the file are executed."""
         return self.leg is not None and self.line == len(self.leg.origins) - 2
 
-    def take(self, items: Sequence[Item]) -> None:
-        """A mission was uploaded, or none any more."""
-        self.state = TRANSITIONS[self.state][Event.TAKE if items else Event.CLEAR]
-        self.items = tuple(items)
-        self._payload = PayloadItems(self.items)
-        self._forget()
-        self.current, self.jumps, self._chosen = 0, {}, False
+    def in_file(self, uid: str, leg: FlightPlanFile, line: int) -> MissionProgress:
+        """Return the progress in a file of which `line` was executed last; -1 for none."""
+        current = leg.origins[line + 1] if line + 1 < len(leg.origins) else self.current
+        skipped = self.skipped if leg is self.leg else frozenset[int]()
+        return replace(self, leg=leg, uid=uid, line=line, current=current, skipped=skipped, left=None)
 
-    def choose(self, item: int, *, anew: bool = True) -> None:
-        """Select the item at which the mission begins next.
+    def at_item(self, item: int) -> MissionProgress:
+        """Return the progress at an item that the gateway flies, or whose file it loads."""
+        return replace(self, leg=None, line=-1, current=item, skipped=frozenset(), left=None)
 
-        Loop counters restart, unless the keyword argument is False (the mission continues at this item anyway).
+    def with_done(self, items: Sequence[Item], done: Sequence[int]) -> MissionProgress:
+        """Return the progress after these items are done: jumps among them count."""
+        jumps = dict(self.jumps)
+        for item in done:
+            if items[item].command == DO_JUMP:
+                jumps[item] = jumps.get(item, 0) + 1
+        return replace(self, jumps=jumps)
 
-        Raises `ValueError` on wrong arguments of ours: `item` must be one of the mission's, which does not fly.
-        """
-        if not 0 <= item < len(self.items):
-            raise ValueError(f"the mission has no item {item}")
-        self.state = TRANSITIONS[self.state][Event.CHOOSE]
-        self._forget()
-        self.current, self._chosen = item, True
-        if anew:
-            self.jumps = {}
-
-    def begin(self, leg: FlightPlanFile | None, line: int = -1) -> None:
-        """Record that the mission is flown, by a file or (None) by the gateway for now.
-
-        `line` is the line of the file that was executed last.
-        """
-        self.state = TRANSITIONS[self.state][Event.BEGIN]
-        if leg is not self.leg:
-            self._skipped.clear()
-        self.leg, self.line = leg, line
-        if leg is not None and not self.leg_done:
-            self.current = leg.origins[line + 1]
-
-    def fly(self, item: int) -> None:
-        """The gateway flies this item itself."""
-        self.state = TRANSITIONS[self.state][Event.BEGIN]
-        self.leg, self.line, self.current = None, -1, item
-
-    def stop(self) -> None:
-        """It does not go on by itself."""
-        self.state = TRANSITIONS[self.state][Event.STOP]
-
-    def finish(self) -> None:
-        """Nothing is left of it."""
-        self.state = TRANSITIONS[self.state][Event.FINISH]
-        self.jumps = {}
-
-    def did(self, items: Sequence[int]) -> None:
-        """Items are done: jumps among them count."""
-        for item in items:
-            if self.items[item].command == DO_JUMP:
-                self.jumps[item] = self.jumps.get(item, 0) + 1
-
-    def skip(self, line: int) -> int | None:
-        """The drone leaves a line out; the item that this spoils."""
+    def with_skipped(self, line: int) -> tuple[MissionProgress, int | None]:
+        """Return the progress after the drone has left out a line, and the item not reached."""
         leg = self.leg
         if leg is None or not self.line < line < len(leg.origins):
-            return None
-        self._skipped.add(line)
-        return leg.origins[line]
+            return self, None
+        return replace(self, skipped=self.skipped | {line}), leg.origins[line]
 
-    def executed(self, line: int) -> tuple[int, ...]:
-        """Record that the drone has executed a line; returns the items that are done with it.
+    def with_executed(self, items: Sequence[Item], line: int) -> tuple[MissionProgress, tuple[int, ...]]:
+        """Return the progress after the drone has executed a line, and the items that are done.
 
         A line that was reported before, or that the file does not have, is ignored. Lines in between that were never
-        reported, because the link was lost, may have been flown: that they were is not claimed.
+        reported, because the link was lost, may have been flown: they are not reported as done.
         """
         leg = self.leg
-        if self.state is not State.ACTIVE or leg is None or not self.line < line < len(leg.origins):
-            return ()
-        for passed in leg.done[self.line + 1 : line + 1]:
-            self.did(passed)
-        self.line = line
+        if leg is None or not self.line < line < len(leg.origins):
+            return self, ()
+        passed = [item for done in leg.done[self.line + 1 : line + 1] for item in done]
         done = leg.done[line]
-        if line in self._skipped:
+        if line in self.skipped:
             done = tuple(item for item in done if item != leg.origins[line])
-        if line + 1 < len(leg.origins):
-            self.current = leg.origins[line + 1]
-        return done
+        current = leg.origins[line + 1] if line + 1 < len(leg.origins) else self.current
+        return replace(self.with_done(items, passed), line=line, current=current), done
 
-    def _forget(self) -> None:
-        self.leg, self.line = None, -1
-        self._skipped.clear()
+    def record(self, mission: int) -> MissionRecord | None:
+        """Return the record for a restarted gateway; None without a file of the drone."""
+        if self.leg is not None:
+            return MissionRecord.of(mission, self.uid, self.leg, self.line, self.course.following, self.jumps)
+        return None if self.kept is None else self.kept.flown_up_to(self.current, self.jumps)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from typing import Any
 
@@ -13,7 +13,6 @@ from typing_extensions import Self
 from anafi_mav.plans.plan import DO_JUMP, Item
 from anafi_mav.plans.translation.translate import FlightPlanFile
 from anafi_mav.vehicle.mission.path import way_points
-from anafi_mav.vehicle.mission.progress import MissionProgress
 
 
 class MissionRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -70,40 +69,6 @@ class MissionRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def leg(self) -> FlightPlanFile:
         return FlightPlanFile(self.content.encode(), self.origins, self.done)
-
-
-class Keeper:
-    """Keeps an up-to-date record of the plan that the drone flies.
-
-    Also while the gateway is at an item behind the drone's file.
-    """
-
-    def __init__(self) -> None:
-        self.write: Callable[[MissionRecord | None], None] = lambda record: None
-        """Takes what is to be remembered from now on."""
-        self._kept: MissionRecord | None = None
-
-    def found(self, record: MissionRecord) -> None:
-        """This was remembered by another run."""
-        self._kept = record
-
-    def forget(self) -> None:
-        """Another run has nothing to know."""
-        self._kept = None
-        self.write(None)
-
-    def keep(self, mission: int, uid: str, progress: MissionProgress, following: int | None) -> None:
-        """Remember how far a mission is.
-
-        `following` is the item behind the file that the drone flies.
-        """
-        if progress.leg is not None:
-            self._kept = MissionRecord.of(mission, uid, progress.leg, progress.line, following, progress.jumps)
-        elif self._kept is not None:
-            self._kept = self._kept.flown_up_to(progress.current, progress.jumps)
-        else:
-            return
-        self.write(self._kept)
 
 
 def _leads_somewhere(leg: FlightPlanFile) -> bool:

@@ -9,6 +9,10 @@ from anafi_mav.drone.events import FlightPlanIndicator as Input
 from anafi_mav.errors import CommandRejected
 from anafi_mav.texts import OperatorText
 
+FIRST_LABEL = 1
+"""The number of our item 0 in texts. On a station's map item 0 is home, whether or not it is sent to the vehicle
+(QGroundControl FirmwarePlugin::sendHomePositionToVehicle): seq + 1 for PX4's clients, seq for ArduPilot's."""
+
 _REASONS = {
     Part.GPS: texts.NO_FIX,
     Part.CALIBRATION: texts.DRONE_CALIBRATION,
@@ -34,7 +38,7 @@ def refusal(state: FlightPlanState, error: CommandRejected) -> OperatorText:
 
 
 def beginning(item: int, resumes: bool, *, stepped: bool, returns: bool | None) -> OperatorText:
-    """Return the text of a beginning or resumed mission, with the behaviour without the gateway.
+    """Return the text of a mission that begins or resumes, with the drone's link-loss behaviour.
 
     `stepped`: the drone has a part of the mission only. `returns`: the value of its ReturnHomeOnDisconnect.
     """
@@ -42,4 +46,4 @@ def beginning(item: int, resumes: bool, *, stepped: bool, returns: bool | None) 
     if stepped and returns is not True:
         alone = texts.LINK_LOSS_FILE
     template = texts.MISSION_RESUMES if resumes else texts.MISSION_STARTS
-    return template.fill(item=item, alone=alone)
+    return template.fill(item=item + FIRST_LABEL, alone=alone)

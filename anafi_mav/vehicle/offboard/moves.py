@@ -41,12 +41,15 @@ _Wanted: TypeAlias = "tuple[Goal, float | None]"
 class OffboardMoves:
     """The moves of one session of setpoints."""
 
-    def __init__(self, vehicle: Aircraft, warn_throttled: Callable[[OperatorText], None]) -> None:
+    def __init__(self, vehicle: Aircraft, drop: Callable[[OperatorText], None]) -> None:
+        """`drop` receives the reason for which a goal is not flown to."""
         self._vehicle = vehicle
-        self._warn_throttled = warn_throttled
+        self._drop = drop
         self._wanted: _Wanted | None = None
         """Requested move that has not begun."""
         self._begun: _Wanted | None = None
+        self._failure: OperatorText | None = None
+        """Reason for which the drone does not make the move that has begun; None while it does."""
         self._retry_at = math.inf
         self._starter: asyncio.Task[None] | None = None
         self._relative: set[asyncio.Task[None]] = set()
@@ -57,18 +60,28 @@ class OffboardMoves:
         """Something has been begun and not been stopped; it may have arrived."""
         return self._begun is not None
 
-    def go(self, goal: Goal, yaw: float | None, now: float, *, asked: bool) -> None:
+    @property
+    def under_way(self) -> bool:
+        """True until the goal is reached, as far as the drone has reported it."""
+        return self._wanted is not None or bool(self._relative) or self._vehicle.drone.piloting.moving
+
+    def go(self, goal: Goal, yaw: float | None, now: float, *, asked: bool) -> OperatorText | None:
         """Fly to a goal and turn to a heading (rad from north) on the way; None keeps the heading.
 
         `asked`: the client still repeats the goal. A goal that was sent once is tried once.
+
+        Returns the reason for which the drone has not flown to this goal, which may be tried again; None without one.
         """
         wanted = (goal, yaw)
-        if wanted == self._begun and (not asked or now < self._retry_at):
-            return
+        if wanted != self._begun:
+            self._failure = None
+        elif not asked or now < self._retry_at:
+            return self._failure
         self._begun = self._wanted = wanted
         self._retry_at = math.inf
         if self._starter is None or self._starter.done():
             self._starter = asyncio.get_running_loop().create_task(self._start())
+        return self._failure
 
     def stop(self) -> list[asyncio.Task[None]]:
         """End what has been begun: the drone hovers, unless it lands or returns.
@@ -83,7 +96,7 @@ class OffboardMoves:
 
     def forget(self) -> list[asyncio.Task[None]]:
         """Begin nothing more, and wait for nothing. Returns tasks that are about to end."""
-        self._wanted = self._begun = None
+        self._wanted = self._begun = self._failure = None
         self._retry_at = math.inf
         tasks = [task for task in (self._starter, *self._relative) if task is not None and not task.done()]
         for task in tasks:
@@ -126,6 +139,8 @@ class OffboardMoves:
             vertical_speed=vehicle.climb_speed,
             orientation=orientation,
         )
+        if self._is_news_of(wanted):
+            self._failure = None
         move.ended.add_done_callback(lambda ended: self._ended(wanted, ended.result()))
 
     @property
@@ -136,7 +151,7 @@ class OffboardMoves:
         first: the drone would stop at each of them.
         """
         rule = self._vehicle.move_heading
-        if self._vehicle.selected is not FlightMode.GUIDED or rule is MoveHeading.KEEP:
+        if self._vehicle.control.mode is not FlightMode.GUIDED or rule is MoveHeading.KEEP:
             return MoveHeading.KEEP
         return MoveHeading.TO_TARGET
 
@@ -163,7 +178,8 @@ class OffboardMoves:
         if how is MoveEnd.ERROR:
             self._failed(wanted, texts.MOVE_FAILED, again=True)
         elif how is MoveEnd.CANCELED and self._is_news_of(wanted):
-            self._warn_throttled(texts.SETPOINT_DROPPED.fill(reason=texts.MOVE_CANCELLED))
+            self._failure = texts.MOVE_CANCELLED
+            self._drop(texts.MOVE_CANCELLED)
 
     def _is_news_of(self, wanted: _Wanted) -> bool:
         """Of a move that was replaced or stopped there is nothing to say."""
@@ -175,7 +191,8 @@ class OffboardMoves:
             return
         if again:
             self._retry_at = asyncio.get_running_loop().time() + RETRY
-        self._warn_throttled(texts.SETPOINT_DROPPED.fill(reason=why))
+        self._failure = why
+        self._drop(why)
         # One that was refused leaves an older one alone, which nobody asks for any more.
         if self._vehicle.drone.piloting.sticks_blocked is None:
             with contextlib.suppress(LinkLost):

@@ -9,6 +9,9 @@ import enum
 from dataclasses import dataclass
 from typing import TypeAlias
 
+NO_MOTION = 0.01
+"""rad, rad/s, m/s, m/s2 and share of full climb up to which a setpoint asks for no motion: single precision."""
+
 
 @dataclass(frozen=True)
 class AttitudeSetpoint:
@@ -24,6 +27,11 @@ class AttitudeSetpoint:
     """rad/s, clockwise +; feed-forward."""
     climb: float
     """-1 full descent .. 1 full climb."""
+
+    @property
+    def is_still(self) -> bool:
+        """True when it asks for no motion; its heading does not count."""
+        return all(abs(value) <= NO_MOTION for value in (self.roll, self.pitch, self.yaw_rate, self.climb))
 
 
 class PositionReference(enum.Enum):
@@ -58,6 +66,12 @@ class MotionSetpoint:
     """rad, clockwise from north, with `body` from the heading."""
     yaw_rate: float | None = None
     """rad/s, clockwise +."""
+
+    @property
+    def is_still(self) -> bool:
+        """True when it asks for no motion: no place, no heading, and zeros."""
+        rates = (*self.velocity, *self.acceleration, self.yaw_rate)
+        return self.position == NOTHING and self.yaw is None and all(abs(value or 0.0) <= NO_MOTION for value in rates)
 
     @property
     def moves(self) -> bool:

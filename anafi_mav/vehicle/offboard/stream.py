@@ -16,8 +16,8 @@ import enum
 from collections.abc import Hashable
 from typing import NamedTuple
 
-from anafi_mav.vehicle.base.silence import SILENCE
 from anafi_mav.vehicle.offboard.setpoints import NOTHING, MotionSetpoint, Setpoint
+from anafi_mav.vehicle.offboard.silence import SILENCE
 
 GUIDED_TIMEOUT = 1.5
 """s that a velocity of ArduPilot's Guided lasts, unless a client sets another (dronekit's documents send one a

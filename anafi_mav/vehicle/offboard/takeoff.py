@@ -14,6 +14,7 @@ import enum
 from collections.abc import Callable, Hashable
 from typing import Protocol
 
+from anafi_mav.vehicle.base.requester import By
 from anafi_mav.vehicle.offboard.setpoints import AttitudeSetpoint, PositionReference, Setpoint
 
 CLIMB_FOR = 1.0
@@ -50,13 +51,10 @@ class Launcher(Protocol):
     def is_armed_by(self, client: Hashable) -> bool:
         """Has this client armed the vehicle for the flight that begins now?"""
 
-    def displace(self) -> None:
-        """Cancel the command that waits for the end of a take-off."""
-
     async def launch(self) -> None:
         """Take off to the drone's own height; returns when the drone confirmed it."""
 
-    async def abort(self) -> None:
+    async def abort(self, by: By) -> None:
         """Disarm a drone that stands, land one that is about to leave the ground."""
 
 

@@ -95,7 +95,7 @@ async def test_doctor_with_a_healthy_drone_reports_no_problem(model: str, skycon
         assert sessions(drone) == before
         more = await with_handshake(place(drone.address))
         assert faults(more) == {}
-        assert [finding.check for finding in more] == ["controller", "firmware", "settings"]
+        assert [finding.check for finding in more] == ["controller", "firmware", "settings", "failsafes"]
 
 
 # What is wrong, before the handshake.
@@ -212,6 +212,14 @@ async def test_doctor_reports_the_reasons_against_takeoff() -> None:
     assert "take-off is refused: magneto" in faults(findings)["settings"]
 
 
+async def test_doctor_reports_dangerous_settings_with_their_mend() -> None:
+    async with simulated() as drone:
+        drone.firmware.settings.set("rth_delay", 0.0)
+        findings = await with_handshake(place(drone.address))
+    line = "failsafes: WRONG: Return delay 0 s: each link loss is a return; raise the parameter ANF_RTH_DELAY"
+    assert faults(findings)["failsafes"] == line
+
+
 @pytest.mark.parametrize(
     ("version", "is_wrong"), [("1.8.2", False), ("1.6.0", True), ("1.10.0-rc1", False), ("", True), ("7", False)]
 )
@@ -232,14 +240,15 @@ async def test_doctor_without_terminal_skips_controller_firmware_and_settings() 
         options = ("--http-port", str(HTTP), "--rtsp-port", str(RTSP))
         async with command("doctor", drone.address, *options) as held:
             assert await held.end() == 0, str(held)
-        assert held.lines[-1].startswith("controller, firmware, settings: not asked")
+        assert held.lines[-1].startswith("controller, firmware, settings, failsafes: not asked")
         assert f"port {HTTP}: ok: open, web server" in held.lines
         assert sessions(drone) == 0
         async with command("doctor", drone.address, *options, "--take", "--json") as held:
             assert await held.end() == 0, str(held)
         report = json.loads("\n".join(held.lines))
         assert report["not_asked"] == []
-        assert [found["check"] for found in report["findings"]][-3:] == ["controller", "firmware", "settings"]
+        checks = [found["check"] for found in report["findings"]]
+        assert checks[-4:] == ["controller", "firmware", "settings", "failsafes"]
         assert sessions(drone) > 0
 
 

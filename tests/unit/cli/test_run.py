@@ -26,6 +26,7 @@ from anafi_mav.cli.addresses import Reservations
 from anafi_mav.cli.run import configuration, place
 from anafi_mav.cli.sim import Fleet
 from anafi_mav.config import Config, load
+from anafi_mav.mavlink.key_ring import write_key
 from anafi_mav.sim.world.wind import WindSpec
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="it waits for processes by pidfd")
@@ -236,6 +237,26 @@ async def test_ctrl_c_in_the_air_asks_first(tmp_path: Path) -> None:
         assert p.complaints == []
 
 
+async def test_service_manager_hears_ready_and_log_file_is_json(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(str(tmp_path / "notify"))
+        manager.setblocking(False)
+        loop = asyncio.get_running_loop()
+        log = tmp_path / "gateway.log"
+        env = {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "200000"}
+        options = ("-v", "--log-file", str(log), "--log-format", "json")
+        async with product(tmp_path, fleet(loopback(), loopback()), *options, env=env) as p:
+            assert await asyncio.wait_for(loop.sock_recv(manager, 100), 10.0) == b"READY=1\nSTATUS=1 drones"
+            assert await asyncio.wait_for(loop.sock_recv(manager, 100), 10.0) == b"WATCHDOG=1"
+            p.process.send_signal(signal.SIGTERM)
+            assert await p.end(15.0) == 0
+        while (word := await asyncio.wait_for(loop.sock_recv(manager, 100), 10.0)) == b"WATCHDOG=1":
+            pass
+        assert word == b"STOPPING=1"
+    entries = [msgspec.json.decode(line) for line in log.read_bytes().splitlines()]
+    assert any(entry["drone"] == "alpha" and entry["level"] == "INFO" for entry in entries)
+
+
 async def test_sigterm_does_not_ask(tmp_path: Path) -> None:
     async with under_way(tmp_path) as (p, _, address, _):
         child = p.child()
@@ -427,6 +448,20 @@ async def test_endpoint_open_to_the_network_warns_at_start(tmp_path: Path) -> No
         warning, error = p.complaints
         assert warning.startswith("anafi-mav: warning: endpoints[1]: tcpin://192.0.2.1:5760 is open to the network")
         assert error.startswith(f"anafi-mav: {tmp_path / 'fleet.yaml'}: endpoints[1]: cannot open")
+
+
+async def test_endpoint_whose_key_is_off_warns_at_start(tmp_path: Path) -> None:
+    write_key(tmp_path / "state" / "keys", "field", bytes(40))
+    write_key(tmp_path / "state" / "keys", "good", bytes(range(40)))
+    config = f"""
+        state: {tmp_path / "state"}
+        endpoints: ["tcpin://192.0.2.1:5760?signing=field", "tcpin://192.0.2.1:5761?signing=good"]
+        drones: [{{name: a, sysid: 1, address: {loopback()}}}]
+    """
+    async with product(tmp_path, config, ready=False) as p:
+        assert await p.end() == 2
+        warnings = [line for line in p.complaints if "is open to the network" in line]
+        assert [line.partition(": tcpin")[0] for line in warnings] == ["anafi-mav: warning: endpoints[0]"]
 
 
 async def test_error_of_an_option_names_the_option(tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ HOST = "expected an IPv4 address or a host name, like 192.168.42.1, got"
 NAME = "expected 1 to 32 letters, digits, '-', '_' or '.', beginning with a letter or digit, got"
 SYSID = "expected a whole number from 1 to 250"
 KEYS = ", ".join(Config.__struct_fields__)
+ENDPOINT = "expected a URL like udpout://127.0.0.1:14550, or a mapping with a url and options"
 KEYS_OF_A_DRONE = "name, sysid, address, interface, sim, discovery_port, http_port, rtsp_port, allow_kill"
 
 
@@ -197,7 +198,7 @@ MISTAKES = {
     # Wrong types
     "endpoints: tcpin://127.0.0.1:5760": "endpoints: expected a list of 1 to 32 URLs, got 'tcpin://127.0.0.1:5760'",
     "endpoints: null": "endpoints: expected a list of 1 to 32 URLs, got nothing",
-    "endpoints: [5760]": "endpoints[0]: expected a URL like udpout://127.0.0.1:14550, got 5760",
+    "endpoints: [5760]": f"endpoints[0]: {ENDPOINT}, got 5760",
     "drones: {a: 3}": "drones: expected a list of 1 to 250 drones, got {'a': 3}",
     "drones: [3]": f"drones[0]: expected a mapping with the keys {KEYS_OF_A_DRONE}, got 3",
     "allow_kill: please": "allow_kill: expected true or false, got 'please'",
@@ -207,6 +208,11 @@ MISTAKES = {
     one("sysid: 1, sim: {}, allow_kill: 1"): "drones[0].allow_kill: expected true or false, got 1",
     one("sysid: 1, sim: 4k"): "drones[0].sim: expected a mapping with the keys of a simulated drone, or {}, got '4k'",
     one("sysid: 1, address: 42"): f"drones[0].address: {HOST} 42",
+    "endpoints: [{url: 'udpin://0.0.0.0:1', acces: all}]": "endpoints[0].acces: unknown key; did you mean access?",
+    "endpoints: [{access: all}]": "endpoints[0].url: missing; expected a URL like udpin://0.0.0.0:14550",
+    "endpoints: [{url: 'udpin://0.0.0.0:1', access: fly}]": "endpoints[0].access: expected observe, control or all, got 'fly'",
+    "endpoints: [{url: 'udpin://0.0.0.0:1', systems: [1, x]}]": "endpoints[0].systems[1]: expected a system id from 1 to 255, or a range like 1-9, got 'x'",
+    "endpoints: [{url: 'udpin://0.0.0.0:1', max_clients: 0}]": "endpoints[0].max_clients: expected a whole number from 1 to 250, got 0",
     # Missing
     one("sim: {}"): f"drones[0].sysid: missing; {SYSID}",
     one("sysid: 1"): "drones[0]: expected either address or sim, got neither",
@@ -216,7 +222,7 @@ MISTAKES = {
     # Out of range
     "drones: []": "drones: expected a list of 1 to 250 drones, got []",
     "endpoints: []": "endpoints: expected a list of 1 to 32 URLs, got []",
-    "endpoints: ['']": "endpoints[0]: expected a URL like udpout://127.0.0.1:14550, got ''",
+    "endpoints: ['']": f"endpoints[0]: {ENDPOINT}, got ''",
     one("sysid: 0, sim: {}"): f"drones[0].sysid: {SYSID}, got 0",
     one("sysid: 251, sim: {}"): f"drones[0].sysid: {SYSID}, got 251",
     "drones: [{name: 'a b', sysid: 1, sim: {}}]": f"drones[0].name: {NAME} 'a b'",

@@ -74,7 +74,6 @@ async def flies(pair: Pair) -> None:
             await asyncio.sleep(0.3)
 
 
-@pytest.mark.timeout(300)
 @pytest.mark.parametrize("seed", range(3))
 async def test_drone_after_stop_neither_moves_nor_reports(seed: int) -> None:
     chance = random.Random(seed)

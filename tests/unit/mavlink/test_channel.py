@@ -8,8 +8,8 @@ import pytest
 
 from anafi_mav.errors import LocalProtocolError
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.channel import FRAME_BYTES, Channel, total
-from anafi_mav.mavlink.frames import Parser, ReceivedFrame, frame, pack
+from anafi_mav.mavlink.channel import Channel, total
+from anafi_mav.mavlink.frames import FRAME_BYTES, Parser, ReceivedFrame, frame, pack
 
 ATTITUDE = dialect.MAVLink_attitude_message(1, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5)
 ACK = dialect.MAVLink_command_ack_message(400, 0)

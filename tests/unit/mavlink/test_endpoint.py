@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
+import msgspec
 import pytest
+from msgspec.structs import replace
 
 from anafi_mav.clock import SystemClock
+from anafi_mav.endpoint_options import OPTIONS, EndpointConfig, EndpointOptions
 from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink.base import EndpointUrl
 from anafi_mav.mavlink.endpoint import SCHEMES, is_open_to_network, make_endpoint, parse_endpoint
@@ -30,7 +35,7 @@ FLAVOURS = ("px4", "ardupilot", "standard")
     ],
 )
 def test_good_urls(url: str, scheme: str, place: str, number: int, flavour: str | None) -> None:
-    assert parse_endpoint(url, FLAVOURS) == EndpointUrl(url, scheme, place, number, flavour)
+    assert parse_endpoint(url, FLAVOURS) == EndpointUrl(url, scheme, place, number, EndpointOptions(flavour=flavour))
 
 
 @pytest.mark.parametrize(
@@ -60,19 +65,36 @@ def test_good_urls(url: str, scheme: str, place: str, number: int, flavour: str 
         ("serial://:57600", "expected serial://DEVICE:BAUD"),
         (
             "tcpin://127.0.0.1:5760?flavour=betaflight",
-            "expected flavour px4 or ardupilot or standard, got",
+            "flavour: expected px4, ardupilot or standard, got 'betaflight'",
         ),
-        ("tcpin://127.0.0.1:5760?flavour=", "expected flavour px4 or ardupilot or standard, got ''"),
-        ("tcpin://127.0.0.1:5760?flavor=px4", "no option but ?flavour=px4|ardupilot|standard"),
-        ("tcpin://127.0.0.1:5760?flavour=px4&flavour=px4", "no option but"),
-        ("tcpin://127.0.0.1:5760?", "no option but"),
-        ("tcpin://127.0.0.1:5760?px4", "no option but"),
-        ("tcpin://127.0.0.1:5760?frames=many", "no option but ?flavour=px4|ardupilot|standard, each once"),
-        ("serial:///dev/ttyUSB0:57600?frames=one", "no option but ?flavour=px4|ardupilot|standard, each once"),
-        ("udpin://127.0.0.1:1?frames=2", "expected frames one or many, got '2'"),
-        ("udpin://127.0.0.1:1?frames=", "expected frames one or many, got ''"),
-        ("udpout://127.0.0.1:1?frames=many&frames=one", "frames=one|many, each once"),
-        ("udpout://127.0.0.1:1?flavour=px4&datagrams=many", "and frames=one|many, each once"),
+        ("tcpin://127.0.0.1:5760?flavour=", "flavour: expected px4, ardupilot or standard, got ''"),
+        ("tcpin://127.0.0.1:5760?flavor=px4", "flavor: unknown option; did you mean flavour?"),
+        (
+            "tcpin://127.0.0.1:5760?flavour=px4&flavour=px4",
+            "expected options like ?flavour=px4&access=observe, each once",
+        ),
+        ("tcpin://127.0.0.1:5760?", "expected options like"),
+        ("tcpin://127.0.0.1:5760?px4", "expected options like"),
+        ("tcpin://127.0.0.1:5760?frames=many", "frames: expected none for tcpin://, whose options are flavour"),
+        ("serial:///dev/ttyUSB0:57600?frames=many", "frames: expected none for serial://"),
+        ("udpin://127.0.0.1:1?frames=2", "frames: expected one or many, got '2'"),
+        ("udpin://127.0.0.1:1?frames=", "frames: expected one or many, got ''"),
+        ("udpout://127.0.0.1:1?frames=many&frames=one", "each once"),
+        ("udpout://127.0.0.1:1?flavour=px4&x=many", "x: unknown option; expected one of flavour, access, systems"),
+        ("udpout://127.0.0.1:1?max_clients=3", "max_clients: expected none for udpout://"),
+        ("udpout://127.0.0.1:1?allowed_peers=10.0.0.1", "allowed_peers: expected none for udpout://"),
+        ("udpout://127.0.0.1:1?access=fly", "access: expected observe, control or all, got 'fly'"),
+        ("udpout://127.0.0.1:1?systems=0", "systems: expected a system id from 1 to 255, or a range like 1-9, got '0'"),
+        ("udpout://127.0.0.1:1?systems=1,9-7", "a range like 1-9, got '9-7'"),
+        ("udpout://127.0.0.1:1?systems=1,", "systems: expected a list of system ids and ranges"),
+        ("udpout://127.0.0.1:1?allow_messages=ATTITUDES", "expected the name of a message like ATTITUDE"),
+        ("udpout://127.0.0.1:1?block_messages=30", "expected the name of a message like ATTITUDE, got '30'"),
+        ("udpout://127.0.0.1:1?frames=many&datagram_bytes=1401", "expected a whole number of bytes from 280 to 1400"),
+        ("udpout://127.0.0.1:1?datagram_bytes=1400", "datagram_bytes: expected it together with frames many"),
+        ("udpin://127.0.0.1:1?max_clients=0", "max_clients: expected a whole number from 1 to 250, got '0'"),
+        ("udpin://127.0.0.1:1?idle_limit=-1", "idle_limit: expected a number of seconds from 0 to 86400"),
+        ("udpin://127.0.0.1:1?allowed_peers=10.0.0.1/8", "expected an IP address or a network, got '10.0.0.1/8'"),
+        ("udpin://127.0.0.1:1?allowed_peers=gcs.local", "expected an IP address or a network, got 'gcs.local'"),
     ],
 )
 def test_bad_urls(url: str, expected: str) -> None:
@@ -96,7 +118,55 @@ def test_bad_urls(url: str, expected: str) -> None:
 @pytest.mark.parametrize("scheme", ["udpin", "udpout"])
 def test_udp_url_with_options_keeps_each(scheme: str, query: str, flavour: str | None, frames: str) -> None:
     url = parse_endpoint(f"{scheme}://127.0.0.1:14550{query}", FLAVOURS)
-    assert (url.flavour, url.frames) == (flavour, frames)
+    assert (url.options.flavour, url.options.frames) == (flavour, frames)
+
+
+def test_mapping_and_url_give_the_same_options() -> None:
+    options = {
+        "flavour": "ardupilot",
+        "access": "observe",
+        "systems": [1, "7-9"],
+        "allow_messages": ["ATTITUDE", "SYS_STATUS"],
+        "frames": "many",
+        "datagram_bytes": 1400,
+        "max_clients": 3,
+        "idle_limit": 0.5,
+        "allowed_peers": ["10.8.0.0/24", "::1"],
+    }
+    query = "&".join(
+        f"{name}={','.join(map(str, value)) if isinstance(value, list) else value}" for name, value in options.items()
+    )
+    mapping = msgspec.convert({"url": "udpin://0.0.0.0:14550", **options}, EndpointConfig)
+    by_key = parse_endpoint(mapping, FLAVOURS)
+    by_url = parse_endpoint(f"udpin://0.0.0.0:14550?{query}", FLAVOURS)
+    assert by_key.options.system_ids == by_url.options.system_ids == {1, 7, 8, 9}
+    assert replace(by_url.options, systems=by_key.options.systems) == by_key.options
+    assert by_key.options.changed() == list(options)
+    assert str(by_key.options.networks[0] if by_key.options.networks else None) == "10.8.0.0/24"
+
+
+@pytest.mark.parametrize(
+    ("mapping", "key", "problem"),
+    [
+        ({"url": "udpin:0.0.0.0:1"}, "url", "expected a URL that begins with one of"),
+        ({"url": "udpin://0.0.0.0:1?access=all"}, "url", "expected the options as keys beside url"),
+        ({"url": "udpin://0.0.0.0:1", "flavour": "x"}, "flavour", "expected px4, ardupilot or standard, got 'x'"),
+        ({"url": "tcpin://0.0.0.0:1", "frames": "many"}, "frames", "expected none for tcpin://"),
+    ],
+)
+async def test_error_in_a_mapping_names_its_key(mapping: dict[str, str], key: str, problem: str) -> None:
+    entry = msgspec.convert(mapping, EndpointConfig)
+    with pytest.raises(ConfigError) as caught:
+        parse_endpoint(entry, FLAVOURS)
+    assert caught.value.key_path == key
+    assert problem in caught.value.problem
+    with pytest.raises(ConfigError) as caught:
+        await Node(flavours=FLAVOURS).start(["udpout://127.0.0.1:9", entry])
+    assert caught.value.key_path == f"endpoints[1].{key}"
+
+
+def test_every_option_belongs_to_a_scheme() -> None:
+    assert {name for scheme in SCHEMES.values() for name in scheme.options} == set(OPTIONS)
 
 
 def test_scheme_makes_its_endpoint_with_a_description() -> None:
@@ -107,6 +177,25 @@ def test_scheme_makes_its_endpoint_with_a_description() -> None:
         assert endpoint.local_port is None
         assert scheme.arguments
         assert scheme.description
+
+
+@pytest.mark.parametrize(
+    ("url", "name"),
+    [
+        ("udpout://127.0.0.1:14550", "udpout-127.0.0.1-14550"),
+        ("udpin://[::1]:14550?flavour=px4", "udpin--1-14550"),
+        ("tcpin://0.0.0.0:5760?signing=field", "field"),
+        ("serial:///dev/ttyUSB0:57600", "serial--dev-ttyUSB0-57600"),
+        (
+            "serial:///dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A50285BI-if00-port0:57600",
+            "serial--dev-serial-by-id-usb-FTDI_FT232R_USB_UART_A5028-",
+        ),
+    ],
+)
+def test_key_of_an_endpoint_is_named_by_option_or_url(url: str, name: str) -> None:
+    found = parse_endpoint(url, FLAVOURS).key_name
+    assert re.fullmatch(re.escape(name) + "[0-9a-f]{8}" if name.endswith("-") else re.escape(name), found)
+    assert len(found) <= 64
 
 
 async def test_closing_an_unopened_endpoint_does_nothing() -> None:

@@ -16,9 +16,9 @@ from support.lines import SerialClient, UdpClient, pseudo_terminal
 from support.mav import Client
 from support.world import loopback
 
+from anafi_mav.endpoint_options import CLIENTS
 from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.base import MAX_PEERS
 from anafi_mav.mavlink.channel import QUEUE_BYTES, Channel
 from anafi_mav.mavlink.frames import Parser, ReceivedFrame, frame, pack
 from anafi_mav.mavlink.node import Inbound, Node
@@ -302,8 +302,8 @@ async def test_udpin_adds_peers_by_their_datagrams() -> None:
 async def test_a_full_endpoint_refuses_and_the_others_stay() -> None:
     host = loopback()
     async with bench(f"tcpin://{host}:5760") as d:
-        clients = [await Client(n + 1).connect(5760, host) for n in range(MAX_PEERS)]
-        await d.until(lambda: len(d.node.channels) == MAX_PEERS)
+        clients = [await Client(n + 1).connect(5760, host) for n in range(CLIENTS)]
+        await d.until(lambda: len(d.node.channels) == CLIENTS)
         reader, writer = await asyncio.open_connection(host, 5760)
         with pytest.raises((ConnectionError, asyncio.IncompleteReadError)):
             await asyncio.wait_for(reader.readexactly(1), 5.0)
@@ -313,6 +313,89 @@ async def test_a_full_endpoint_refuses_and_the_others_stay() -> None:
         for client in clients:
             await client.wait("ATTITUDE", since=0)
             await client.close()
+
+
+@pytest.mark.parametrize("scheme", ["tcpin", "udpin"])
+async def test_idle_clients_lock_no_client_out(scheme: str, caplog: pytest.LogCaptureFixture) -> None:
+    host = loopback()
+    port = udp_port(host)
+
+    async def join(sysid: int) -> Client:
+        if scheme == "tcpin":
+            return await Client(sysid).connect(port, host)
+        return await UdpClient(sysid).open(host, (host, port))
+
+    async with bench(f"{scheme}://{host}:{port}?max_clients=3") as d:
+        station = await join(255)
+        station.send(BEAT)
+        await d.until(lambda: bool(d.got("HEARTBEAT", 255)))
+        idle = [await join(n) for n in (1, 2, 3)]
+        for client in idle:
+            if scheme == "udpin":
+                client.send(BEAT)
+        await d.until(lambda: d.node.counters()["refused_peers"] == 1)  # no one has been silent for long enough
+        for _ in range(6):
+            await asyncio.sleep(1.0)
+            station.send(BEAT)
+        new = await join(20)
+        new.send(BEAT)
+        await d.until(lambda: bool(d.got("HEARTBEAT", 20)))
+        assert d.node.counters()["evicted_peers"] == 1
+        d.node.send(ATTITUDE, sysid=1, compid=1)
+        for client in (station, new):
+            await client.wait("ATTITUDE", since=0)
+        assert d.node.endpoints[0].describe().endswith(": 3 clients" if scheme == "tcpin" else ": 3 peers")
+        for client in (station, new, *idle):
+            await client.close()
+    assert sum(" replaces " in record.getMessage() for record in caplog.records) == 1
+
+
+@pytest.mark.parametrize("scheme", ["tcpin", "udpin"])
+@pytest.mark.parametrize(("limit", "dropped"), [(8, True), (0, False)])
+async def test_idle_client_is_dropped_after_its_limit(scheme: str, limit: int, dropped: bool) -> None:
+    host = loopback()
+    port = udp_port(host)
+    async with bench(f"{scheme}://{host}:{port}?idle_limit={limit}") as d:
+        clients = []
+        for sysid in (10, 20):
+            client = Client(sysid)
+            clients.append(client.connect_udp(host, port) if scheme == "udpin" else await client.connect(port, host))
+            client.send(BEAT)
+        await d.until(lambda: len(d.node.channels) == 2)
+        for _ in range(20):
+            await asyncio.sleep(1.0)
+            clients[1].send(BEAT)
+        await d.until(lambda: len(d.node.channels) == (1 if dropped else 2))
+        assert d.node.counters()["idle_peers"] == (1 if dropped else 0)
+        for client in clients:
+            await client.close()
+
+
+@pytest.mark.parametrize("scheme", ["tcpin", "udpin"])
+async def test_address_that_is_not_allowed_is_refused(scheme: str, caplog: pytest.LogCaptureFixture) -> None:
+    host, stranger = loopback(), loopback()
+    port = udp_port(host)
+    async with bench(f"{scheme}://{host}:{port}?allowed_peers=127.0.0.1,10.0.0.0/8") as d:
+        if scheme == "udpin":
+            other = await UdpClient(20).open(stranger, (host, port))
+            for _ in range(2):
+                other.send(BEAT)
+            await d.until(lambda: d.node.counters()["refused_addresses"] == 2)
+            await other.close()
+        else:
+            for count in (1, 2):
+                reader, writer = await asyncio.open_connection(host, port, local_addr=(stranger, 0))
+                with pytest.raises((ConnectionError, asyncio.IncompleteReadError)):
+                    await asyncio.wait_for(reader.readexactly(1), 5.0)
+                writer.close()
+                assert d.node.counters()["refused_addresses"] == count
+        friend = Client(10)
+        friend = friend.connect_udp(host, port) if scheme == "udpin" else await friend.connect(port, host)
+        friend.send(BEAT)
+        await d.until(lambda: bool(d.got("HEARTBEAT", 10)))
+        assert not d.got("HEARTBEAT", 20)
+        await friend.close()
+    assert sum("not one of allowed_peers" in record.getMessage() for record in caplog.records) == 1
 
 
 async def test_serial_line_connected_later_is_opened(tmp_path: Path) -> None:
@@ -367,6 +450,13 @@ async def test_failed_start_leaves_nothing_open() -> None:
         socket.create_server((host, 5760)).close()
 
 
+async def test_broadcast_address_is_refused_with_a_reason() -> None:
+    with pytest.raises(ConfigError) as caught:
+        await Node().start(["udpout://127.255.255.255:14550"])
+    assert caught.value.key_path == "endpoints[0]"
+    assert caught.value.problem.endswith("Permission denied: expected the address of one station, not of a broadcast")
+
+
 async def test_closing_ends_every_connection_and_frees_the_port() -> None:
     host = loopback()
     async with bench(f"tcpin://{host}:5760") as d:
@@ -382,10 +472,20 @@ async def test_closing_ends_every_connection_and_frees_the_port() -> None:
     socket.create_server((host, 5760)).close()
 
 
-@pytest.mark.parametrize(("query", "most"), [("", 40), ("?frames=one", 40), ("?frames=many", 4)])
+@pytest.mark.parametrize(
+    ("query", "most", "limit"),
+    [
+        ("", 40, 512),
+        ("?frames=one", 40, 512),
+        ("?frames=many", 4, 512),
+        ("?frames=many&datagram_bytes=1400", 1, 1400),
+    ],
+)
 @pytest.mark.parametrize("scheme", ["udpout", "udpin"])
-async def test_frames_of_one_iteration_leave_in_configured_datagrams(scheme: str, query: str, most: int) -> None:
-    """One frame per datagram, or as many as a reader with 512 bytes can take. Nothing waits for the next iteration."""
+async def test_frames_of_one_iteration_leave_in_configured_datagrams(
+    scheme: str, query: str, most: int, limit: int
+) -> None:
+    """One frame per datagram, or as many as the limit allows. Nothing waits for the next iteration."""
     host = loopback()
     loop = asyncio.get_running_loop()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
@@ -408,7 +508,7 @@ async def test_frames_of_one_iteration_leave_in_configured_datagrams(scheme: str
                     sizes.append(len(data))
                     sequence += [message.get_seq() for message in parser.parse_buffer(data)]
                 assert sequence == list(range(first, first + 40))
-                assert max(sizes) <= 512
+                assert max(sizes) <= limit
                 assert len(sizes) == 40 if most == 40 else len(sizes) <= most  # of 40 frames with 40 and 26 bytes
             d.node.send(ATTITUDE, sysid=7, compid=1)
             data = await asyncio.wait_for(loop.sock_recv(client, 2048), 2.0)

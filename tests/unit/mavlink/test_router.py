@@ -172,6 +172,14 @@ def test_frame_received_twice_is_forwarded_once(router: Router[str, str]) -> Non
     assert router.route("a", frame, 10.0 + RING_WINDOW).forward == ("b", "c")
 
 
+def test_frame_that_may_not_be_forwarded_takes_no_place(router: Router[str, str]) -> None:
+    router.route("c", heartbeat(source=(FOREIGN, 1)), 0.0)
+    land = command(FOREIGN, 1, seq=7)
+    assert router.route("a", land, 1.0, may_forward=False).forward == ()
+    assert router.route("b", land, 1.1).forward == ("c",)
+    assert router.counters["rings"] == 0
+
+
 def test_router_remembers_a_bounded_number_of_sources(router: Router[str, str]) -> None:
     for sysid in range(2, 250):
         for compid in (1, 2, 3):

@@ -57,6 +57,13 @@ def test_page_contains_no_forbidden_word(page: Path) -> None:
     assert list(forbidden_in(prose(page))) == []
 
 
+def test_tests_of_the_threat_table_exist() -> None:
+    named = set(re.findall(r"`(test_\w+)`", (ROOT / "docs" / "security.md").read_text(encoding="utf-8")))
+    code = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py"))
+    assert len(named) > 20
+    assert sorted(named - set(re.findall(r"def (test_\w+)", code))) == []
+
+
 BEGIN = [page for page in ALL if page.parent.name == "docs" and page.name not in ("changelog.md", "conformance.md")]
 """The changelog has its own form; docs/conformance.md is made by a whole run (tests/conftest.py)."""
 

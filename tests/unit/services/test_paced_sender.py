@@ -9,6 +9,7 @@ from typing import Any, cast
 import pytest
 
 from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.address_proof import AddressProof
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.services.paced_sender import SHARE, PacedSender
 from anafi_mav.services.service import Host
@@ -59,3 +60,40 @@ async def test_slow_line_share_is_divided_among_senders(components: tuple[int, .
     assert [compid for _, compid, _ in left] == list(components) * NUMBER
     for sender in senders:
         sender.clear()
+
+
+class Watched(Channel):
+    """A channel that counts how often it is asked whether it is ready."""
+
+    looks = 0
+
+    @property
+    def ready(self) -> bool:
+        self.looks += 1
+        return super().ready
+
+
+@pytest.mark.parametrize("rate", [None, RATE])
+async def test_list_waits_for_the_proof_without_polling(rate: float | None) -> None:
+    written: list[bytes] = []
+    channel = Watched("from 192.0.2.7", written.append, datagrams=True, bytes_per_second=rate)
+    channel.proof = AddressProof()
+    sender = PacedSender(cast(Host, Component(1)))
+    sender.start(channel, "list", iter([dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)] * NUMBER))
+    await asyncio.sleep(10.0)
+    assert (channel.looks, written) == (0, [])
+    channel.prove()
+    await asyncio.sleep(2.0)
+    assert len(written) == NUMBER
+    assert not channel.when_proved
+
+
+async def test_closed_channel_without_proof_leaves_no_waiting_list() -> None:
+    channel = Channel("from 192.0.2.7", lambda data: None, datagrams=True)
+    channel.proof = AddressProof()
+    sender = PacedSender(cast(Host, Component(1)))
+    sender.start(channel, "list", iter([]))
+    await asyncio.sleep(0.1)
+    sender.closed(channel)
+    await asyncio.sleep(0.1)
+    assert not channel.when_proved

@@ -39,7 +39,7 @@ def test_handlers_of_several_tables_keep_table_order() -> None:
     [
         (
             events.FlyingStateChanged,
-            "Vehicle MessageService GuidedService EventService FenceService RollSignService OffboardFlight "
+            "Vehicle MessageService EventService FenceService RollSignService OffboardFlight "
             "WarningService TakeoffPointService DownloadService",
         ),
         (

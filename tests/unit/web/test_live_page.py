@@ -29,7 +29,7 @@ async def test_page_and_all_that_it_names_are_served() -> None:
                     assert answer.status == 200
                     assert answer.headers["Content-Type"] == f"{kind}; charset=utf-8"
                     text = await answer.text()
-                    assert {*re.findall(r'(?:href|src)="([^"]+)"', text)} <= {*FILES, "/drones"}
+                    assert {*re.findall(r'(?:href|src)="([^"]+)"', text)} <= {*FILES, "/drones", "/status"}
     finally:
         await server.close()
 

@@ -16,7 +16,15 @@ from anafi_mav.arsdk.link.handshake import DeviceInfo
 from anafi_mav.arsdk.link.session import OnMessage
 from anafi_mav.arsdk.messages import ardrone3, common
 from anafi_mav.arsdk.mux import mux, mux_link
-from anafi_mav.arsdk.mux.mux import Control, Decoder, MuxFrame, decode_control, decode_pomp, encode_frame, encode_pomp
+from anafi_mav.arsdk.mux.mux import (
+    Decoder,
+    MuxControl,
+    MuxFrame,
+    decode_control,
+    decode_pomp,
+    encode_frame,
+    encode_pomp,
+)
 from anafi_mav.errors import LinkLost, LocalProtocolError
 
 INFO = DeviceInfo(0x091D, "PI040443AA9K754503", 0, "SC4")
@@ -33,7 +41,7 @@ def test_the_handshake_by_hand() -> None:
     frame = mux.encode_control(mux.HANDSHAKE, 0, 1, mux.VERSION)
     words = "7f000000 00000000 01000000 02000000 00000000 00000000 00000000 00000000"
     assert frame == bytes.fromhex("4d555821 00000000 2c000000 " + words)
-    assert decode_control(frame[12:]) == Control(127, 0, (1, 2, 0, 0, 0, 0))
+    assert decode_control(frame[12:]) == MuxControl(127, 0, (1, 2, 0, 0, 0, 0))
     assert decode_control(frame[12:-1]) is None
 
 

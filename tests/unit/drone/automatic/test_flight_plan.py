@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Hashable
 
 import pytest
 from support.flight_plans import V1
@@ -137,6 +137,50 @@ async def test_unanswered_plan_start_is_withdrawn(device: ScriptedDevice) -> Non
     await drone.close()
     with pytest.raises(LinkLost):
         await starting
+
+
+async def test_playing_state_names_the_attempt_that_it_is_about(device: ScriptedDevice) -> None:
+    drone = device.drone()
+    await drone.connect()
+
+    async def reported(state: PlayingState, uid: str) -> Hashable | None:
+        heard = asyncio.ensure_future(drone.expect(common.MavlinkFilePlayingStateChanged))
+        await asyncio.sleep(0)
+        device.say(common.MavlinkFilePlayingStateChanged(state, uid, MavlinkType.FLIGHT_PLAN))
+        await heard
+        return drone.flight_plan.reported_attempt
+
+    assert await reported(PlayingState.PLAYING, "abc") is None
+    for attempt, uid in enumerate(("abc", "def")):  # 0 is a name like any other
+        starting = asyncio.ensure_future(drone.flight_plan.start(uid, attempt=attempt))
+        await device.until(common.Start, attempt + 1)
+        assert await reported(PlayingState.PLAYING, uid) == attempt
+        await starting
+    assert await reported(PlayingState.STOPPED, "abc") == 0  # late: the second one flies
+    drone.flight_plan.suspend()
+    await device.until(common.Pause)
+    drone.piloting.hover()
+    await device.until(common.Pause, 2)
+    assert await reported(PlayingState.PAUSED, "def") == 1
+    assert await reported(PlayingState.PLAYING, "def") is None  # resumed by another controller
+    await drone.close()
+
+
+async def test_late_error_of_a_withdrawn_start_leaves_the_newer(device: ScriptedDevice) -> None:
+    drone = device.drone()
+    await drone.connect()
+    older = asyncio.ensure_future(drone.flight_plan.start("abc"))
+    await device.until(common.Start)
+    device.script[common.Stop] = lambda _: [common.ComponentStateListChanged(FlightPlanComponent.GPS, 1)]
+    heard = asyncio.ensure_future(drone.expect(common.ComponentStateListChanged))
+    older.cancel()
+    await heard
+    newer = asyncio.ensure_future(drone.flight_plan.start("abc"))
+    await device.until(common.Start, 2)
+    device.say(common.StartingErrorEvent())
+    device.say(common.MavlinkFilePlayingStateChanged(PlayingState.PLAYING, "abc", MavlinkType.FLIGHT_PLAN))
+    await newer
+    await drone.close()
 
 
 async def test_start_at_of_older_firmware_uses_the_older_form(device: ScriptedDevice) -> None:

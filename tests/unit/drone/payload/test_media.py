@@ -148,13 +148,13 @@ async def serving(**answers: web.Response) -> AsyncIterator[tuple[Drone, Scripte
             await runner.cleanup()
 
 
-def told(value: object) -> web.Response:
+def json_answer(value: object) -> web.Response:
     return web.Response(body=json.dumps(value).encode())
 
 
 async def test_media_that_are_not_readable_are_left_out() -> None:
     listed = [{"media_id": "1"}, 5, {"media_id": 7, "resources": 3}, {"no": "id"}, {"media_id": "2", "new": [None]}]
-    async with serving(medias=told(listed), f5=told([1])) as (drone, _):
+    async with serving(medias=json_answer(listed), f5=json_answer([1])) as (drone, _):
         assert drone.media.state.videos == 1
         assert drone.media.state.photo_files == 4
         assert [item.media_id for item in await drone.media.list()] == ["1", "2"]
@@ -170,7 +170,7 @@ async def test_files_that_cannot_be_shown_are_left_out(caplog: pytest.LogCapture
     bad: list[dict[str, object]] = [{"resource_id": id} for id in ("a/b", "a\tb", "a\0", "x" * 231, "..")]
     bad += [{"resource_id": "2.JPG", "size": size} for size in (-1, 1 << 63)]
     many = [{"media_id": str(n), "resources": [good, *bad]} for n in range(500)]  # decoded in a thread
-    async with serving(medias=told(many)) as (drone, _):
+    async with serving(medias=json_answer(many)) as (drone, _):
         for _ in range(2):
             items = await drone.media.list()
             assert {tuple(file.resource_id for file in item.resources) for item in items} == {("1.JPG",)}
@@ -201,8 +201,12 @@ async def test_long_list_is_sorted_in_a_thread() -> None:
 
 
 async def test_missing_md5_differs_from_failed_md5_request() -> None:
-    answers = {"path": told({"md5": "../../x"}), "short": told({"md5": "0" * 31}), "error": web.Response(status=500)}
-    async with serving(good=told({"md5": "A" * 32}), **answers) as (drone, _):
+    answers = {
+        "path": json_answer({"md5": "../../x"}),
+        "short": json_answer({"md5": "0" * 31}),
+        "error": web.Response(status=500),
+    }
+    async with serving(good=json_answer({"md5": "A" * 32}), **answers) as (drone, _):
         assert await drone.media.known_md5(Resource("good")) == "a" * 32
         assert await drone.media.known_md5(Resource("none")) is None
         for name, problem in (

@@ -281,6 +281,15 @@ async def test_motors_stopping_again_are_a_refused_takeoff(drone: Drone, device:
         await drone.piloting.take_off()
 
 
+async def test_repeated_landed_does_not_refuse_a_takeoff(drone: Drone, device: ScriptedDevice) -> None:
+    device.script[ardrone3.TakeOff] = lambda _: [
+        ardrone3.FlyingStateChanged(FlyingState.LANDED),  # of before, a second time
+        ardrone3.FlyingStateChanged(FlyingState.MOTOR_RAMPING),
+        ardrone3.FlyingStateChanged(FlyingState.TAKINGOFF),
+    ]
+    await drone.piloting.take_off()
+
+
 async def test_no_take_off_while_landing(drone: Drone, device: ScriptedDevice) -> None:
     await reported(drone, device, ardrone3.FlyingStateChanged(FlyingState.LANDING))
     with pytest.raises(CommandRejected, match="landing"):

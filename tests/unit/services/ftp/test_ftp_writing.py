@@ -6,7 +6,7 @@ import struct
 
 from anafi_mav.services.files import FileError as Error
 from anafi_mav.services.files import FileTree
-from anafi_mav.services.ftp.ftp import ACK, NAK, PAYLOAD, SESSION_TIMEOUT, FtpServer, Opcode
+from anafi_mav.services.ftp.ftp import ACK, MAX_CLIENTS, NAK, PAYLOAD, SESSION_TIMEOUT, FtpServer, Opcode
 
 PATH = b"@MISSION/mission.dat"
 ROOM = 1000
@@ -31,13 +31,15 @@ class Writable:
 
 class Bench:
     def __init__(self) -> None:
-        self.server, self.files, self.now, self.seq = FtpServer(), Writable(), 0.0, 0
+        self.server, self.files, self.now, self.seq = FtpServer(lambda who: str(who)[0]), Writable(), 0.0, 0
 
-    def ask(self, opcode: int, data: bytes = b"", *, offset: int = 0, seq: int | None = None) -> tuple[int, bytes]:
+    def ask(
+        self, opcode: int, data: bytes = b"", *, offset: int = 0, seq: int | None = None, who: str = "a"
+    ) -> tuple[int, bytes]:
         """Opcode and data of the answer. Without a `seq` each request has another one."""
         self.seq += 2
         header = struct.pack("<HBBBBBBI", self.seq if seq is None else seq, 0, opcode, len(data), 0, 0, 0, offset)
-        reply = self.server.receive("a", (header + data).ljust(PAYLOAD, b"\0"), self.files, self.now)
+        reply = self.server.receive(who, (header + data).ljust(PAYLOAD, b"\0"), self.files, self.now)
         assert reply is not None
         size = struct.unpack_from("<HBBBBBBI", reply)[3]
         return reply[3], reply[12 : 12 + size]
@@ -130,3 +132,30 @@ def test_file_under_writing_cannot_be_read_in_its_session() -> None:
     b.ask(Opcode.CREATE_FILE, PATH)
     for opcode in (Opcode.READ_FILE, Opcode.BURST_READ_FILE):
         assert b.ask(opcode) == (NAK, bytes((Error.INVALID_SESSION,)))
+
+
+def test_many_clients_end_no_upload() -> None:
+    b = Bench()
+    b.ask(Opcode.CREATE_FILE, PATH, who="pilot")
+    for number in range(3 * MAX_CLIENTS):
+        assert b.ask(Opcode.NONE, who=f"observer {number}") == (ACK, b"")
+    assert b.ask(Opcode.WRITE_FILE, b"hello", who="pilot") == (ACK, b"")
+    b.ask(Opcode.TERMINATE_SESSION, who="pilot")
+    assert b.files.written == [b"hello"]
+
+
+def test_client_of_a_crowded_channel_gives_way_first() -> None:
+    b = Bench()
+    b.ask(Opcode.TERMINATE_SESSION, who="pilot", seq=7)
+    for number in range(3 * MAX_CLIENTS):
+        b.ask(Opcode.NONE, who=f"observer {number}")
+    assert "pilot" in b.server._clients
+    assert len(b.server._clients) == MAX_CLIENTS
+
+
+def test_client_is_refused_while_all_others_write() -> None:
+    b = Bench()
+    for number in range(MAX_CLIENTS):
+        b.ask(Opcode.CREATE_FILE, PATH, who=f"{number}")
+    assert b.ask(Opcode.CREATE_FILE, PATH, who="late") == (NAK, bytes((Error.NO_SESSIONS_AVAILABLE,)))
+    assert b.server.sessions == MAX_CLIENTS

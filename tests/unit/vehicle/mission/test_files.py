@@ -39,12 +39,12 @@ async def files() -> AsyncIterator[FilesOnDrone]:
 
 def told(mission: tuple[Item, ...], flown: FlightPlanFile, after: int) -> list[tuple[int, ...]]:
     """What is done with the lines that the drone flies."""
-    progress = MissionProgress()
-    progress.take(mission)
-    progress.begin(flown, after)
-    done = [progress.executed(line) for line in range(after + 1, len(flown.origins))]
+    progress, found = MissionProgress().in_file("", flown, after), []
+    for line in range(after + 1, len(flown.origins)):
+        progress, done = progress.with_executed(mission, line)
+        found.append(done)
     assert progress.leg_done
-    return done
+    return found
 
 
 async def test_same_mission_continues_inside_its_file(files: FilesOnDrone) -> None:

@@ -7,8 +7,11 @@ import pytest
 from anafi_mav import mav_enums
 from anafi_mav.plans.formats.parrot import SET_STILL_MODE, SET_VIEW_MODE
 from anafi_mav.plans.plan import DO_JUMP, Item
+from anafi_mav.plans.rules.parts import GatewayStep
+from anafi_mav.vehicle.mission.course import Course
+from anafi_mav.vehicle.mission.effects import Prepared
+from anafi_mav.vehicle.mission.machine import MissionMachine
 from anafi_mav.vehicle.mission.payload_items import PayloadItems
-from anafi_mav.vehicle.mission.progress import MissionProgress
 
 UP, WAY, SPEED = 22, 16, 178
 AIM = mav_enums.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
@@ -81,10 +84,27 @@ def test_jump_within_the_repeated_items_is_followed() -> None:
 
 
 def test_paused_mission_frees_gimbal_and_camera() -> None:
-    progress = MissionProgress()
-    progress.take([item(UP), item(AIM), item(PHOTO), item(WAY)])
-    seen = [(progress.needs_gimbal, progress.needs_camera)]
-    for step in (lambda: progress.fly(0), progress.stop, lambda: progress.fly(2), lambda: progress.fly(3)):
+    items, later = [item(UP), item(AIM), item(PHOTO), item(WAY)], Course((GatewayStep(2, (2,)), GatewayStep(3, (3,))))
+    machine = MissionMachine()
+    machine.upload(items, 7, 0.0)
+    seen = [(machine.needs_gimbal, machine.needs_camera)]
+
+    def fly(first: int, course: Course) -> None:
+        attempt = machine.attempt(first)
+        machine.prepared(attempt, Prepared(course))
+        machine.granted(attempt)
+
+    def finish() -> None:
+        assert machine.phase.attempt is not None
+        machine.item_flown(machine.phase.attempt)
+
+    steps = (
+        lambda: fly(0, Course((GatewayStep(0, (0,)),))),
+        lambda: machine.control_lost(0.0),
+        lambda: fly(2, later),
+        finish,
+    )
+    for step in steps:
         step()
-        seen.append((progress.needs_gimbal, progress.needs_camera))
+        seen.append((machine.needs_gimbal, machine.needs_camera))
     assert seen == [(False, False), (True, True), (False, False), (False, True), (False, False)]

@@ -7,28 +7,11 @@ import pytest
 from anafi_mav import mav_enums
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import FlightPlanFile
-from anafi_mav.vehicle.mission.progress import TRANSITIONS, Event, MissionProgress, State
+from anafi_mav.vehicle.mission.course import Course
+from anafi_mav.vehicle.mission.effects import DroneReport, Prepared, Reached
+from anafi_mav.vehicle.mission.machine import MissionMachine, State
+from anafi_mav.vehicle.mission.progress import MissionProgress
 from anafi_mav.vehicle.mission.record import MissionRecord
-
-IMPOSSIBLE = {
-    (State.NONE, Event.CHOOSE),
-    (State.NONE, Event.BEGIN),
-    (State.NONE, Event.STOP),
-    (State.NONE, Event.FINISH),
-    (State.READY, Event.STOP),
-    (State.READY, Event.FINISH),
-    (State.ACTIVE, Event.CHOOSE),
-    (State.PAUSED, Event.STOP),
-    (State.PAUSED, Event.FINISH),
-    (State.COMPLETE, Event.STOP),
-    (State.COMPLETE, Event.FINISH),
-}
-
-
-def test_every_progress_state_has_its_events() -> None:
-    for state in State:
-        for event in Event:
-            assert ((state, event) in IMPOSSIBLE) is (event not in TRANSITIONS[state]), (state, event)
 
 
 def item(command: int) -> Item:
@@ -41,116 +24,138 @@ LEG = FlightPlanFile(b"QGC WPL 120\n" + b"x\n" * 6, (0, 0, 1, 2, 4, 5), ((), (0,
 
 
 def flying() -> MissionProgress:
-    progress = MissionProgress()
-    progress.take(ITEMS)
-    assert (progress.state, progress.current, progress.first) == (State.READY, 0, 0)
-    progress.begin(LEG)
-    return progress
+    return MissionProgress().in_file("name", LEG, -1)
+
+
+def after(progress: MissionProgress, *lines: int) -> tuple[MissionProgress, list[tuple[int, ...]]]:
+    """The progress after these lines, and what was done with each."""
+    found = []
+    for line in lines:
+        progress, done = progress.with_executed(ITEMS, line)
+        found.append(done)
+    return progress, found
 
 
 def test_line_after_line() -> None:
     progress = flying()
-    told = [(progress.executed(line), progress.current) for line in range(6)]
-    assert told == [((), 0), ((0,), 1), ((1,), 2), ((2, 3), 4), ((4,), 5), ((5,), 5)]
+    reported = []
+    for line in range(6):
+        progress, done = progress.with_executed(ITEMS, line)
+        reported.append((done, progress.current))
+    assert reported == [((), 0), ((0,), 1), ((1,), 2), ((2, 3), 4), ((4,), 5), ((5,), 5)]
     assert progress.leg_done
-    progress.finish()
-    assert (progress.state, progress.first) == (State.COMPLETE, 0)
 
 
 JUMP = Item(mav_enums.MAV_CMD_DO_JUMP, 2, (1.0, 3.0, None, None, None, None, None))
 
 
 def test_turns_of_loops_are_counted() -> None:
-    """With each line that has the jump, also when the drone's word for it was lost; a chosen item begins them anew."""
-    progress = MissionProgress()
-    progress.take([*ITEMS[:3], JUMP])
-    progress.begin(FlightPlanFile(b"", (1, 2, 1, 2, 1, 2), ((1,), (2, 3), (1,), (2, 3), (1,), (2, 3))))
-    progress.executed(0)
-    assert progress.jumps == {}
-    progress.executed(1)
-    assert progress.jumps == {3: 1}
-    progress.executed(4)  # 2 and 3 were not heard
-    assert progress.jumps == {3: 2}
-    progress.executed(3)
-    assert progress.jumps == {3: 2}
-    progress.stop()
-    progress.choose(1, anew=False)
-    assert progress.jumps == {3: 2}
-    progress.choose(1)
-    assert progress.jumps == {}
-    progress.fly(1)
-    progress.did((1, 3))
-    assert progress.jumps == {3: 1}
-    progress.finish()
-    assert progress.jumps == {}
+    """With each line that has the jump, also when the drone's report of it was lost."""
+    items = [*ITEMS[:3], JUMP]
+    leg = FlightPlanFile(b"", (1, 2, 1, 2, 1, 2), ((1,), (2, 3), (1,), (2, 3), (1,), (2, 3)))
+    progress, counted = MissionProgress().in_file("", leg, -1), []
+    for line in (0, 1, 4, 3):  # 2 and 3 were not received, or too late
+        progress, _ = progress.with_executed(items, line)
+        counted.append(dict(progress.jumps))
+    assert counted == [{}, {3: 1}, {3: 2}, {3: 2}]
+    assert MissionProgress().at_item(1).with_done(items, (1, 3)).jumps == {3: 1}
+
+
+def test_chosen_item_restarts_loops_and_end_clears_them() -> None:
+    machine = MissionMachine()
+    machine.upload([*ITEMS[:3], JUMP], 7, 0.0)
+    leg = FlightPlanFile(b"", (1, 2), ((1,), (2, 3)))
+    attempt = machine.attempt(1)
+    machine.prepared(attempt, Prepared(Course((leg,)), "name"))
+    machine.granted(attempt)
+    machine.playing("name")
+    machine.executed(1)
+    assert machine.progress.jumps == {3: 1}
+    assert machine.attempt().jumps == {3: 1}
+    assert machine.attempt(1).jumps == {}
+    machine.halted(stopped=True, report=DroneReport(), now=0.0)
+    assert (machine.rest, machine.progress.jumps) == (State.COMPLETE, {})
 
 
 def test_repeated_or_invalid_line_changes_no_progress() -> None:
-    progress = flying()
-    assert progress.executed(1) == (0,)
-    for line in (1, 0, -1, 6, 4_000_000_000):
-        assert progress.executed(line) == ()
+    progress, done = after(flying(), 1)
+    assert done == [(0,)]
+    assert after(progress, 1, 0, -1, 6, 4_000_000_000) == (progress, [()] * 5)
     assert (progress.line, progress.current) == (1, 1)
 
 
 def test_skipped_lines_are_not_reported_as_reached() -> None:
     """The link was away while items 1 to 3 may have been flown."""
-    progress = flying()
-    progress.executed(1)
-    assert progress.executed(4) == (4,)
+    progress, done = after(flying(), 1, 4)
+    assert done == [(0,), (4,)]
     assert progress.current == 5
 
 
 def test_omitted_item_is_skipped_but_lineless_items_count() -> None:
-    progress = flying()
-    progress.executed(2)
-    assert progress.skip(3) == 2
-    assert progress.executed(3) == (3,)
-    assert progress.skip(9) is None
+    progress, _ = after(flying(), 2)
+    progress, item = progress.with_skipped(3)
+    assert item == 2
+    progress, done = after(progress, 3)
+    assert done == [(3,)]
+    assert progress.with_skipped(9) == (progress, None)
+
+
+def flown(*lines: int) -> MissionMachine:
+    """The mission is flown, and these lines are executed."""
+    machine = MissionMachine()
+    machine.upload(ITEMS, 7, 0.0)
+    assert (machine.rest, machine.progress.current, machine.first) == (State.READY, 0, 0)
+    attempt = machine.attempt()
+    machine.prepared(attempt, Prepared(Course((LEG,)), "name"))
+    machine.granted(attempt)
+    machine.playing("name")
+    for line in lines:
+        machine.executed(line)
+    return machine
+
+
+def paused(*lines: int) -> MissionMachine:
+    machine = flown(*lines)
+    machine.control_lost(0.0)
+    machine.halted(stopped=False, report=DroneReport(), now=0.0)
+    assert machine.state is State.PAUSED
+    return machine
 
 
 def test_paused_mission_completes_no_item() -> None:
-    progress = flying()
-    progress.executed(1)
-    progress.stop()
-    assert progress.executed(2) == ()
-    assert (progress.state, progress.current) == (State.PAUSED, 1)
-    progress.begin(LEG, progress.line)
-    assert progress.executed(2) == (1,)
+    machine = paused(1)
+    assert machine.executed(2) == []
+    assert (machine.state, machine.progress.current) == (State.PAUSED, 1)
+    machine.playing("name")
+    assert Reached(1) in machine.executed(2)
 
 
 def test_last_line_marks_the_plans_own_end() -> None:
-    progress = flying()
-    seen = []
+    machine, seen = flown(), []
     for line in range(6):
-        seen.append((progress.ending, progress.at_last_line))
-        progress.executed(line)
+        seen.append((machine.ending, machine.progress.at_last_line))
+        machine.executed(line)
     assert seen == [(False, False)] * 5 + [(True, True)]
-    assert not progress.ending, "done"
+    assert not machine.ending, "done"
 
 
 def test_choosing_an_item() -> None:
-    progress = flying()
-    progress.executed(3)
-    progress.stop()
-    progress.choose(1)
-    assert (progress.state, progress.current, progress.leg) == (State.PAUSED, 1, None)
-    for wrong in (-1, 6):
-        with pytest.raises(ValueError, match="no item"):
-            progress.choose(wrong)
-    progress.begin(LEG, 5)
-    progress.finish()
-    progress.choose(4)
-    assert (progress.state, progress.first) == (State.READY, 4)
+    machine = paused(3)
+    machine.choose(1)
+    assert (machine.state, machine.progress.current, machine.progress.leg) == (State.PAUSED, 1, None)
+    machine = flown(5)
+    machine.halted(stopped=True, report=DroneReport(), now=0.0)
+    assert (machine.state, machine.first) == (State.COMPLETE, 0)
+    machine.choose(4)
+    assert (machine.state, machine.first) == (State.READY, 4)
 
 
 def test_another_mission() -> None:
-    progress = flying()
-    progress.executed(3)
-    progress.take(ITEMS[:2])
-    assert (progress.state, progress.current, progress.leg) == (State.READY, 0, None)
-    progress.take([])
-    assert progress.state is State.NONE
+    machine = paused(3)
+    machine.upload(ITEMS[:2], 8, 0.0)
+    assert (machine.state, machine.progress.current, machine.progress.leg) == (State.READY, 0, None)
+    machine.upload((), 0, 0.0)
+    assert machine.state is State.NO_MISSION
 
 
 PLACE = "\t0\t3\t16\t0\t0\t0\t0\t48.0\t2.0\t10.0\t1"

@@ -9,9 +9,9 @@ import pytest
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.setpoint.setpoint_messages import attitude_setpoint, global_setpoint, local_setpoint
-from anafi_mav.vehicle.base.silence import SILENCE
 from anafi_mav.vehicle.base.velocity_loop import turn_towards
 from anafi_mav.vehicle.offboard.setpoints import AttitudeSetpoint, MotionSetpoint, PositionReference, Setpoint
+from anafi_mav.vehicle.offboard.silence import SILENCE
 from anafi_mav.vehicle.offboard.stream import (
     LATE_AFTER_STREAM,
     MAX_PILOTS,

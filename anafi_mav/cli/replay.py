@@ -1,0 +1,150 @@
+"""`anafi-mav replay`: plays a recorded session, or any tlog, to MAVLink endpoints.
+
+A ground station then shows the flight again. Only frames of vehicles are sent: those of the clients of then would
+look like other stations. What a client sends back is dropped: nothing flies. With --trace the ARSDK messages of the
+session are printed at their times.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import heapq
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from anafi_mav.cli import interrupts, log, options
+from anafi_mav.cli.terminal import say
+from anafi_mav.errors import ConfigError
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.frames import Parser, ReceivedFrame
+from anafi_mav.mavlink.node import Node
+from anafi_mav.recording.tlog import TlogEntry, TlogReader
+from anafi_mav.recording.trace import TraceEntry, read_line
+from anafi_mav.services.flavours import FLAVOURS
+
+CHUNK = 64 * 1024
+"""Bytes of a file that are read at once."""
+
+LONGEST_LINE = 1_000_000
+"""Bytes of a line of a trace."""
+
+LONGEST_PAUSE = 5.0
+"""s: a longer gap, as between two flights, is shortened to this."""
+
+DEFAULT_ENDPOINT = "udpout://127.0.0.1:14550"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `anafi-mav replay`."""
+    parser.add_argument("path", type=Path, metavar="SESSION", help="folder of a recorded session, or a .tlog file")
+    parser.add_argument(
+        "--endpoint", action="append", metavar="URL", help=f"where to send ({DEFAULT_ENDPOINT}); repeatable"
+    )
+    parser.add_argument("--speed", default="1", metavar="N", help="recorded seconds per second, from 0.1 to 20")
+    parser.add_argument("--start", default="0", metavar="S", help="begin so many seconds after the first frame")
+    parser.add_argument("--trace", action="store_true", help="print the ARSDK messages of the session")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Play to the end or to Ctrl-C. Raises `ConfigError` for a path without a recording."""
+    log.set_up()
+    tlogs, traces = files_of(arguments.path)
+    speed = options.speed(arguments.speed)
+    start = options.number("--start", arguments.start, "a number of seconds")
+    endpoints = arguments.endpoint or [DEFAULT_ENDPOINT]
+    count = interrupts.run(_play(tlogs, traces if arguments.trace else [], endpoints, speed, start))
+    say(f"{count} frames played")
+    return 0
+
+
+def files_of(path: Path) -> tuple[list[Path], list[Path]]:
+    """Return the parts of a session's tlog and of its trace. Raises `ConfigError`."""
+    if path.is_dir():
+        tlogs = sorted(path.glob("gateway.*.tlog"))
+        traces = sorted(path.glob("arsdk.*.jsonl"))
+    else:
+        tlogs, traces = ([path] if path.is_file() else []), []
+    if not tlogs:
+        raise ConfigError("SESSION", f"expected the folder of a recorded session or a .tlog file, got {path}")
+    return tlogs, traces
+
+
+def read_tlogs(paths: Sequence[Path]) -> Iterator[TlogEntry]:
+    """Yield the entries of some files, one after another."""
+    for path in paths:
+        reader = TlogReader()
+        with path.open("rb") as file:
+            while data := file.read(CHUNK):
+                yield from reader.receive(data)
+
+
+def read_traces(paths: Sequence[Path]) -> Iterator[TraceEntry]:
+    """Yield the entries of some files, one after another."""
+    for path in paths:
+        with path.open("rb") as file:
+            while line := file.readline(LONGEST_LINE):
+                if (entry := read_line(line)) is not None:
+                    yield entry
+
+
+class VehicleFrames:
+    """Chooses the frames of vehicles: systems that have sent a HEARTBEAT with an autopilot."""
+
+    def __init__(self) -> None:
+        self._parser = Parser()
+        self._vehicles: set[int] = set()
+
+    def choose(self, raw: bytes) -> ReceivedFrame | None:
+        """Return the frame of a vehicle; None for another one, and for what is no frame."""
+        found = self._parser.receive_datagram(raw)
+        if not found:
+            return None
+        frame = found[0]
+        message = frame.message
+        if frame.id == dialect.MAVLINK_MSG_ID_HEARTBEAT and message.autopilot != dialect.MAV_AUTOPILOT_INVALID:
+            self._vehicles.add(frame.sysid)
+        return frame if frame.sysid in self._vehicles else None
+
+
+async def _play(
+    tlogs: Sequence[Path], traces: Sequence[Path], endpoints: Sequence[str], speed: float, start: float
+) -> int:
+    """Send everything at its time; return the number of frames."""
+    node = Node(flavours=tuple(FLAVOURS))
+    await node.start(endpoints)
+    try:
+        return await _send(node, tlogs, traces, speed, start)
+    finally:
+        await node.close()
+
+
+async def _send(node: Node, tlogs: Sequence[Path], traces: Sequence[Path], speed: float, start: float) -> int:
+    loop = asyncio.get_running_loop()
+    vehicles, count = VehicleFrames(), 0
+    merged = heapq.merge(
+        ((entry.time, 0, entry) for entry in read_tlogs(tlogs)),
+        ((entry.t, 1, entry) for entry in read_traces(traces)),
+        key=lambda one: one[:2],
+    )
+    first: float | None = None
+    before, due = 0.0, loop.time()
+    for at, _, entry in merged:
+        first = at if first is None else first
+        frame = vehicles.choose(entry.frame) if isinstance(entry, TlogEntry) else None
+        if at - first < start:
+            before = at
+            continue
+        due += min(max(0.0, at - max(before, first + start)), LONGEST_PAUSE) / speed
+        before = max(before, at)
+        if due > loop.time():
+            await asyncio.sleep(due - loop.time())
+        if isinstance(entry, TraceEntry):
+            say(f"{at - first:.3f} {entry.drone} {entry.kind} {entry.name} {json.dumps(entry.args)}")
+        elif frame is not None:
+            raw = frame.version_2()
+            for channel in node.channels:
+                channel.forward(raw)
+            count += 1
+    return count

@@ -1,0 +1,56 @@
+"""`anafi-mav run --check`: looks whether a gateway could start, without starting one.
+
+It opens what a start opens (state folder, keys, endpoints, video and web server) and closes it again, so that it and a
+start cannot disagree. No drone is connected to. An endpoint that connects (`tcpout`, `serial`) is open for a moment.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import platform
+from collections.abc import Callable
+from typing import Any
+
+from anafi_mav import __version__
+from anafi_mav.cli.addresses import Reservations
+from anafi_mav.cli.doctor import Finding, ok, wrong
+from anafi_mav.config import Config, remarks
+from anafi_mav.errors import ConfigError
+from anafi_mav.gateway import Gateway
+
+__all__ = ["findings", "wrong"]
+
+Place = Callable[[Config, Reservations], tuple[Config, dict[str, Any] | None]]
+"""Gives simulated drones their addresses. Raises `ConfigError`."""
+
+
+async def findings(config: Config, place: Place) -> list[Finding]:
+    """Return a line for each thing that a start needs."""
+    found = [versions(), ok("configuration", f"{len(config.drones)} drones, {len(config.endpoints)} endpoints")]
+    found += [ok("configuration", f"warning: {remark}") for remark in remarks(config)]
+    with Reservations() as reservations:
+        try:
+            placed, _ = place(config, reservations)
+        except ConfigError as error:
+            return [*found, wrong(error.key_path, error.problem, "mend it at that key")]
+    gateway = Gateway(placed)
+    try:
+        await gateway.open()
+    except ConfigError as error:
+        return [*found, wrong(error.key_path, error.problem, "mend it at that key, or free what it names")]
+    try:
+        problems = gateway.state_problems()
+        found += [wrong("state", problem, "give the gateway a folder that it can write") for problem in problems]
+        if not problems:
+            found.append(ok("state", "folder can be written, and no other gateway uses it"))
+        found += [ok("open", line) for line in gateway.lines()]
+    finally:
+        await gateway.close()
+    return found
+
+
+def versions() -> Finding:
+    """Return the versions of what runs."""
+    picture = "with" if importlib.util.find_spec("aiortc") else "without"
+    facts = f"anafi-mav {__version__}, Python {platform.python_version()}, {platform.system()} {platform.release()}"
+    return ok("versions", f"{facts}, {picture} live picture in browsers (aiortc)")

@@ -1,0 +1,209 @@
+"""`anafi-mav status`: shows the drones, clients and refused commands of a running gateway.
+
+It asks the gateway's web server, whose address and token it finds in the state folder. On a terminal the tables are
+shown again every second until Ctrl-C, elsewhere once. Nothing is commanded.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import aiohttp
+import msgspec
+
+from anafi_mav.cli import interrupts, log
+from anafi_mav.cli.terminal import TableRows, is_live, live_tables, say, say_json, say_table
+from anafi_mav.errors import AnafiMavError, ConfigError
+from anafi_mav.state_lock import read_holder, state_folder
+from anafi_mav.status_record import PATH, VERSION, ClientStatus, DroneStatus, GatewayStatus, Quantiles
+from anafi_mav.web.access_token import AccessToken, read_token
+from anafi_mav.web.server import QUERY
+
+EVERY = 1.0
+"""s between two requests."""
+
+LIMIT = 5.0
+"""s for an answer."""
+
+MAX_REFUSED = 10
+"""Refused commands that are shown."""
+
+
+class AskedGateway(NamedTuple):
+    """Web server of the gateway that is asked."""
+
+    url: str
+    """Ends in "/"."""
+    token: AccessToken | None
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `anafi-mav status`."""
+    parser.add_argument("--state", metavar="FOLDER", help="state folder of the gateway, if it is not the usual one")
+    parser.add_argument("--url", metavar="URL", help="web server of the gateway, like http://192.168.1.7:8088/")
+    parser.add_argument("--json", action="store_true", help="print the record once, as JSON")
+    parser.add_argument(
+        "--link", action="store_true", help="print the link that opens the page in a browser; it holds the token"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Show the status. Raises `AnafiMavError` when no gateway answers."""
+    log.set_up()
+    source = find(arguments.state, arguments.url)
+    if arguments.link:
+        query = "" if source.token is None else f"?{QUERY}={source.token.text}"
+        say(f"{source.url}status{query}")
+        return 0
+    interrupts.run(_show(source, as_json=arguments.json))
+    return 0
+
+
+def find(state: str | None, url: str | None) -> AskedGateway:
+    """Return where the gateway of a state folder, or of a URL, is asked. Raises `ConfigError`."""
+    folder = state_folder(state)
+    if url is not None:
+        if not url.startswith(("http://", "https://")):
+            raise ConfigError("--url", f"expected a URL like http://192.168.1.7:8088/, got {url!r}")
+        return AskedGateway(url.rstrip("/") + "/", read_token(folder))
+    holder = read_holder(folder)
+    if holder is None:
+        raise ConfigError("--state", f"expected the folder of a running gateway; no gateway holds {folder}")
+    if not holder.web:
+        raise ConfigError("--state", f"expected a gateway with a web server; that of process {holder.pid} has none")
+    return AskedGateway(holder.web, read_token(folder))
+
+
+async def fetch(session: aiohttp.ClientSession, source: AskedGateway) -> bytes:
+    """Return the record as the gateway sends it. Raises `AnafiMavError`."""
+    headers = {} if source.token is None else {"Authorization": f"Bearer {source.token.text}"}
+    try:
+        async with session.get(source.url + PATH.lstrip("/"), headers=headers) as answer:
+            body = await answer.read()
+            if answer.status != 200:
+                raise AnafiMavError(f"{source.url}: {answer.status} {body.decode(errors='replace').strip()[:200]}")
+            return body
+    except (aiohttp.ClientError, OSError, asyncio.TimeoutError) as error:
+        raise AnafiMavError(f"{source.url} does not answer: {error or 'no answer'}") from error
+
+
+def decode(body: bytes) -> GatewayStatus:
+    """Return the record in an answer. Raises `AnafiMavError` for one of another version."""
+    try:
+        status = msgspec.json.decode(body, type=GatewayStatus)
+    except msgspec.ValidationError as error:
+        raise AnafiMavError(f"the gateway's status is not of version {VERSION}: {error}") from error
+    except (ValueError, RecursionError) as error:
+        raise AnafiMavError(f"the gateway's status is no JSON: {error}") from error
+    if status.version != VERSION:
+        raise AnafiMavError(f"expected a status of version {VERSION}, the gateway sent {status.version}")
+    return status
+
+
+async def _show(source: AskedGateway, *, as_json: bool) -> None:
+    async with aiohttp.ClientSession(timeout=aiohttp.ClientTimeout(total=LIMIT)) as session:
+        body = await fetch(session, source)
+        if as_json:
+            decode(body)
+            say_json(json.loads(body))
+            return
+        if not is_live():
+            for line in head(decode(body)):
+                say(line)
+            for table in tables(decode(body)):
+                say_table(*table)
+            return
+        with live_tables() as show:
+            while True:
+                status = decode(body)
+                show(head(status), tables(status))
+                await asyncio.sleep(EVERY)
+                body = await fetch(session, source)
+
+
+def head(status: GatewayStatus) -> list[str]:
+    """Return the lines above the tables."""
+    lines = [
+        f"anafi-mav {status.program}, process {status.pid}, up {status.uptime_s:.0f} s, "
+        f"timers late {_quantiles(status.loop_delay)}"
+    ]
+    if status.web is not None:
+        lines.append(f"page {status.web.url}status")
+    return [*lines, *status.problems]
+
+
+def tables(status: GatewayStatus) -> list[TableRows]:
+    """Return drones, clients and refused commands as tables."""
+    result = [
+        TableRows(
+            ("drone", "id", "state", "mode", "battery", "GPS", "height", "radio", "heard", "commands", "warnings"),
+            [_drone(drone) for drone in status.drones],
+        ),
+        TableRows(
+            ("client", "systems", "heard", "out", "in", "dropped"),
+            [_client(client) for endpoint in status.endpoints for client in endpoint.clients]
+            or [("no client", "", "", "", "", "")],
+        ),
+    ]
+    if refused := list(_refused(status))[:MAX_REFUSED]:
+        result.append(TableRows(("ago", "drone", "from", "refused command", "result", "reason"), refused))
+    peers = [
+        (endpoint.url, reason, str(count))
+        for endpoint in status.endpoints
+        for reason, count in sorted(endpoint.refused.items())
+    ]
+    if peers:
+        result.append(TableRows(("endpoint", "refused", "count"), peers))
+    return result
+
+
+def _drone(drone: DroneStatus) -> Sequence[str]:
+    if not drone.connected:
+        return (drone.name, str(drone.sysid), "not connected", *("",) * 7, drone.problem)
+    radio = " ".join(
+        part for part in (_number(drone.radio_quality, "/5"), _number(drone.radio_dbm, " dBm")) if part != "-"
+    )
+    return (
+        drone.name,
+        str(drone.sysid),
+        f"{(drone.flying or '').lower().replace('_', ' ')}{', armed' if drone.armed else ''}",
+        drone.mode or "",
+        _number(drone.battery_percent, " %"),
+        ("fix " if drone.gps_fix else "no fix ") + _number(drone.satellites),
+        _number(drone.height_m, " m"),
+        radio or "-",
+        _number(drone.silence_s, " s"),
+        _quantiles(drone.commands.latency),
+        "; ".join(drone.warnings),
+    )
+
+
+def _client(client: ClientStatus) -> Sequence[str]:
+    return (
+        client.name,
+        " ".join(client.systems),
+        _number(client.silence_s, " s"),
+        f"{client.sent_rate / 1000.0:.1f} kB/s",
+        f"{client.received_rate / 1000.0:.1f} kB/s",
+        f"{client.dropped_bytes} B",
+    )
+
+
+def _refused(status: GatewayStatus) -> Iterator[Sequence[str]]:
+    refused = [(one, drone.name) for drone in status.drones for one in drone.commands.refused]
+    for one, name in sorted(refused, key=lambda pair: pair[0].age_s):
+        yield f"{one.age_s:.0f} s", name, one.sender, one.command, one.result, one.reason
+
+
+def _number(value: float | None, unit: str = "") -> str:
+    return "-" if value is None else f"{value:g}{unit}"
+
+
+def _quantiles(found: Quantiles) -> str:
+    if found.p50_ms is None or found.p99_ms is None:
+        return "-"
+    return f"p50 {found.p50_ms:.0f} p99 {found.p99_ms:.0f} ms"

@@ -1,0 +1,344 @@
+"""Commands sent to the drone, and the one that an event is about. No I/O.
+
+ARSDK has no replies: a later event reports the effect of a command, and does not name the command. A command that was
+withdrawn may have reached the drone all the same, so it is remembered for as long as the drone may still execute it.
+Every fact about one sending is in its `SentCommand`; which of them an event is about is decided in
+`SentCommands.attribute` alone. Times are those of the event loop, s.
+"""
+
+from __future__ import annotations
+
+import enum
+import itertools
+import math
+from collections import deque
+from collections.abc import Hashable, Mapping
+from typing import Any, NamedTuple
+
+import msgspec
+
+from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.messages import ardrone3, common
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState
+from anafi_mav.arsdk.messages.common import PlayingState
+
+KEPT = 8
+"""Commands of one kind that are remembered. Two overlap at most; the others have been answered or expire in seconds."""
+
+TAKE_OFF_MEMORY = 10.0
+"""s after a start was withdrawn in which the drone may still take off, or takes off and could not report it."""
+
+STAYS_DOWN = 3.0
+"""s after LANDED in which a TakeOff that was to end the landing may still be executed."""
+
+PLAN_MEMORY = 20.0
+"""s in which a flight plan may begin; as Olympe (common.Mavlink.Start): the drone reads the whole file before it
+reports anything."""
+
+TAKEN_OFF = frozenset({FlyingState.TAKINGOFF, FlyingState.HOVERING, FlyingState.FLYING})
+RISING = TAKEN_OFF | {FlyingState.MOTOR_RAMPING}
+
+
+class Slot(enum.Enum):
+    """Kind of a command, by the thing that it starts."""
+
+    LAUNCH = "launch"
+    """TakeOff, and UserTakeOff of a hand launch."""
+    LANDING_END = "landing end"
+    """TakeOff or SmartTakeOffLand against a landing."""
+    PLAN = "flight plan"
+    POI = "point of interest"
+    FOLLOW = "follow me"
+    ANIMATION = "animation"
+
+
+AUTOMATIC = (Slot.PLAN, Slot.POI, Slot.FOLLOW, Slot.ANIMATION)
+"""What hover and every newer flight end."""
+
+STARTS_MOTORS = (Slot.LAUNCH, Slot.LANDING_END, Slot.PLAN)
+
+
+class Expiry(NamedTuple):
+    """How long a command that is no longer awaited counts, s."""
+
+    may_begin: float = 0.0
+    """The drone may still leave the ground by it."""
+    reported: float = 0.0
+    """Its effect may still be reported; that of a withdrawn one is then undone."""
+
+
+EXPIRY: Mapping[Slot, Expiry] = {
+    Slot.LAUNCH: Expiry(TAKE_OFF_MEMORY),
+    Slot.LANDING_END: Expiry(STAYS_DOWN),
+    Slot.PLAN: Expiry(TAKE_OFF_MEMORY, PLAN_MEMORY),
+}
+
+
+class Phase(enum.Enum):
+    """Progress of a command that was sent."""
+
+    QUEUED = "queued"
+    """The drone has not acknowledged its receipt."""
+    DELIVERED = "delivered"
+    """The drone has received it, and no event has reported its effect."""
+    CONFIRMED = "confirmed"
+    """An event has reported its effect."""
+    ENDED = "ended"
+    """Its effect is over."""
+    REFUSED = "refused"
+    """An event has reported that the drone does not execute it."""
+    WITHDRAWN = "withdrawn"
+    """This program has withdrawn it; the drone may have received it, and may still execute it."""
+    ABANDONED = "abandoned"
+    """Its answer is not awaited, as the link was lost or a newer one replaced it. Its effect is not undone: a plan goes
+    on without a link."""
+
+
+class Event(enum.Enum):
+    """Fact that changes the phase of a command."""
+
+    DELIVERED = "delivered"
+    EXECUTED = "executed"
+    OVER = "over"
+    REFUSED = "refused"
+    WITHDRAWN = "withdrawn"
+    ABANDONED = "abandoned"
+
+
+_UNANSWERED = {
+    Event.EXECUTED: Phase.CONFIRMED,
+    Event.REFUSED: Phase.REFUSED,
+    Event.WITHDRAWN: Phase.WITHDRAWN,
+    Event.ABANDONED: Phase.ABANDONED,
+}
+
+TRANSITIONS: Mapping[Phase, Mapping[Event, Phase]] = {
+    Phase.QUEUED: {Event.DELIVERED: Phase.DELIVERED, **_UNANSWERED},
+    Phase.DELIVERED: _UNANSWERED,
+    # Withdrawn: its verb was cancelled in the event-loop iteration that confirmed it.
+    Phase.CONFIRMED: {Event.OVER: Phase.ENDED, Event.WITHDRAWN: Phase.WITHDRAWN},
+    Phase.ENDED: {},
+    Phase.REFUSED: {},
+    Phase.WITHDRAWN: {Event.OVER: Phase.ENDED, Event.REFUSED: Phase.REFUSED},
+    Phase.ABANDONED: {
+        Event.EXECUTED: Phase.CONFIRMED,
+        Event.OVER: Phase.ENDED,
+        Event.REFUSED: Phase.REFUSED,
+        Event.WITHDRAWN: Phase.WITHDRAWN,
+    },
+}
+"""An event that a phase does not list leaves it as it is: late and doubled events are normal."""
+
+
+class SentCommand(msgspec.Struct, eq=False):
+    """One sending of a command."""
+
+    slot: Slot
+    target: Any = None
+    """Its name in events: the id of the plan, the flying states that confirm a launch."""
+    undo: Message | None = None
+    """Command that ends what it starts. A newer command of its slot replaces one that has it."""
+    undo_refused: bool = False
+    """It is undone when the drone refuses it, too: the drone would execute it later."""
+    attempt: Hashable = None
+    """The sender's own name for this sending."""
+    plan_before: str | None = None
+    """Id of the plan that the drone reported when this start was sent."""
+    answered: bool = False
+    """An event was about it: its motors ramped up, say, or its withdrawn plan began."""
+    answer: Any = None
+    """The wait of its verb, an `expectation.Expectation`."""
+    phase: Phase = Phase.QUEUED
+    delivered: bool = False
+    may_begin_until: float = -math.inf
+    reported_until: float = -math.inf
+
+    @property
+    def awaited(self) -> bool:
+        """True while neither an event nor this program has decided on it."""
+        return self.phase in (Phase.QUEUED, Phase.DELIVERED)
+
+    def may_begin(self, now: float) -> bool:
+        """Return True when the drone may still execute it."""
+        closed = self.phase in (Phase.WITHDRAWN, Phase.ABANDONED)
+        return self.awaited or (closed and now < self.may_begin_until)
+
+    def apply(self, event: Event, now: float = -math.inf) -> None:
+        """Change the phase. `now` is needed for WITHDRAWN and ABANDONED."""
+        self.delivered = self.delivered or event is Event.DELIVERED
+        self.answered = self.answered or event in (Event.EXECUTED, Event.REFUSED, Event.OVER)
+        phase = TRANSITIONS[self.phase].get(event, self.phase)
+        if phase is not self.phase and phase in (Phase.WITHDRAWN, Phase.ABANDONED):
+            expiry = EXPIRY.get(self.slot, Expiry())
+            self.may_begin_until, self.reported_until = now + expiry.may_begin, now + expiry.reported
+        self.phase = phase
+
+
+class SentCommands:
+    """The newest commands of each slot."""
+
+    def __init__(self) -> None:
+        self._slots: dict[Slot, deque[SentCommand]] = {slot: deque(maxlen=KEPT) for slot in Slot}
+
+    def place(self, sent: SentCommand, now: float) -> list[SentCommand]:
+        """Add a command; return those that it replaces, whose verbs are not to wait any longer."""
+        commands = self._slots[sent.slot]
+        replaced = [one for one in commands if one.awaited and one.undo is not None]
+        for one in replaced:
+            one.apply(Event.ABANDONED, now)
+        if sent.slot in STARTS_MOTORS:
+            self._slots[Slot.LANDING_END].clear()  # motors that start from now on are wanted
+        commands.append(sent)
+        return replaced
+
+    def awaited(self, *slots: Slot) -> list[SentCommand]:
+        """Return the undecided commands of these slots, of all without an argument."""
+        return [one for slot in slots or Slot for one in self._slots[slot] if one.awaited]
+
+    def may_start_motors(self, now: float) -> bool:
+        """Return True when a drone that stands may still begin to fly."""
+        return any(one.may_begin(now) for slot in STARTS_MOTORS for one in self._slots[slot])
+
+    def is_unwanted(self, sent: SentCommand, now: float) -> bool:
+        """Return True when the effect of this command, which an event has reported, is to be undone.
+
+        Not while a newer one of its slot may be in force: what undoes the older one would end the newer.
+        """
+        newer = itertools.takewhile(lambda one: one is not sent, reversed(self._slots[sent.slot]))
+        in_force = any(
+            one.awaited or one.phase is Phase.CONFIRMED or (one.phase is Phase.ABANDONED and one.may_begin(now))
+            for one in newer
+        )
+        return sent.phase is Phase.WITHDRAWN and not in_force and now < sent.reported_until
+
+    def is_newest(self, sent: SentCommand) -> bool:
+        """Return True while no newer command of its slot was sent."""
+        return self._slots[sent.slot][-1] is sent
+
+    def is_executed(self, slot: Slot) -> bool:
+        """Return True when the reported effect of a command of this slot has not ended."""
+        return any(one.phase is Phase.CONFIRMED for one in self._slots[slot])
+
+    def rule_out(self) -> None:
+        """Note that no withdrawn command starts the motors any more.
+
+        The drone has received a command behind it that keeps it on the ground, and reports nothing.
+        """
+        for slot in STARTS_MOTORS:
+            for one in self._slots[slot]:
+                one.may_begin_until = -math.inf
+
+    def deliver(self, token: int) -> None:
+        """The drone has received the command with this token."""
+        for one in self.awaited():
+            if one.answer.token == token:
+                one.apply(Event.DELIVERED)
+
+    def abandon(self, now: float) -> None:
+        """The link is lost: no answer is awaited."""
+        for one in self.awaited():
+            one.apply(Event.ABANDONED, now)
+
+    def clear(self) -> None:
+        """Forget all: the commands of an earlier session do not count in a new one."""
+        for commands in self._slots.values():
+            commands.clear()
+
+    # -- what the drone reports
+
+    def attribute(self, message: Message, now: float) -> SentCommand | None:
+        """Return the command that this event is about, in its new phase.
+
+        None: no command of this program explains it. Commands are executed in the order of their sending, and the
+        events of one type arrive in the order of their effects; beyond that nothing is promised.
+        """
+        match message:
+            case ardrone3.FlyingStateChanged():
+                return self._attribute_flying(message.state, now)
+            case common.MavlinkFilePlayingStateChanged(state=PlayingState.PLAYING):
+                return self._attribute_playing(message.filepath, now)
+            case common.MavlinkFilePlayingStateChanged():
+                return self._attribute_stopped(message.filepath)
+            case common.StartingErrorEvent():
+                return self._attribute_start_error(now)
+        return None
+
+    def _attribute_flying(self, state: FlyingState, now: float) -> SentCommand | None:
+        """A flying state names nothing.
+
+        - LANDED is a refusal only once the motors have turned: a drone refuses a take-off by silence, so a LANDED
+          before that is an older one, repeated.
+        - A TakeOff against a landing that reaches the drone on the ground starts the motors there. LANDED and the
+          motors that ramp up may arrive together, so its effect is unwanted from LANDED on.
+        """
+        newest = None
+        for one in self._slots[Slot.LAUNCH]:
+            newest = one
+            if state in one.target:
+                one.apply(Event.EXECUTED)
+            elif state == FlyingState.EMERGENCY or (state == FlyingState.LANDED and one.answered):
+                one.apply(Event.REFUSED if one.awaited else Event.OVER)
+            elif state != FlyingState.LANDED:
+                one.answered = True
+        for one in self._slots[Slot.LANDING_END]:
+            if state == FlyingState.LANDED and one.may_begin(now):
+                one.apply(Event.WITHDRAWN, now)
+                one.may_begin_until = one.reported_until = now + STAYS_DOWN
+            if state in RISING and self.is_unwanted(one, now):
+                newest = one
+        return newest
+
+    def _attribute_playing(self, uid: str, now: float) -> SentCommand | None:
+        """PLAYING names the plan as the upload did; some firmware may name it otherwise.
+
+        - Of two starts of one plan it is the newer's. Were it the older's, STOPPED follows it; the reverse error would
+          withdraw a plan that flies.
+        - A name that is not known is that of the plan that is awaited.
+        - A withdrawn start begins late when it took the drone so long to read the plan that the command against it
+          arrived before its beginning.
+        """
+        plans = self._slots[Slot.PLAN]
+        sent = self._plan_named(uid)
+        if sent is None and plans and plans[-1].awaited and not (uid and uid == plans[-1].plan_before):
+            sent = plans[-1]
+        for one in plans:
+            if one is not sent and one.phase is Phase.CONFIRMED:
+                one.apply(Event.OVER)  # the drone plays one plan at a time
+        if sent is None or not (sent.awaited or sent.phase is Phase.CONFIRMED or now < sent.reported_until):
+            return None
+        sent.apply(Event.EXECUTED)
+        return sent
+
+    def _attribute_stopped(self, uid: str) -> SentCommand | None:
+        """PAUSED and STOPPED name the plan or nothing.
+
+        - One that names another plan of this program than the one that plays is an older one.
+        - Without a plan that plays it answers the command against a withdrawn start.
+        """
+        plans, named = self._slots[Slot.PLAN], self._plan_named(uid)
+        playing = next((one for one in plans if one.phase is Phase.CONFIRMED), None)
+        if playing is not None:
+            if named is not None and named.target != playing.target:
+                return named
+            playing.apply(Event.OVER)
+            return playing
+        for one in plans:
+            one.answered = one.answered or one.phase is Phase.WITHDRAWN
+        sent = named or (plans[-1] if plans else None)
+        return None if sent is None or sent.awaited else sent
+
+    def _attribute_start_error(self, now: float) -> SentCommand | None:
+        """StartingErrorEvent names nothing.
+
+        Starts are answered in their order, so it is the oldest's that the drone has received and not answered.
+        Taken for the newer's, it would report a plan as refused that flies a moment later.
+        """
+        plans = self._slots[Slot.PLAN]
+        open_ones = [one for one in plans if one.awaited or (not one.answered and now < one.reported_until)]
+        sent = next((one for one in open_ones if one.delivered), open_ones[-1] if open_ones else None)
+        if sent is not None:
+            sent.apply(Event.REFUSED)
+        return sent
+
+    def _plan_named(self, uid: str) -> SentCommand | None:
+        return next((one for one in reversed(self._slots[Slot.PLAN]) if one.target == uid), None)

@@ -1,0 +1,247 @@
+"""The signing keys of a node: loads them, advances their timestamps, saves them ahead.
+
+A key is a file of 40 bytes in the folder `keys` of the state folder. Only its owner may read it: a file or folder that
+others can read is refused, as SSH refuses such keys. Windows has no such permissions; there the folder inherits those
+of the user's profile. `Signing` is the core. The ring looks at its keys once a second; with no key in use it does
+nothing. Frames that are refused are reported by one line every ten seconds, however many they are.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import re
+import stat
+import threading
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from anafi_mav.clock import Alarm, Clock
+from anafi_mav.endpoint_options import KEY_NAME
+from anafi_mav.errors import ConfigError
+from anafi_mav.mavlink.signing import CONTENT_BYTES, KEY_BYTES, Signing
+from anafi_mav.state_lock import replace_file
+
+logger = logging.getLogger(__name__)
+
+FOLDER = "keys"
+SUFFIX, OLD_SUFFIX = ".key", ".key.old"
+"""Of the present key, and of the one before it, to which `keygen --undo` returns."""
+
+NAME = re.compile(KEY_NAME)
+NAME_EXPECTED = "the name of a key: 1 to 64 letters, digits, '-', '_' or '.', beginning with a letter or digit"
+
+_OTHERS = stat.S_IRWXG | stat.S_IRWXO
+
+LOOK_EVERY = 1.0
+"""s between looks at timestamps and refused frames."""
+
+REPORT_EVERY = 10.0
+"""s between two lines in the log about refused frames of one key."""
+
+_WRITER = ThreadPoolExecutor(max_workers=1, thread_name_prefix="anafi-mav-keys")
+"""Timestamps are not written by the event loop: a memory card may take a second."""
+
+
+class KeyRing:
+    """The keys in one folder. `open` them, `start`, `close`.
+
+    A folder of None has no keys: nothing can be signed.
+    """
+
+    def __init__(self, folder: Path | None, clock: Clock, *, saves: bool = True) -> None:
+        """Without `saves` the files are read only.
+
+        A program beside the gateway then uses its key with the clock's timestamps.
+        """
+        self.problem = ""
+        """Why timestamps or a key could not be saved; empty while they can."""
+        self._folder = folder
+        self._saves = saves
+        self._clock = clock
+        self._keys: dict[str, Signing] = {}
+        self._alarm = Alarm(self._look)
+        self._saving: asyncio.Task[None] | None = None
+        self._file_lock = threading.Lock()
+        self._reported: dict[str, Counter[str]] = {}
+        self._report_at = 0.0
+
+    def open(self, name: str, *, is_required: bool) -> Signing | None:
+        """Return the key with this name, off if there is no such key.
+
+        One name is one object. Raises `ConfigError`, without a key path, for a key that cannot be used, or is required
+        and absent.
+        """
+        if NAME.fullmatch(name) is None:
+            raise ConfigError("", f"expected {NAME_EXPECTED}, got {name!r}")
+        if name in self._keys:
+            return self._keys[name]
+        if self._folder is None:
+            if is_required:
+                raise ConfigError("", f"no key {name}: there is no state folder")
+            return None
+        try:
+            content = read_key(self._folder, name)
+        except OSError as error:
+            if is_required:
+                raise ConfigError("", f"{self._folder}: {error.strerror}") from error
+            logger.warning("%s: %s; SETUP_SIGNING is refused", self._folder, error.strerror)
+            return None
+        if content is None and is_required:
+            raise ConfigError("", f"no key {name} in {self._folder}; make it with: anafi-mav keygen {name}")
+        content = content or bytes(CONTENT_BYTES)
+        if not self._saves:
+            content = content[:KEY_BYTES] + bytes(CONTENT_BYTES - KEY_BYTES)
+        signing = self._keys[name] = Signing(name, content)
+        if is_required and not signing.is_on:
+            logger.warning("key %s: switched off by SETUP_SIGNING, its endpoints do not sign", name)
+        return signing
+
+    async def start(self) -> None:
+        """Save timestamps ahead, before anything is signed, and begin to look after them."""
+        await self._save_due()
+        self._look()
+
+    async def close(self) -> None:
+        """Save the reached timestamps, where the next start continues. Safe to call twice."""
+        self._alarm.cancel()
+        if self._saving is not None:
+            await asyncio.wait([self._saving])
+            self._saving = None
+        for signing in self._keys.values():
+            if signing.is_on and self._saves:
+                await self._write(signing, signing.timestamp, is_last=True)
+        self._keys.clear()
+
+    def replace(self, signing: Signing, secret: bytes, timestamp: int, *, before_use: Callable[[], None]) -> None:
+        """Store another key, keep the old one's file, and use the new one from now on.
+
+        Zeros stand for no key. `before_use` is called when the files are written. Until then this blocks, which it may
+        while nothing is armed. Raises `OSError`; the old key then remains in use.
+        """
+        assert self._folder is not None
+        now = self._clock.time()
+        new = Signing(signing.name, signing.content())
+        new.replace(secret, timestamp)
+        new.advance(now)
+        saved = new.due(now) or new.timestamp
+        with self._file_lock:
+            write_new_key(self._folder, signing.name, new.content(saved), signing.content())
+        before_use()
+        signing.replace(secret, timestamp)
+        signing.saved = saved
+        self._look()
+
+    def _look(self) -> None:
+        now = self._clock.time()
+        due = False
+        for signing in self._keys.values():
+            if signing.is_on:
+                signing.advance(now)
+                due = due or (self._saves and signing.due(now) is not None)
+        if due and (self._saving is None or self._saving.done()):
+            self._saving = asyncio.get_running_loop().create_task(self._save_due())
+        self._report()
+        if any(signing.is_on for signing in self._keys.values()):
+            self._alarm.set_in(LOOK_EVERY)
+
+    async def _save_due(self) -> None:
+        now = self._clock.time()
+        for signing in tuple(self._keys.values()):
+            signing.advance(now)
+            if self._saves and (timestamp := signing.due(now)) is not None:
+                await self._write(signing, timestamp)
+
+    async def _write(self, signing: Signing, timestamp: int, *, is_last: bool = False) -> None:
+        try:
+            await asyncio.get_running_loop().run_in_executor(_WRITER, self._write_now, signing, timestamp, is_last)
+        except OSError as error:
+            problem = f"key {signing.name}: {error.strerror or error}; old frames may be accepted after a restart"
+            if problem != self.problem:
+                logger.warning("%s", problem)
+            self.problem = problem
+        else:
+            self.problem = ""
+
+    def _write_now(self, signing: Signing, timestamp: int, is_last: bool) -> None:
+        """In the thread of files; the lock keeps a replaced key from coming back."""
+        assert self._folder is not None
+        with self._file_lock:
+            timestamp = timestamp if is_last else max(timestamp, signing.saved)
+            if signing.is_on:
+                write_key(self._folder, signing.name, signing.content(timestamp))
+                signing.saved = timestamp
+
+    def _report(self) -> None:
+        """Write how many frames were refused since the last line."""
+        now = self._clock.monotonic()
+        if now < self._report_at:
+            return
+        for signing in self._keys.values():
+            new = signing.refused - self._reported.get(signing.name, Counter())
+            if new:
+                kinds = ", ".join(f"{count} {kind.removeprefix('refused_')}" for kind, count in sorted(new.items()))
+                logger.warning("key %s: frames refused: %s; newest on %s", signing.name, kinds, signing.last_refused)
+                self._reported[signing.name] = signing.refused.copy()
+                self._report_at = now + REPORT_EVERY
+
+
+def folder_of(state: Path) -> Path:
+    """Return the folder of the keys in a state folder."""
+    return state / FOLDER
+
+
+def path_of(folder: Path, name: str, suffix: str = SUFFIX) -> Path:
+    """Return the file of a key."""
+    return folder / f"{name}{suffix}"
+
+
+def read_key(folder: Path, name: str, suffix: str = SUFFIX) -> bytes | None:
+    """Return the content of a key file; None if there is no such file.
+
+    Raises `ConfigError`, without a key path, for a file that cannot be used, and `OSError` for one that cannot be read.
+    No message holds anything of the content.
+    """
+    path = path_of(folder, name, suffix)
+    try:
+        _check(folder, folder.stat(), "700")
+        with path.open("rb") as file:
+            _check(path, os.fstat(file.fileno()), "600")
+            content = file.read(CONTENT_BYTES + 1)
+    except FileNotFoundError:
+        return None
+    if len(content) != CONTENT_BYTES:
+        raise ConfigError("", f"{path}: expected a key file of {CONTENT_BYTES} bytes, got {len(content)} or more")
+    return content
+
+
+def has_key(folder: Path, name: str) -> bool:
+    """Return True if there is a key with this name that can be used, and it is not switched off."""
+    try:
+        content = read_key(folder, name)
+    except (ConfigError, OSError):
+        return False
+    return content is not None and Signing(name, content).is_on
+
+
+def write_key(folder: Path, name: str, content: bytes, suffix: str = SUFFIX) -> None:
+    """Replace a key file, and make the folder if it is absent. Raises `OSError`."""
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    replace_file(path_of(folder, name, suffix), content)
+
+
+def write_new_key(folder: Path, name: str, content: bytes, old: bytes) -> None:
+    """Replace a key and keep the old one. Raises `OSError`; the key is then the old one."""
+    write_key(folder, name, old, OLD_SUFFIX)
+    write_key(folder, name, content)
+
+
+def _check(path: Path, status: os.stat_result, mode: str) -> None:
+    if os.name != "posix":
+        return
+    if status.st_mode & _OTHERS:
+        found = f"{stat.S_IMODE(status.st_mode):o}"
+        raise ConfigError("", f"{path}: expected mode {mode}, got {found}: others could read the key; chmod {mode} it")

@@ -1,0 +1,82 @@
+"""Places of the clients of one endpoint: which is idle, and which gives way. No I/O."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from typing import Generic, TypeVar
+
+PeerT = TypeVar("PeerT", bound=Hashable)
+
+REPLACEABLE = 5.0
+"""s of silence after which a known client gives its place to another when all are taken: four or five missed
+heartbeats are a lost link (MAVLink heartbeat.md)."""
+
+
+class PeerTable(Generic[PeerT]):
+    """The clients that have a place, by their silence.
+
+    A client is known when it has proved to be there, or to hold the key. Known clients and others have as many places
+    each, so that made-up addresses and connections take none from known clients.
+    """
+
+    def __init__(self, places: int, idle_limit: float) -> None:
+        """`places`: of known clients, and as many of others.
+
+        `idle_limit`: s of silence after which a client loses its place; 0: never.
+        """
+        self._places = places
+        self._idle_limit = idle_limit
+        self._heard: dict[PeerT, float] = {}
+        """When each client was heard last, or got its place."""
+        self._known: set[PeerT] = set()
+
+    def __len__(self) -> int:
+        return len(self._heard)
+
+    def __contains__(self, peer: object) -> bool:
+        return peer in self._heard
+
+    def is_full(self, *, known: bool) -> bool:
+        """Return True when all places of known clients, or of others, are taken."""
+        return len(self._known if known else self._heard.keys() - self._known) >= self._places
+
+    def is_known(self, peer: PeerT) -> bool:
+        """Return True for a known client."""
+        return peer in self._known
+
+    def add(self, peer: PeerT, now: float, *, known: bool) -> None:
+        """Give a new client a place, or a known client one of those in place of its other."""
+        self._heard[peer] = now
+        if known:
+            self._known.add(peer)
+
+    def heard(self, peer: PeerT, now: float) -> None:
+        """A frame of a client has arrived."""
+        if peer in self._heard:
+            self._heard[peer] = now
+
+    def remove(self, peer: PeerT) -> None:
+        """Free the place of a client. Twice does no harm."""
+        self._heard.pop(peer, None)
+        self._known.discard(peer)
+
+    def silence(self, peer: PeerT, now: float) -> float:
+        """Return for how long a client has been silent, s."""
+        return now - self._heard[peer]
+
+    def replaceable(self, now: float, *, known: bool) -> PeerT | None:
+        """Return the client that gives way to one of its kind: the one silent for longest.
+
+        None when no known client has been silent for long enough. The others give way at once.
+        """
+        kind = [peer for peer in self._heard if (peer in self._known) is known]
+        longest = min(kind, key=self._heard.__getitem__, default=None)
+        if longest is None or (known and now - self._heard[longest] < REPLACEABLE):
+            return None
+        return longest
+
+    def idle(self, now: float) -> list[PeerT]:
+        """Return the clients that have been silent for longer than the limit."""
+        if not self._idle_limit:
+            return []
+        return [peer for peer, heard in self._heard.items() if now - heard > self._idle_limit]

@@ -1,0 +1,160 @@
+"""The files of recorded sessions: parts of bounded size, of which the oldest are deleted.
+
+    FOLDER/20261122T210000Z/gateway.0001.tlog, arsdk.0001.jsonl, …
+
+Nothing waits for the disk: what is appended is written by a thread, twice a second. When the disk is too slow or full,
+data is dropped, counted and reported once. Only files with the names of this module are ever deleted.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import re
+import time
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import BinaryIO
+
+logger = logging.getLogger(__name__)
+
+PART_BYTES = 32_000_000
+"""Of one file: a flight of half an hour in one part, and what is deleted at once when room is needed."""
+
+MAX_WAITING = 8_000_000
+"""Bytes that may wait for the disk: some ten seconds of 250 drones."""
+
+WRITE_EVERY = 0.5
+"""s between two writes; a power cut costs so much of the recording."""
+
+SESSION = re.compile(r"\d{8}T\d{6}Z(-\d{1,3})?")
+PART = re.compile(r"(gateway\.\d{4,}\.tlog|arsdk\.\d{4,}\.jsonl)")
+
+MAVLINK, ARSDK = "gateway.{:04d}.tlog", "arsdk.{:04d}.jsonl"
+"""Names of the parts of the two files."""
+
+
+class SessionFolder:
+    """One session's folder and its files. `start` once, `close` once."""
+
+    def __init__(self, folder: Path, max_bytes: int) -> None:
+        """`folder`: of all sessions, whose files together stay below `max_bytes`."""
+        self.path = folder
+        """Of this session, once `start` has made it."""
+        self.counters: Counter[str] = Counter()
+        """written_bytes, dropped_bytes (the disk is too slow or full), deleted_files."""
+        self.problem = ""
+        """Why data was dropped last; empty while none was."""
+        self._folder = folder
+        self._max_bytes = max_bytes
+        self._waiting: dict[str, list[bytes]] = {MAVLINK: [], ARSDK: []}
+        self._waiting_bytes = 0
+        self._parts: dict[str, tuple[BinaryIO, int]] = {}
+        """Open part of each file, and its bytes."""
+        self._numbers: Counter[str] = Counter()
+        self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="anafi-mav-recording")
+        self._task: asyncio.Task[None] | None = None
+
+    def start(self) -> None:
+        """Make the folder of this session, and begin to write. Raises OSError."""
+        stem = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
+        self._folder.mkdir(parents=True, exist_ok=True)
+        for number in range(100):
+            self.path = self._folder / (stem if not number else f"{stem}-{number}")
+            with contextlib.suppress(FileExistsError):
+                self.path.mkdir(mode=0o700)  # positions and serial numbers
+                break
+        else:
+            raise FileExistsError(f"{self.path}: it exists")
+        self._task = asyncio.get_running_loop().create_task(self._run(), name="recording")
+
+    def append(self, name: str, data: bytes) -> None:
+        """Write later to `MAVLINK` or `ARSDK`. Never blocks."""
+        if self._waiting_bytes + len(data) > MAX_WAITING:
+            self._drop(len(data), "the disk is too slow")
+            return
+        self._waiting[name].append(data)
+        self._waiting_bytes += len(data)
+
+    async def close(self) -> None:
+        """Write what waits, and close the files. Idempotent."""
+        task, self._task = self._task, None
+        if task is None:
+            return
+        task.cancel()
+        await asyncio.wait([task])
+        await self.flush()
+        self._writer.shutdown(wait=False)
+        for file, _ in self._parts.values():
+            with contextlib.suppress(OSError):
+                file.close()
+        self._parts.clear()
+
+    async def _run(self) -> None:
+        while True:
+            await asyncio.sleep(WRITE_EVERY)
+            await asyncio.shield(self.flush())
+
+    async def flush(self) -> None:
+        """Write what waits now."""
+        batch = {name: b"".join(waiting) for name, waiting in self._waiting.items() if waiting}
+        if not batch:
+            return
+        for waiting in self._waiting.values():
+            waiting.clear()
+        self._waiting_bytes = 0
+        try:
+            await asyncio.get_running_loop().run_in_executor(self._writer, self._write, batch)
+        except Exception as error:  # the recording goes on as soon as it can
+            reason = error.strerror if isinstance(error, OSError) else None
+            self._drop(sum(map(len, batch.values())), reason or str(error))
+
+    def _drop(self, size: int, reason: str) -> None:
+        self.counters["dropped_bytes"] += size
+        if not self.problem:
+            logger.warning("%s: recording has gaps: %s", self.path, reason)
+        self.problem = reason
+
+    # In the thread.
+
+    def _write(self, batch: dict[str, bytes]) -> None:
+        for name, data in batch.items():
+            file, size = self._parts.get(name, (None, 0))
+            if file is None or size + len(data) > PART_BYTES:
+                if file is not None:
+                    del self._parts[name]  # also if the disk is full: a closed file takes nothing more
+                    file.close()
+                self._make_room(len(data))
+                self._numbers[name] += 1
+                file, size = (self.path / name.format(self._numbers[name])).open("xb"), 0
+            self._parts[name] = (file, size + len(data))
+            file.write(data)
+            file.flush()
+            self.counters["written_bytes"] += len(data)
+
+    def _make_room(self, size: int) -> None:
+        """Delete the oldest parts, so that a new part may become full."""
+        parts = list(parts_of(self._folder))
+        held = {Path(file.name) for file, _ in self._parts.values()}
+        total = sum(part.stat().st_size for part in parts) + max(PART_BYTES, size) * (1 + len(held))
+        for part in parts:
+            if total <= self._max_bytes:
+                return
+            if part in held:
+                continue
+            total -= part.stat().st_size
+            part.unlink()
+            self.counters["deleted_files"] += 1
+            if part.parent != self.path:
+                with contextlib.suppress(OSError):  # not empty
+                    part.parent.rmdir()
+
+
+def parts_of(folder: Path) -> Iterator[Path]:
+    """Yield the parts of all sessions in a folder, oldest first."""
+    for session in sorted(path for path in folder.iterdir() if SESSION.fullmatch(path.name) and path.is_dir()):
+        own = [part for part in session.iterdir() if PART.fullmatch(part.name) and part.is_file()]
+        yield from sorted(own, key=lambda part: (part.stat().st_mtime, part.name))

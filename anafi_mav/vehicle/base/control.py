@@ -1,0 +1,392 @@
+"""The one owner of flight: decides which flight task is active, and hands control over.
+
+`control_machine` decides; this shell performs its effects. `acquire` is the only way to the drone's sticks and moves:
+
+1. The policy and the task's needs are checked. A request that is refused disturbs nothing.
+2. What flies is ended at once, and all older actions are cancelled. From now on they can send only what stops them.
+3. Their end is awaited: without that an aborted move could cancel the one that follows it.
+4. A return that a client commanded is cancelled, the needs are checked again, and the drone is stopped where the task
+   needs it. Then the task begins.
+
+A newer request replaces a pending one. No module but this one stores who flies, and the mode is derived from it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Coroutine, Hashable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, replace
+from typing import Any, Protocol, TypeAlias
+
+from anafi_mav import texts
+from anafi_mav.drone import Drone
+from anafi_mav.errors import AnafiMavError
+from anafi_mav.texts import OperatorText, Subject
+from anafi_mav.vehicle.base.control_machine import (
+    ADOPTED,
+    Attempt,
+    DroneAct,
+    Event,
+    Input,
+    Situation,
+    State,
+    Step,
+    step,
+)
+from anafi_mav.vehicle.base.flight_actions import FlightAction, FlightActions
+from anafi_mav.vehicle.base.flight_task import STEERING, FlightTask, Needs, Preparation, TaskRules
+from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.refusal import Refused, text_of
+from anafi_mav.vehicle.base.requester import By, Source, client_of
+from anafi_mav.vehicle.base.severity import Severity
+
+
+@dataclass(frozen=True)
+class Request:
+    """A request of a flight task."""
+
+    task: FlightTask
+    by: By
+    rules: TaskRules
+    """Those of the task, or what this request has instead."""
+
+    @property
+    def client(self) -> Hashable:
+        """The client that requests it; None: a part of the gateway."""
+        return client_of(self.by)
+
+
+Policy: TypeAlias = Callable[[Request], "Refused | None"]
+"""Decides who may request a flight task: returns the refusal, or None."""
+
+
+def allow_all(request: Request) -> Refused | None:
+    """Refuse no request."""
+    return None
+
+
+class Conditions(Protocol):
+    """The aircraft, as far as requests of flight tasks depend on it."""
+
+    drone: Drone
+    text: Callable[[Severity, OperatorText], None]
+    changed: Callable[[], None]
+
+    @property
+    def in_air(self) -> bool:
+        """True when flying, and neither taking off nor landing by itself."""
+
+    @property
+    def returning(self) -> bool:
+        """True while the drone flies home."""
+
+    @property
+    def activity(self) -> OperatorText:
+        """Activity of the drone, as the reason of a refusal."""
+
+    def lacking(self, needs: Needs) -> OperatorText | None:
+        """Return the first condition that is not met, as the reason of a refusal; None: all are."""
+
+
+_SHOWN = (Event.GRANT, Event.FAIL, Event.ADOPT, Event.FINISH, Event.LOSE)
+"""Events after which clients are notified of a new mode. While a request is pending, what it leads to is not known yet;
+what the drone does by itself is notified by `Vehicle`, once it has noted all of it."""
+
+
+class Grant:
+    """A request whose predecessors have ended."""
+
+    def __init__(self, control: Control, attempt: Attempt[FlightTask]) -> None:
+        self._control = control
+        self._attempt = attempt
+
+    @property
+    def is_current(self) -> bool:
+        """True while no newer request, the ground or the loss of the link has replaced it."""
+        return self._control.epoch == self._attempt.number
+
+    def begin(self, *, pauses: bool | None = None) -> None:
+        """Make the task active: its mode is shown from now on. Later calls do nothing."""
+        attempt = self._attempt if pauses is None else replace(self._attempt, pauses=pauses)
+        self._control.handle(Event.GRANT, Input(attempt))
+
+
+class Control:
+    """Owner of flight of one vehicle. All methods run on the event loop's thread."""
+
+    def __init__(self, aircraft: Conditions) -> None:
+        self.policy: Policy = allow_all
+        self.actions = FlightActions()
+        self._aircraft = aircraft
+        self._situation: Situation[FlightTask] = Situation()
+
+    # What flies.
+
+    @property
+    def active(self) -> FlightTask | None:
+        """The active flight task, or the chosen hovering mode.
+
+        None: the drone stands, or hovers in Hold.
+        """
+        return self._situation.task or self._situation.below
+
+    @property
+    def below(self) -> FlightTask | None:
+        """The hovering mode below the active task, and after it; None: Hold."""
+        return self._situation.below
+
+    @property
+    def next(self) -> FlightTask | None:
+        """The task that is being acquired; None without one."""
+        return self._situation.next
+
+    @property
+    def successor(self) -> FlightTask | None:
+        """The task that follows the active one."""
+        return self._situation.successor
+
+    @property
+    def state(self) -> State:
+        """The state of the machine."""
+        return self._situation.state
+
+    @property
+    def mode(self) -> FlightMode:
+        """The mode of the active task.
+
+        `Vehicle.mode` puts first what the drone does by itself.
+        """
+        task, below = self._situation.shown
+        modes = (one.mode for one in (task, below) if one is not None)
+        return next((mode for mode in modes if mode is not None), FlightMode.HOLD)
+
+    @property
+    def paused(self) -> bool:
+        """True while a pause of a client is in force, or about to be: no setpoint is flown.
+
+        A command or another mode ends it.
+        """
+        return self._situation.holds_streams
+
+    @property
+    def epoch(self) -> int:
+        """Count of requests, and of what ended all commands: the ground, the loss of the link."""
+        return self._situation.epoch
+
+    def keeps(self, task: FlightTask) -> bool:
+        """Return True while this task is active and its conditions last; else control is lost.
+
+        A task that flies by sticks asks before it sends any.
+        """
+        if self._situation.task is not task:
+            return False
+        reason = self._aircraft.lacking(task.rules.needs & STEERING)
+        if reason is None:
+            return True
+        self.lose(reason)
+        return False
+
+    # Requests.
+
+    @asynccontextmanager
+    async def acquire(
+        self,
+        task: FlightTask,
+        *,
+        by: By,
+        below: FlightTask | None = None,
+        pauses: bool = False,
+        rules: TaskRules | None = None,
+    ) -> AsyncIterator[Grant]:
+        """Acquire control for a task; the block prepares and starts it.
+
+        The task becomes active by `Grant.begin`, at the end of the block at the latest. When the block raises, the
+        hovering mode of before is active again; after `begin` it is the one below the task. A newer request is not
+        disturbed by either.
+
+        `below`: the hovering mode after the task; None: Hold. `pauses`: streams do not leave it. `rules`: for this
+        request, instead of the task's own.
+
+        Raises `Refused` by the policy, for a need that is not met, and while the motors are being cut.
+        """
+        rules = rules or task.rules
+        self.check(task, by, rules)
+        number = self.epoch + 1
+        own = task if rules.lasts and not rules.is_hover else None
+        hover = task if rules.is_hover else below
+        attempt = Attempt(own, number, hover, rules.keeps_below, pauses, rules.is_urgent)
+        try:
+            await self._release(attempt, rules.wait)
+            self.handle(Event.RELEASED, Input(attempt))
+            await self._prepare(attempt, Request(task, by, rules))
+            grant = Grant(self, attempt)
+            yield grant
+            grant.begin()
+        except BaseException:
+            self.handle(Event.FAIL, Input(attempt))
+            self.handle(Event.FINISH, Input(task=own, number=number))
+            raise
+
+    def check(self, task: FlightTask, by: By, rules: TaskRules | None = None) -> None:
+        """Raise `Refused` when a task may not be requested now; disturbs nothing."""
+        rules = rules or task.rules
+        self.require_allowed(task, by, rules)
+        if rules.is_stream and self.paused:
+            raise Refused(rules.what, texts.PAUSED_BY_CLIENT)
+        if (reason := self._aircraft.lacking(rules.needs)) is not None:
+            raise Refused(rules.what, reason)
+        if (pending := self._situation.pending) is not None and pending.is_urgent:
+            raise Refused(texts.FLIGHT_COMMAND, texts.MOTORS_STOPPING)
+
+    def require_allowed(self, task: FlightTask, by: By, rules: TaskRules | None = None) -> None:
+        """Raise `Refused` for the policy, or for the pilot whom a part of the gateway leaves alone."""
+        rules = rules or task.rules
+        if (refusal := self.policy(Request(task, by, rules))) is not None:
+            raise refusal
+        is_own = isinstance(by, Source) and by not in (Source.MISSION, Source.SWITCH)
+        if is_own and self._aircraft.drone.controller.pilot_has_source:
+            raise Refused(rules.what, texts.PILOT)
+
+    def _require_pending(self, attempt: Attempt[FlightTask], what: Subject) -> None:
+        """Raise `Refused` when something newer has replaced an attempt."""
+        if self._situation.pending is not attempt:
+            raise Refused(what, texts.MISSION_DISPLACED)
+
+    async def _release(self, attempt: Attempt[FlightTask], limit: float | None) -> None:
+        """End what flies, which can fly the drone no further, and wait for the end."""
+        ending = [*self.actions.end_older(), *self.handle(Event.REQUEST, Input(attempt))]
+        drone = self._aircraft.drone
+        drone.retire(ending)
+        if attempt.is_urgent:
+            drone.silence(ending)
+        elif ending:
+            _, late = await asyncio.wait(ending, timeout=limit)
+            drone.silence(late)
+
+    async def _prepare(self, attempt: Attempt[FlightTask], request: Request) -> None:
+        """Stop the drone as the task needs it, and check policy and needs again.
+
+        An attempt that a newer one has replaced sends nothing more: it may be no action, which would be cancelled.
+        """
+        rules, aircraft, piloting = request.rules, self._aircraft, self._aircraft.drone.piloting
+        self._require_pending(attempt, rules.what)
+        if rules.start is Preparation.STOP:
+            await piloting.stop()
+            self._require_pending(attempt, rules.what)
+        if Needs.NO_DESCENT in rules.needs:
+            # One asked for through another controller, or before the link was lost. Raises when it is the drone's own.
+            await piloting.cancel_return_home()
+            self._require_pending(attempt, rules.what)
+        if Needs.IN_AIR in rules.needs and (not aircraft.in_air or aircraft.returning):
+            raise Refused(rules.what, aircraft.activity)
+        if (reason := aircraft.lacking(rules.needs & ~Needs.NO_DESCENT)) is not None:
+            raise Refused(rules.what, reason)
+        self.require_allowed(request.task, request.by, rules)
+        if rules.start is Preparation.HOVER:
+            piloting.hover()
+
+    def succeed(self, task: FlightTask) -> None:
+        """Let a task follow the active one, instead of another successor.
+
+        Any request withdraws it.
+        """
+        self.handle(Event.SUCCEED, Input(task=task))
+
+    def adopt(self, task: FlightTask, *, below: FlightTask | None = None, keeps_below: bool = False) -> None:
+        """Make a task active that the drone flies already; what else flew is ended.
+
+        `below`: the hovering mode after the task; `keeps_below`: that of before.
+        """
+        own, hover = (None, task) if task.rules.is_hover else (task, below)
+        self.handle(Event.ADOPT, Input(Attempt(own, ADOPTED, hover, keeps_below)))
+
+    def release(self, task: FlightTask) -> None:
+        """End a task that is over: its successor is active, or the hovering mode below it."""
+        self.handle(Event.FINISH, Input(task=task))
+
+    def lose(self, reason: OperatorText) -> None:
+        """End the active task, whose conditions are no longer met, with a text.
+
+        The drone hovers in Hold.
+        """
+        task = self.active
+        self.handle(Event.LOSE)
+        if task is not None:
+            text = texts.TASK_ENDED.fill(what=task.rules.what, reason=reason)
+            self._aircraft.text(Severity.WARNING, text)
+
+    def resume(self) -> None:
+        """End the pause: setpoints may fly the drone again."""
+        self.handle(Event.RESUME)
+
+    def run(self, client: Hashable, work: Coroutine[Any, Any, None], *, is_order: bool = True) -> asyncio.Task[None]:
+        """Run an action in its turn among the commands; its refusal is sent as a text.
+
+        `is_order`: a client has commanded it; neither the gateway began it, nor a stream of setpoints.
+        """
+        task = asyncio.get_running_loop().create_task(self._explained(work))
+        self.actions.add(task, FlightAction(client, is_order, is_of_core=True))
+        self.actions.announce(client)
+        return task
+
+    async def perform(self, work: Coroutine[Any, Any, None]) -> None:
+        """Run the gateway's own action in its turn; return when it has ended or is replaced.
+
+        For a caller that is no action: what replaces the action leaves the caller undisturbed.
+        """
+        await asyncio.wait({self.run(None, work, is_order=False)})
+
+    async def _explained(self, work: Coroutine[Any, Any, None]) -> None:
+        try:
+            await work
+        except AnafiMavError as error:
+            critical = isinstance(error, Refused) and error.critical
+            self._aircraft.text(Severity.CRITICAL if critical else Severity.WARNING, text_of(error))
+        finally:
+            work.close()  # cancelled before it began, it would complain that nothing awaited it
+
+    # What the drone reports.
+
+    def on_descent(self, act: DroneAct) -> None:
+        """End the active task, because the drone lands, returns or has cut its motors.
+
+        A task continues whose own end that is.
+        """
+        if not self._owns_descent:
+            self.handle(Event.DESCEND, Input(act=act))
+
+    def on_hover(self) -> None:
+        """The drone neither lands nor returns."""
+        self.handle(Event.HOVER)
+
+    def on_ground(self) -> None:
+        """The drone stands: nothing of before flies it again."""
+        self.handle(Event.GROUND, Input(task=self._situation.task if self._owns_descent else None))
+
+    def link_down(self) -> list[asyncio.Task[None]]:
+        """The link is lost: nothing that was requested outlives it."""
+        self.actions.link_down()
+        return self.handle(Event.LINK_DOWN)
+
+    @property
+    def _owns_descent(self) -> bool:
+        task = self._situation.task
+        return task is not None and task.owns_descent
+
+    # Machinery.
+
+    def handle(self, event: Event, about: Input[FlightTask] | None = None) -> list[asyncio.Task[None]]:
+        """Take a step of the machine and perform its effects; return what is about to end.
+
+        For `Grant`: others request, release or report.
+        """
+        before = self._situation
+        after: Step[FlightTask] = step(before, event, about)
+        self._situation = after.situation
+        ending = [task for one in after.ended for task in one.end()]
+        if after.begun is not None:
+            after.begun.begin()
+        if event in _SHOWN and after.situation is not before:
+            self._aircraft.changed()
+        return ending

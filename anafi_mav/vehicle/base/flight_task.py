@@ -1,0 +1,158 @@
+"""Flight tasks: their interface, their needs, and what distinguishes them as data.
+
+At most one flight task is active (`Control`). Offboard setpoints, a target to follow, a mission, a goto, a take-off
+and a return are flight tasks. Hold, Guided and Position are hovering modes: what is active below a task and after it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import enum
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from anafi_mav import texts
+from anafi_mav.texts import Subject
+from anafi_mav.vehicle.base.modes import FlightMode
+
+
+class Needs(enum.Flag):
+    """Conditions that a task needs.
+
+    They are checked before what flies is ended, and again when it has ended.
+    """
+
+    NONE = 0
+    NO_DESCENT = enum.auto()
+    """The drone neither lands nor returns, and was not commanded to."""
+    IN_AIR = enum.auto()
+    FIX = enum.auto()
+    NO_PILOT = enum.auto()
+    """The pilot at a Skycontroller has not just acquired control."""
+    LIMITS = enum.auto()
+    """The drone has reported its tilt and speed limits."""
+    PLAIN_STICKS = enum.auto()
+    """Stick input is relative to the drone's nose, not to its camera."""
+    ROLL_SIGN = enum.auto()
+    """The reported roll has not been found inverted."""
+
+
+STEERING = Needs.NO_PILOT | Needs.PLAIN_STICKS | Needs.ROLL_SIGN
+"""Conditions that a task that flies by sticks needs until its end: without one of them control is lost."""
+
+
+class Preparation(enum.Enum):
+    """How the drone is prepared for a task."""
+
+    AS_IT_IS = "nothing is sent: the task itself replaces the motion, or stops it"
+    HOVER = "hover, without waiting: what moves is cancelled, the sticks are centred"
+    STOP = "stop, and wait until the drone has confirmed the end of its moves"
+
+
+@dataclass(frozen=True)
+class TaskRules:
+    """Differences of a flight task from the others, as data."""
+
+    what: Subject
+    """For texts: `{what} refused: {reason}` and `{what} ended: {reason}`."""
+    needs: Needs = Needs.NONE
+    start: Preparation = Preparation.AS_IT_IS
+    wait: float | None = None
+    """s that the tasks before it may take to end; None: however long it takes. After that they can send nothing."""
+    is_urgent: bool = False
+    """It is sent first, and does not wait for the end of anything; nothing replaces it."""
+    lasts: bool = True
+    """It is active until it ends; else it is over as soon as its command to the drone is."""
+    is_hover: bool = False
+    """A hovering mode: active below a task and after it."""
+    is_stream: bool = False
+    """Setpoints of a client: they never leave a pause."""
+    keeps_below: bool = False
+    """The hovering mode of before stays chosen, and so does a pause."""
+    is_flight: bool = True
+    """A policy may refuse it; False: it stops the drone, lands it, leads it home, or nothing flies meanwhile."""
+
+
+STOP_WAIT = 0.5
+"""s that a stopping command waits for the action that it replaces.
+
+An action that has not ended by then can send nothing.
+"""
+
+
+class FlightTask(Protocol):
+    """A flight task, or a hovering mode."""
+
+    @property
+    def rules(self) -> TaskRules:
+        """Differences from other tasks."""
+
+    @property
+    def mode(self) -> FlightMode | None:
+        """The mode that is shown while it is active; None: the hovering mode below it."""
+
+    @property
+    def owns_descent(self) -> bool:
+        """True when a landing or return that begins now is the task's own."""
+
+    def begin(self) -> None:
+        """Begin as the successor of a task that is over; only `Control` calls it."""
+
+    def end(self) -> list[asyncio.Task[None]]:
+        """End this task, because something else flies now; earlier setpoints no longer count.
+
+        Returns tasks that are about to end.
+
+        Never waits, never raises, and does nothing when the task is not active. Only `Control` calls it.
+        """
+
+
+class PlainTask:
+    """Base of flight tasks: what most of them have in common."""
+
+    @property
+    def owns_descent(self) -> bool:
+        return False
+
+    def begin(self) -> None:
+        """Begin as the successor of a task that is over."""
+
+    def end(self) -> list[asyncio.Task[None]]:
+        """End this task: another one flies now."""
+        return []
+
+
+@dataclass(frozen=True)
+class Hover(PlainTask):
+    """A hovering mode: Hold or Guided."""
+
+    mode: FlightMode = FlightMode.HOLD
+    client: Hashable = field(default=None, compare=False)
+    """Client that chose it by name or number; None: it is the end of something else."""
+    resumes: FlightTask | None = field(default=None, compare=False)
+    """The task that a pause has stopped and DO_PAUSE_CONTINUE goes on with."""
+
+    @property
+    def rules(self) -> TaskRules:
+        return TaskRules(texts.Subject(self.mode.value), wait=STOP_WAIT, is_hover=True, is_flight=False)
+
+
+@dataclass(frozen=True)
+class CommandTask(PlainTask):
+    """One command to the drone, without a mode of its own: landing, motor cut, maintenance."""
+
+    rules: TaskRules
+    mode: FlightMode | None = None
+
+    @property
+    def owns_descent(self) -> bool:
+        return self.rules.what == texts.LANDING
+
+
+LAND = CommandTask(TaskRules(texts.LANDING, wait=STOP_WAIT, is_flight=False))
+MOTOR_CUT = CommandTask(TaskRules(texts.MOTOR_CUT, is_urgent=True, lasts=False, is_flight=False))
+DISARM = CommandTask(TaskRules(texts.DISARM, wait=STOP_WAIT, keeps_below=True, lasts=False, is_flight=False))
+HAND_LAUNCH = CommandTask(TaskRules(texts.ARMING, keeps_below=True, lasts=False))
+MAINTENANCE = CommandTask(TaskRules(texts.CALIBRATION, keeps_below=True, lasts=False, is_flight=False))
+"""Calibrations and the like: nothing flies meanwhile."""

@@ -1,0 +1,949 @@
+"""The flight of a mission as a state machine. No I/O.
+
+Everything that changes the flight of a mission is an event here: clients' requests, reports of the drone, the results
+of what `MissionFlight`, the shell, does for the machine, and time. Each event method returns the effects that the
+shell has to perform, in their order. `TRANSITIONS` is the law: an event that a state has no row for changes nothing.
+
+A start is an `MissionAttempt`, a value that is compared by identity. What becomes of it (prepared, granted, confirmed,
+failed) is reported with the attempt, and counts only while that attempt is the machine's: what an older attempt still
+reports changes nothing. A start that is withdrawn leaves the state CANCELLING, in which a late report that the drone
+plays that file belongs to the withdrawn start, and to no other controller.
+
+In the states of a start, `MissionPhase.rest` is the state of the mission meanwhile, and after the start has failed.
+"""
+
+from __future__ import annotations
+
+import enum
+import functools
+import math
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Concatenate, ParamSpec, TypeAlias
+
+from anafi_mav import geo, mav_enums, texts
+from anafi_mav.drone.automatic.flight_plan import START_TIMEOUT
+from anafi_mav.drone.events import AltitudeChanged, GpsLocationChanged, Message
+from anafi_mav.plans.plan import Item
+from anafi_mav.plans.translation.translate import FlightPlanFile, GatewayStep
+from anafi_mav.texts import OperatorText
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.mission.course import Course
+from anafi_mav.vehicle.mission.effects import (
+    Acquire,
+    Announce,
+    DroneReport,
+    Effect,
+    Failure,
+    FlyItem,
+    MissionAttempt,
+    Persist,
+    Prepare,
+    Prepared,
+    Reached,
+    Release,
+    Select,
+    SendText,
+    StartFile,
+    Suspend,
+)
+from anafi_mav.vehicle.mission.path import WayPoint, way_points
+from anafi_mav.vehicle.mission.progress import ENDINGS, Mission, MissionProgress
+from anafi_mav.vehicle.mission.record import MissionRecord
+from anafi_mav.vehicle.mission.texts import FIRST_LABEL
+
+ARM_WAIT = 10.0
+"""s that a mission waits for arming.
+
+QGroundControl chooses the mode first and arms when it is shown.
+"""
+
+END_WAIT = 2.0
+"""s within which a drone whose plan has ended has reported the last line, or begun its landing or return."""
+
+POSITION_WAIT = 10.0
+"""s after that end within which a position must be received that proves the drone at its last way point.
+
+An ANAFI reports its location once a second, and no report is repeated. Of ten, a link that loses half of them loses all
+in one case of a thousand.
+"""
+
+PROOF: frozenset[type[Message]] = frozenset({GpsLocationChanged, AltitudeChanged})
+"""Reports of which the drone's position is made."""
+
+GPS_MARGIN = 2.0
+"""m beyond the radius of a way point at which a drone that has stopped there may report itself."""
+
+
+class State(enum.Enum):
+    NO_MISSION = "no mission stored"
+    READY = "not begun"
+    AWAIT_ARM = "mode Mission is chosen on the ground, and its client has to arm"
+    PREPARING = "that client has armed, and the files are translated and uploaded"
+    TAKING_OVER = "the files are on the drone, and control is acquired"
+    STARTING = "the drone is commanded to fly a file, and has not confirmed it"
+    CANCELLING = "a start or a flight is withdrawn, and the drone has not confirmed that"
+    FLYING_FILE = "the drone flies a file"
+    FLYING_ITEM = "the gateway flies an item, or loads the next file"
+    ENDING = "the drone has stopped its file without a report of the last line"
+    PAUSED = "begun and then stopped"
+    COMPLETE = "flown completely"
+
+
+class Event(enum.Enum):
+    UPLOADED = "another mission is uploaded"
+    CLEARED = "the mission is deleted"
+    UPLOADED_AGAIN = "the same mission is uploaded again"
+    CHOSEN = "a client sets the current item"
+    ENGAGED = "a client chooses mode Mission on the ground, disarmed"
+    ARMED = "that client arms"
+    PREPARED = "the files of a start are on the drone"
+    GRANTED = "control is acquired"
+    CONFIRMED = "the command that starts the file is confirmed"
+    FAILED = "a start or an item fails"
+    WITHDRAWN = "a start or an item is cancelled, or its confirmation is overdue"
+    PLAYING = "the drone reports that it flies this file"
+    OTHER_PLAYING = "the drone reports that it flies another plan"
+    HALTED = "the drone reports its plan as paused or stopped"
+    EXECUTED = "the drone reports an executed line"
+    SKIPPED = "the drone leaves a line out"
+    ITEM_FLOWN = "the gateway has flown an item"
+    REPORTED = "the drone reports its position, a landing or a return"
+    CONTROL_LOST = "another flight task, a landing or a return is active"
+    TIMEOUT = "the state has lasted too long"
+    LINK_DOWN = "the link is lost"
+    LINK_UP = "the link is there again, or the gateway is a new one"
+
+
+S, E = State, Event
+_REST = (S.READY, S.PAUSED, S.COMPLETE)
+_ANY_REST = (S.NO_MISSION, *_REST)
+_NEXT = (S.FLYING_ITEM, S.COMPLETE, S.PAUSED)
+"""After a file or an item: the next one, the end, or a stop before what the drone cannot fly alone."""
+
+TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
+    S.NO_MISSION: {
+        E.UPLOADED: (S.READY,),
+        E.CLEARED: (S.NO_MISSION,),
+        E.OTHER_PLAYING: (S.NO_MISSION,),
+        E.LINK_DOWN: (S.NO_MISSION,),
+    },
+    S.READY: {
+        E.UPLOADED: (S.READY,),
+        E.CLEARED: (S.NO_MISSION,),
+        E.UPLOADED_AGAIN: (S.READY,),
+        E.CHOSEN: (S.READY,),
+        E.ENGAGED: (S.AWAIT_ARM,),
+        E.PREPARED: (S.TAKING_OVER,),
+        E.PLAYING: (S.FLYING_FILE,),
+        E.OTHER_PLAYING: (S.READY,),
+        E.LINK_DOWN: (S.READY,),
+        E.LINK_UP: (S.READY, S.FLYING_FILE, S.PAUSED, S.COMPLETE),
+    },
+    S.AWAIT_ARM: {
+        E.UPLOADED: (S.READY,),
+        E.CLEARED: (S.NO_MISSION,),
+        E.UPLOADED_AGAIN: (S.AWAIT_ARM,),
+        E.CHOSEN: (S.AWAIT_ARM,),
+        E.ENGAGED: (S.AWAIT_ARM,),
+        E.ARMED: (S.PREPARING,),
+        E.PREPARED: (S.TAKING_OVER,),
+        E.PLAYING: (S.FLYING_FILE,),
+        E.OTHER_PLAYING: (S.AWAIT_ARM,),
+        E.CONTROL_LOST: _REST,
+        E.TIMEOUT: _REST,
+        E.LINK_DOWN: _REST,
+    },
+    S.PREPARING: {
+        E.UPLOADED: (S.PREPARING, S.READY),
+        E.CLEARED: (S.NO_MISSION,),
+        E.UPLOADED_AGAIN: (S.PREPARING,),
+        E.PREPARED: (S.TAKING_OVER,),
+        E.FAILED: _REST,
+        E.WITHDRAWN: _REST,
+        E.OTHER_PLAYING: (S.PREPARING,),
+        E.CONTROL_LOST: _REST,
+        E.LINK_DOWN: _REST,
+    },
+    S.TAKING_OVER: {
+        E.UPLOADED: (S.READY, S.CANCELLING),
+        E.CLEARED: (S.NO_MISSION, S.CANCELLING),
+        E.UPLOADED_AGAIN: (S.TAKING_OVER,),
+        E.PREPARED: (S.TAKING_OVER,),
+        E.GRANTED: (S.STARTING, S.FLYING_ITEM),
+        E.FAILED: (*_REST, S.CANCELLING),
+        E.WITHDRAWN: (*_REST, S.CANCELLING),
+        E.HALTED: (S.TAKING_OVER,),
+        E.LINK_DOWN: _REST,
+    },
+    S.STARTING: {
+        E.UPLOADED: (S.CANCELLING,),
+        E.CLEARED: (S.CANCELLING,),
+        E.UPLOADED_AGAIN: (S.STARTING,),
+        E.PREPARED: (S.TAKING_OVER,),
+        E.CONFIRMED: (S.FLYING_FILE,),
+        E.FAILED: _REST,
+        E.WITHDRAWN: (S.CANCELLING,),
+        E.PLAYING: (S.FLYING_FILE,),
+        E.CONTROL_LOST: (S.CANCELLING,),
+        E.LINK_DOWN: _REST,
+    },
+    S.CANCELLING: {
+        E.UPLOADED: (S.CANCELLING,),
+        E.CLEARED: (S.CANCELLING,),
+        E.UPLOADED_AGAIN: (S.CANCELLING,),
+        E.CHOSEN: (S.CANCELLING,),
+        E.ENGAGED: (S.AWAIT_ARM,),
+        E.PREPARED: (S.TAKING_OVER,),
+        E.PLAYING: (S.CANCELLING,),
+        E.OTHER_PLAYING: (S.CANCELLING,),
+        E.HALTED: (S.CANCELLING, *_ANY_REST),
+        E.TIMEOUT: _ANY_REST,
+        E.LINK_DOWN: _ANY_REST,
+    },
+    S.FLYING_FILE: {
+        E.UPLOADED: (S.CANCELLING,),
+        E.CLEARED: (S.CANCELLING,),
+        E.UPLOADED_AGAIN: (S.FLYING_FILE,),
+        E.PREPARED: (S.TAKING_OVER,),
+        E.CONFIRMED: (S.FLYING_FILE,),
+        E.WITHDRAWN: (S.CANCELLING,),
+        E.OTHER_PLAYING: (S.PAUSED,),
+        E.HALTED: (*_NEXT, S.ENDING),
+        E.EXECUTED: (S.FLYING_FILE,),
+        E.SKIPPED: (S.FLYING_FILE,),
+        E.CONTROL_LOST: (S.CANCELLING,),
+        E.LINK_DOWN: (S.PAUSED,),
+    },
+    S.FLYING_ITEM: {
+        E.UPLOADED: (S.READY,),
+        E.CLEARED: (S.NO_MISSION,),
+        E.UPLOADED_AGAIN: (S.FLYING_ITEM,),
+        E.PREPARED: (S.STARTING, S.FLYING_ITEM, S.TAKING_OVER),
+        E.FAILED: (S.PAUSED,),
+        E.WITHDRAWN: (S.PAUSED,),
+        E.OTHER_PLAYING: (S.PAUSED,),
+        E.ITEM_FLOWN: (S.FLYING_ITEM, S.COMPLETE),
+        E.CONTROL_LOST: (S.PAUSED,),
+        E.LINK_DOWN: (S.PAUSED,),
+    },
+    S.ENDING: {
+        E.UPLOADED: (S.READY,),
+        E.CLEARED: (S.NO_MISSION,),
+        E.UPLOADED_AGAIN: (S.ENDING,),
+        E.PREPARED: (S.TAKING_OVER,),
+        E.PLAYING: (S.FLYING_FILE,),
+        E.OTHER_PLAYING: (S.PAUSED,),
+        E.EXECUTED: (S.ENDING, *_NEXT),
+        E.SKIPPED: (S.ENDING,),
+        E.REPORTED: (S.ENDING, *_NEXT),
+        E.CONTROL_LOST: (S.PAUSED,),
+        E.TIMEOUT: (S.ENDING, *_NEXT),
+        E.LINK_DOWN: (S.PAUSED,),
+    },
+    S.PAUSED: {
+        E.UPLOADED: (S.READY,),
+        E.CLEARED: (S.NO_MISSION,),
+        E.UPLOADED_AGAIN: (S.READY,),
+        E.CHOSEN: (S.PAUSED,),
+        E.ENGAGED: (S.AWAIT_ARM,),
+        E.PREPARED: (S.TAKING_OVER,),
+        E.PLAYING: (S.FLYING_FILE,),
+        E.OTHER_PLAYING: (S.PAUSED,),
+        E.EXECUTED: (S.PAUSED, S.COMPLETE),
+        E.LINK_DOWN: (S.PAUSED,),
+        E.LINK_UP: (S.FLYING_FILE, S.PAUSED, S.COMPLETE),
+    },
+    S.COMPLETE: {
+        E.UPLOADED: (S.READY,),
+        E.CLEARED: (S.NO_MISSION,),
+        E.UPLOADED_AGAIN: (S.READY,),
+        E.CHOSEN: (S.READY,),
+        E.ENGAGED: (S.AWAIT_ARM,),
+        E.PREPARED: (S.TAKING_OVER,),
+        E.OTHER_PLAYING: (S.COMPLETE,),
+        E.LINK_DOWN: (S.COMPLETE,),
+    },
+}
+"""The states that an event may lead to. A missing pair is ignored: it reports what no longer counts."""
+
+FLYING = frozenset({S.FLYING_FILE, S.FLYING_ITEM, S.ENDING})
+
+MAVLINK_STATES = {
+    S.NO_MISSION: mav_enums.MISSION_STATE_NO_MISSION,
+    S.READY: mav_enums.MISSION_STATE_NOT_STARTED,
+    **dict.fromkeys(FLYING, mav_enums.MISSION_STATE_ACTIVE),
+    S.PAUSED: mav_enums.MISSION_STATE_PAUSED,
+    S.COMPLETE: mav_enums.MISSION_STATE_COMPLETE,
+}
+
+
+@dataclass(frozen=True)
+class MissionPhase:
+    """The state, and the facts that live as long as it."""
+
+    state: State
+    rest: State
+    """What the mission is during a start, and when it fails; in the other states the state itself."""
+    attempt: MissionAttempt | None = None
+    """The start or continuation under way; in CANCELLING the withdrawn start, None: a flight."""
+    prepared: Prepared | None = None
+    client: Hashable = None
+    """AWAIT_ARM: who has to arm."""
+    until: float = math.inf
+    """When TIMEOUT is due."""
+    interrupts: bool = False
+    """The start has interrupted the flight of the mission."""
+    again: bool = False
+    """The same mission was uploaded during the start: if it fails, nothing of that mission has been flown."""
+    uid: str = ""
+    """The file that the drone must not fly any longer."""
+    played: bool = False
+    """The drone has reported that it flies that file, and not yet that it does not."""
+    target: WayPoint | None = None
+    """ENDING: the last way point; None when the plan's last line lands or returns."""
+    missing: frozenset[type[Message]] = frozenset()
+    """ENDING: parts of the position that have not been received since the drone stopped."""
+    waits_for_position: bool = False
+    """ENDING: only a position is missing for the decision."""
+    may_end_late: bool = False
+    """PAUSED: the drone stopped its plan. Its report of the last line still completes the mission."""
+
+
+P = ParamSpec("P")
+_Steps: TypeAlias = Iterator[Effect]
+
+
+def _on(
+    event: Event,
+) -> Callable[
+    [Callable[Concatenate[MissionMachine, P], _Steps]], Callable[Concatenate[MissionMachine, P], list[Effect]]
+]:
+    """Run a method as this event: not at all where the state has no such event."""
+
+    def wrap(
+        method: Callable[Concatenate[MissionMachine, P], _Steps],
+    ) -> Callable[Concatenate[MissionMachine, P], list[Effect]]:
+        @functools.wraps(method)
+        def step(self: MissionMachine, /, *args: P.args, **kwargs: P.kwargs) -> list[Effect]:
+            if event not in TRANSITIONS[self.state]:
+                return []
+            before, flew = self.progress, self.flying
+            effects = [*method(self, *args, **kwargs)]
+            # What the drone flies alone while the link is lost is not known yet.
+            return effects if event is E.LINK_DOWN else effects + self._kept(before, flew)
+
+        return step
+
+    return wrap
+
+
+class MissionMachine:
+    """The mission of one vehicle, how far it is, and what becomes of it."""
+
+    def __init__(self) -> None:
+        self.mission = Mission()
+        self.progress = MissionProgress()
+        self.phase = MissionPhase(S.NO_MISSION, S.NO_MISSION)
+
+    @property
+    def state(self) -> State:
+        return self.phase.state
+
+    @property
+    def rest(self) -> State:
+        """The state without a start under way: NO_MISSION, READY, PAUSED, COMPLETE or flown."""
+        return self.phase.rest
+
+    @property
+    def flying(self) -> bool:
+        """The mission is flown, by the drone or by the gateway."""
+        return self.phase.rest in FLYING
+
+    @property
+    def is_untouched(self) -> bool:
+        """True while the mission has not begun and no client has set its current item."""
+        return self.rest is S.READY and not self.progress.chosen
+
+    @property
+    def first(self) -> int:
+        """The item that a start begins with: the current one, and the first again after the end."""
+        return 0 if self.rest is S.COMPLETE else self.progress.current
+
+    @property
+    def ending(self) -> bool:
+        """The drone flies to the item that lands or returns: that it does so is no surprise."""
+        progress, leg = self.progress, self.progress.leg
+        if not self.flying or leg is None or progress.leg_done:
+            return False
+        return self.mission.items[leg.origins[progress.line + 1]].command in ENDINGS
+
+    @property
+    def returned(self) -> bool:
+        """The drone has executed the whole file, and its last line was a return."""
+        leg = self.progress.leg
+        if leg is None or not self.progress.leg_done or not (self.flying or self.rest is S.COMPLETE):
+            return False
+        return self.mission.items[leg.origins[-1]].command == mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH
+
+    @property
+    def is_paused(self) -> bool:
+        """Paused, and no start is under way."""
+        return self.rest is S.PAUSED and self.state in (S.PAUSED, S.CANCELLING)
+
+    @property
+    def has_withdrawn_start(self) -> bool:
+        """The drone may still report that it flies a file whose start is withdrawn."""
+        return self.state is S.CANCELLING and self.phase.attempt is not None
+
+    @property
+    def needs_gimbal(self) -> bool:
+        """True while the mission is flown and an item to come needs the gimbal."""
+        return self.flying and self.mission.payload.needs_gimbal(self.progress.current, self.progress.jumps)
+
+    @property
+    def needs_camera(self) -> bool:
+        """True while the mission is flown and an item to come needs the camera."""
+        return self.flying and self.mission.payload.needs_camera(self.progress.current, self.progress.jumps)
+
+    def deadline(self) -> float | None:
+        """Return when `timeout` is due (s, monotonic); None: never."""
+        return None if self.phase.until == math.inf else self.phase.until
+
+    def attempt(self, item: int | None = None) -> MissionAttempt:
+        """Return a new attempt: from an item on with its loops restarted; None: the current item."""
+        if item is None:
+            return MissionAttempt(self.mission, self.first, self.progress.jumps)
+        return MissionAttempt(self.mission, item, {})
+
+    # Requests of clients.
+
+    def upload(self, items: Sequence[Item], identity: int, now: float) -> list[Effect]:
+        """Another mission was uploaded, or the mission was deleted. One that is flown is stopped."""
+        mission = Mission(items, identity)
+        return self._uploaded(mission, now) if mission.items else self._cleared(mission, now)
+
+    @_on(E.UPLOADED)
+    def _uploaded(self, mission: Mission, now: float) -> _Steps:
+        yield from self._replace(mission, S.READY, texts.MISSION_REPLACED, now)
+
+    @_on(E.CLEARED)
+    def _cleared(self, mission: Mission, now: float) -> _Steps:
+        yield from self._replace(mission, S.NO_MISSION, texts.MISSION_CLEARED, now)
+
+    def _replace(self, mission: Mission, rest: State, why: OperatorText, now: float) -> _Steps:
+        phase, flew, unconfirmed, paused = self.phase, self.flying, self._unconfirmed(now), self._paused_text(why)
+        known = self.mission.identity != 0  # else it has just been read, and the stored record has not been looked at
+        self.mission, self.progress = mission, MissionProgress()
+        if known:
+            yield Persist(None)
+        if phase.state is S.CANCELLING:
+            self.phase = replace(phase, rest=rest)
+            return
+        attempt = phase.attempt
+        if phase.state is S.PREPARING and attempt is not None and attempt.awaits_upload and mission.items:
+            attempt = replace(self.attempt(), unattended=True)
+            self.phase = replace(phase, rest=rest, attempt=attempt)
+            yield Prepare(attempt)
+            return
+        if flew:
+            yield paused
+        elif attempt is not None and attempt.unattended:
+            yield SendText(Severity.WARNING, texts.MISSION_NOT_STARTED.fill(reason=why))
+        self._be(rest, unconfirmed)
+        if flew or phase.state is S.STARTING:
+            yield Suspend(starting=phase.state is S.STARTING)
+        if phase.state not in _ANY_REST:
+            yield Release()
+
+    @_on(E.UPLOADED_AGAIN)
+    def upload_again(self) -> _Steps:
+        """The same mission was uploaded once more: a flight or a start goes on.
+
+        Otherwise it is a new mission, of which nothing has been flown.
+        """
+        phase = self.phase
+        if phase.state is S.CANCELLING or not (self.flying or phase.attempt is not None):
+            if self.mission.items:
+                self._renew()
+                self._rest_at(S.READY)
+                yield Persist(None)
+            return
+        current = self.progress.current
+        if phase.prepared is not None and phase.state is not S.FLYING_FILE:
+            current = _head_item(phase.prepared)
+        elif not self.flying and phase.attempt is not None:
+            current = phase.attempt.item
+        self.phase = replace(phase, again=not self.flying)
+        yield SendText(Severity.INFO, texts.MISSION_SAME.fill(item=current + FIRST_LABEL))
+
+    @_on(E.CHOSEN)
+    def choose(self, item: int) -> _Steps:
+        """Make an item the current one of a mission that does not fly.
+
+        Raises `ValueError` on wrong arguments of ours: `item` must be one of the mission's.
+        """
+        if not 0 <= item < len(self.mission.items):
+            raise ValueError(f"the mission has no item {item}")
+        self.progress = MissionProgress(item, chosen=True, left=self._paused_file(), kept=self.progress.kept)
+        self._rest_at(S.READY if self.rest is S.COMPLETE else self.rest)
+        yield from ()
+
+    @_on(E.ENGAGED)
+    def await_arm(self, client: Hashable, now: float) -> _Steps:
+        """Control was acquired on the ground: wait until this client arms."""
+        self.phase = MissionPhase(S.AWAIT_ARM, self.rest, client=client, until=now + ARM_WAIT)
+        yield Select()
+
+    def armed(self, client: Hashable, *, storing: bool = False) -> list[Effect]:
+        """A client has armed. `storing`: a new mission is being stored, which is meant."""
+        return self._armed(storing) if client == self.phase.client else []
+
+    @_on(E.ARMED)
+    def _armed(self, storing: bool) -> _Steps:
+        attempt = replace(self.attempt(), unattended=True, awaits_upload=storing)
+        self.phase = MissionPhase(S.PREPARING, self.rest, attempt)
+        yield Prepare(attempt)
+
+    # Results of work.
+
+    def holds(self, attempt: MissionAttempt) -> bool:
+        """True while what becomes of this attempt counts."""
+        if self.phase.attempt is attempt:
+            return self.state is not S.CANCELLING
+        return attempt.course is None and not attempt.unattended and attempt.mission is self.mission
+
+    def prepared(self, attempt: MissionAttempt, prepared: Prepared) -> list[Effect]:
+        """The parts of an attempt are laid out, and its first file is on the drone."""
+        return self._prepared(attempt, prepared) if self.holds(attempt) else []
+
+    @_on(E.PREPARED)
+    def _prepared(self, attempt: MissionAttempt, prepared: Prepared) -> _Steps:
+        phase = self.phase
+        if attempt.course is not None:
+            yield from self._begin_part(attempt, prepared)
+            return
+        if self.flying or phase.state is S.STARTING:
+            yield Suspend(starting=phase.state is S.STARTING)
+        self.phase = MissionPhase(
+            S.TAKING_OVER,
+            S.PAUSED if self.flying else self.rest,
+            attempt,
+            prepared,
+            interrupts=self.flying or phase.interrupts,
+            again=phase.again and phase.attempt is attempt,
+            uid=self.progress.uid if phase.state is S.FLYING_FILE else phase.uid,
+            played=phase.played or phase.state is S.FLYING_FILE,
+        )
+        yield Acquire(attempt, prepared.resumes)
+
+    def granted(self, attempt: MissionAttempt) -> list[Effect]:
+        """Control is acquired, and the drone hovers or stands."""
+        return self._granted(attempt) if self.phase.attempt is attempt else []
+
+    @_on(E.GRANTED)
+    def _granted(self, attempt: MissionAttempt) -> _Steps:
+        prepared = self.phase.prepared
+        assert prepared is not None, "TAKING_OVER has it"
+        self.progress = replace(self.progress, left=None)
+        yield Select()
+        yield from self._begin_part(attempt, prepared)
+
+    def _begin_part(self, attempt: MissionAttempt, prepared: Prepared) -> _Steps:
+        """Begin with the first part: the drone with a file, or the gateway with an item."""
+        head = prepared.course.parts[0]
+        if isinstance(head, FlightPlanFile):
+            self.phase = replace(self.phase, state=S.STARTING, attempt=attempt, prepared=prepared)
+            yield StartFile(attempt, prepared.uid, prepared.line)
+            return
+        self.progress = replace(self.progress.at_item(head.item), course=prepared.course, jumps=attempt.jumps)
+        self.phase = MissionPhase(S.FLYING_ITEM, S.FLYING_ITEM, attempt)
+        if attempt.course is None:
+            yield Announce(head.item, resumes=False, stepped=True)
+        yield FlyItem(attempt, head.item)
+
+    def confirmed(self, attempt: MissionAttempt) -> list[Effect]:
+        """The command that starts the file was confirmed."""
+        return self._confirmed(attempt) if self.phase.attempt is attempt else []
+
+    @_on(E.CONFIRMED)
+    def _confirmed(self, attempt: MissionAttempt) -> _Steps:
+        self._begin_file()
+        prepared = self.phase.prepared
+        self._be(S.FLYING_FILE)
+        if attempt.course is None and prepared is not None:
+            yield Announce(_head_item(prepared), prepared.resumes, prepared.course.stepped)
+
+    def _begin_file(self) -> None:
+        """Note that the drone flies the file of the start."""
+        attempt, prepared = self.phase.attempt, self.phase.prepared
+        if self.state is S.STARTING and attempt is not None and prepared is not None:
+            leg = prepared.course.parts[0]
+            assert isinstance(leg, FlightPlanFile), "STARTING begins a file"
+            jumps = self.progress.jumps if prepared.resumes else attempt.jumps
+            progress = self.progress.in_file(prepared.uid, leg, prepared.line)
+            self.progress = replace(progress, course=prepared.course, jumps=jumps)
+            self.phase = MissionPhase(S.FLYING_FILE, S.FLYING_FILE, attempt, prepared)
+
+    def failed(self, attempt: MissionAttempt, failure: Failure, now: float) -> list[Effect]:
+        """The work of an attempt has failed, and nothing of it will begin."""
+        return self._failed(failure, now) if self.phase.attempt is attempt else []
+
+    @_on(E.FAILED)
+    def _failed(self, failure: Failure, now: float) -> _Steps:
+        yield from self._end(failure, None if self.state is S.STARTING else self._unconfirmed(now))
+        yield Release()
+
+    def withdrawn(self, attempt: MissionAttempt, failure: Failure | None, now: float) -> list[Effect]:
+        """The work of an attempt was cancelled (None), or not confirmed in time.
+
+        The drone may begin it late.
+        """
+        return self._withdrawn(failure, now) if self.phase.attempt is attempt else []
+
+    @_on(E.WITHDRAWN)
+    def _withdrawn(self, failure: Failure | None, now: float) -> _Steps:
+        yield from self._end(failure, self._unconfirmed(now))
+        yield Release()
+
+    def _end(self, failure: Failure | None, unconfirmed: MissionPhase | None) -> _Steps:
+        """End a start, a flight or a wait: a flown mission is paused, another is as before."""
+        phase, rest, flew = self.phase, self.rest, self.flying
+        if phase.again and not flew:
+            self._renew()
+            rest = S.READY
+        self._be(S.PAUSED if flew else rest, unconfirmed)
+        if failure is not None and phase.attempt is not None and phase.attempt.unattended:
+            yield SendText(Severity.ERROR, failure.text)
+        if flew or phase.interrupts:
+            yield self._paused_text(failure.reason if flew and failure is not None else None)
+
+    def item_flown(self, attempt: MissionAttempt) -> list[Effect]:
+        """The gateway has flown the item of an attempt."""
+        return self._item_flown() if self.phase.attempt is attempt else []
+
+    @_on(E.ITEM_FLOWN)
+    def _item_flown(self) -> _Steps:
+        head = self.progress.course.parts[0]
+        assert isinstance(head, GatewayStep), "an item of the gateway was flown"
+        self.progress = self.progress.with_done(self.mission.items, head.done)
+        for item in head.done:
+            yield Reached(item)
+        yield from self._part_over()
+
+    # Reports of the drone.
+
+    def playing(self, uid: str) -> list[Effect]:
+        """The drone reports that it flies the plan of this name."""
+        phase, known = self.phase, self._paused_file()
+        if phase.state is S.CANCELLING:
+            own = uid == phase.uid
+        elif phase.state is S.STARTING:
+            own = phase.prepared is not None and uid == phase.prepared.uid
+        elif self.flying:
+            own = uid == self.progress.uid
+        else:
+            own = known is not None and uid == known.uid
+        return self._playing() if own else self._other_playing()
+
+    @_on(E.PLAYING)
+    def _playing(self) -> _Steps:
+        match self.state:
+            case S.STARTING:
+                self._begin_file()
+            case S.CANCELLING:
+                self.phase = replace(self.phase, played=True)
+            case S.ENDING:
+                self._be(S.FLYING_FILE)
+            case _:  # not by us, but it flies, and a client that looks at the mission has to see that
+                known = self._paused_file()
+                assert known is not None, "else it is another plan"
+                self.progress = replace(known, left=None, kept=self.progress.kept)
+                self._be(S.FLYING_FILE)
+                yield Select()
+                yield SendText(Severity.NOTICE, texts.MISSION_RESUMED_ELSEWHERE)
+
+    @_on(E.OTHER_PLAYING)
+    def _other_playing(self) -> _Steps:
+        if self.flying:
+            yield from self._stop(texts.MISSION_OTHER_PLAN)
+        else:
+            self.phase = replace(self.phase, may_end_late=False)
+            yield SendText(Severity.NOTICE, texts.OTHER_PLAN)
+
+    @_on(E.HALTED)
+    def halted(self, *, stopped: bool, report: DroneReport, now: float) -> _Steps:
+        """The drone reports its plan as paused, or as `stopped`."""
+        progress = self.progress
+        if self.state is S.TAKING_OVER:
+            self.phase = replace(self.phase, played=False)
+        elif self.state is S.CANCELLING:
+            if self.phase.played:
+                self._be(self.rest)
+        elif progress.leg_done:
+            yield from self._part_over()
+        elif stopped and self.ending and progress.at_last_line:
+            yield from self._await_end(None, report, now)
+        elif report.pilot:
+            yield from self._stop(texts.MISSION_PILOT)
+        elif stopped and (last := self._last_way_point()) is not None:
+            yield from self._await_end(last, report, now)
+        else:
+            yield from self._stopped_by_drone(stopped=stopped)
+
+    @_on(E.EXECUTED)
+    def executed(self, line: int) -> _Steps:
+        """The drone reports that it has executed a line of its file."""
+        leg = self.progress.leg
+        late = self.state is S.PAUSED
+        if late and not (self.phase.may_end_late and leg is not None and line == len(leg.origins) - 1):
+            return
+        yield from self._execute(line)
+        if late:  # and no other mode: another flight task may be active by now
+            yield from self._complete()
+        elif self.state is S.ENDING and self.progress.leg_done:
+            yield from self._part_over()
+
+    def _execute(self, line: int) -> _Steps:
+        self.progress, done = self.progress.with_executed(self.mission.items, line)
+        for item in done:
+            yield Reached(item)
+
+    @_on(E.SKIPPED)
+    def skipped(self, line: int) -> _Steps:
+        """The drone has left out a line of its file."""
+        self.progress, item = self.progress.with_skipped(line)
+        if item is not None:
+            yield SendText(Severity.WARNING, texts.MISSION_OUT_OF_REACH.fill(item=item + FIRST_LABEL))
+
+    @_on(E.REPORTED)
+    def reported(self, report: DroneReport, kind: type[Message] | None = None) -> _Steps:
+        """The drone has reported a landing, a return, an alert, or (`kind`) a part of its position."""
+        phase = self.phase
+        if kind is None:
+            yield from self._look(report)
+            return
+        self.phase = replace(phase, missing=phase.missing - {kind})
+        if phase.waits_for_position and not self.phase.missing:
+            yield from self._look(report, last=True)
+
+    @_on(E.CONTROL_LOST)
+    def control_lost(self, now: float) -> _Steps:
+        """Another flight task, a landing or a return is active.
+
+        In TAKING_OVER it is our own acquisition. Another one cancels that work, and its end is an event.
+        """
+        state, flew = self.state, self.flying
+        yield from self._end(None, self._unconfirmed(now))
+        if flew or state is S.STARTING:
+            yield Suspend(starting=state is S.STARTING)
+
+    # Time and the link.
+
+    @_on(E.TIMEOUT)
+    def timeout(self, report: DroneReport) -> _Steps:
+        """The deadline has passed."""
+        phase = self.phase
+        match phase.state:
+            case S.AWAIT_ARM:
+                self._be(self.rest)
+                why = texts.NOT_ARMED_WITHIN.fill(seconds=ARM_WAIT)
+                yield Release()
+                yield SendText(Severity.WARNING, texts.MISSION_NOT_STARTED.fill(reason=why))
+            case S.ENDING if phase.missing and not phase.waits_for_position:
+                self.phase = replace(phase, waits_for_position=True, until=phase.until + POSITION_WAIT - END_WAIT)
+            case S.ENDING:
+                yield from self._look(report, last=True)
+            case _:
+                self._be(self.rest)
+
+    @_on(E.LINK_DOWN)
+    def link_down(self) -> _Steps:
+        """The drone may fly on with the file that it has. What the gateway flies itself ends here."""
+        self.progress = replace(self.progress, course=self.progress.course.ending_with_this_part())
+        self._be(S.PAUSED if self.flying else self.rest)
+        yield from ()
+
+    @_on(E.LINK_UP)
+    def link_up(self, record: MissionRecord | None, uid: str | None, *, plays: bool, in_air: bool) -> _Steps:
+        """The drone is connected and reports its newest plan, and if it flies that.
+
+        `record` is the stored one.
+        """
+        if self.progress.leg is None and record is not None and record.mission == self.mission.identity:
+            if uid != record.uid and not in_air:
+                return
+            progress = MissionProgress(self.progress.current).in_file(record.uid, record.leg, record.line)
+            course = Course((record.leg,), later=record.next)
+            self.progress = replace(progress, course=course, jumps=dict(record.jumps), kept=record)
+            self._be(S.PAUSED)
+        progress = self.progress
+        if self.state is not S.PAUSED or progress.leg is None:
+            return
+        later = progress.course.later
+        if progress.leg_done and later is not None:
+            progress = self.progress = replace(progress, current=later)
+        current = progress.current + FIRST_LABEL
+        if plays and uid == progress.uid:
+            self._be(S.FLYING_FILE)
+            yield Select()
+            yield SendText(Severity.NOTICE, texts.MISSION_FOUND_FLYING.fill(item=current))
+        elif progress.leg_done and later is None:
+            yield from self._complete()
+        else:
+            yield SendText(Severity.NOTICE, texts.MISSION_FOUND_PAUSED.fill(item=current))
+
+    # Steps of several events.
+
+    def _be(self, state: State, unconfirmed: MissionPhase | None = None) -> None:
+        """Enter a state that has no further facts.
+
+        `unconfirmed`: not before the drone has confirmed the end of a file.
+        """
+        self.phase = MissionPhase(state, state) if unconfirmed is None else replace(unconfirmed, rest=state)
+
+    def _paused_file(self) -> MissionProgress | None:
+        """Return the progress in a paused file, which another controller may resume."""
+        in_file = self.rest is S.PAUSED and self.progress.leg is not None
+        return self.progress if in_file else self.progress.left
+
+    def _renew(self) -> None:
+        """Nothing of the mission has been flown, but for a file that the drone has paused."""
+        self.progress = MissionProgress(left=self._paused_file())
+
+    def _rest_at(self, rest: State) -> None:
+        """Let the mission be READY or PAUSED, also in a state that keeps this for later."""
+        if self.state in _REST:
+            self._be(rest)
+        else:
+            self.phase = replace(self.phase, rest=rest)
+
+    def _unconfirmed(self, now: float) -> MissionPhase | None:
+        """Return the phase after the start or the flight of the present file is withdrawn.
+
+        Until the drone has confirmed that, what it reports of the file is of that start or flight. None: no file.
+        """
+        phase, until = self.phase, now + START_TIMEOUT
+        if phase.state is S.STARTING and phase.prepared is not None:
+            return MissionPhase(S.CANCELLING, phase.rest, phase.attempt, uid=phase.prepared.uid, until=until)
+        if phase.state is S.FLYING_FILE:
+            return MissionPhase(S.CANCELLING, phase.rest, uid=self.progress.uid, played=True, until=until)
+        if phase.state is S.TAKING_OVER and phase.played:
+            return MissionPhase(S.CANCELLING, phase.rest, uid=phase.uid, played=True, until=until)
+        return None
+
+    def _paused_text(self, why: OperatorText | None) -> SendText:
+        item = self.progress.current + FIRST_LABEL
+        if why is None:
+            return SendText(Severity.INFO, texts.MISSION_PAUSED.fill(item=item))
+        return SendText(Severity.WARNING, texts.MISSION_PAUSED_REASON.fill(item=item, reason=why))
+
+    def _stop(self, why: OperatorText | None) -> _Steps:
+        """Pause the mission for a reason that no client has commanded."""
+        self._be(S.PAUSED)
+        yield self._paused_text(why)
+        yield Release()
+
+    def _stopped_by_drone(self, *, stopped: bool) -> _Steps:
+        """Pause the mission: the drone has stopped its plan, as far as its reports go."""
+        yield from self._stop(texts.MISSION_STOPPED)
+        late = stopped and self.progress.course.following is None
+        self.phase = replace(self.phase, may_end_late=late)
+
+    def _part_over(self) -> _Steps:
+        """The first part is flown: begin the next one, or end the mission."""
+        progress = self.progress
+        course = progress.course.without_first()
+        following = course.first
+        if following is None and course.later is not None:
+            kept = progress.record(self.mission.identity)  # with the whole file
+            ended = MissionProgress(course.later, jumps=progress.jumps, chosen=True, kept=kept)
+            self.progress = ended
+            yield from self._stop(texts.MISSION_LINK_LOST)
+        elif following is None:
+            yield from self._complete()
+            yield Release()
+        else:
+            # When the mission is paused before the next part begins, the part before is not flown again.
+            kept = progress.record(self.mission.identity)
+            progress = self.progress = replace(progress.at_item(following), course=course, kept=kept)
+            attempt = MissionAttempt(self.mission, following, progress.jumps, course)
+            self.phase = MissionPhase(S.FLYING_ITEM, S.FLYING_ITEM, attempt)
+            if course.parts and isinstance(course.parts[0], GatewayStep):
+                yield FlyItem(attempt, following)
+            else:
+                yield Prepare(attempt)
+
+    def _complete(self) -> _Steps:
+        self.progress = replace(self.progress, jumps={}, left=None, kept=None, course=Course())
+        self._be(S.COMPLETE)
+        yield Persist(None)
+        yield SendText(Severity.INFO, texts.MISSION_COMPLETE)
+
+    def _kept(self, before: MissionProgress, flew: bool) -> list[Effect]:
+        """Return the effect that stores the progress, if it has changed or the flight has ended."""
+        stopped = flew and not self.flying
+        if self.rest not in FLYING and self.rest is not S.PAUSED and self.progress.kept is None:
+            return []
+        if self.progress is before and not stopped:
+            return []
+        record = self.progress.record(self.mission.identity)
+        if record is None:
+            return []
+        self.progress = replace(self.progress, kept=record)
+        return [Persist(record)] if record != before.kept or stopped else []
+
+    # The end of a plan whose last line the drone has not reported.
+    #
+    # Parrot does not document if the last MissionItemExecuted precedes the state stopped. A last line that lands or
+    # returns is done when the drone has begun that; one of another cause is not the mission's. Any other last line is
+    # done when the drone is at the last way point and nothing is wrong. The report itself may also be late. A position
+    # that was received before the drone stopped proves nothing: over a bad link it may be seconds old.
+
+    def _last_way_point(self) -> WayPoint | None:
+        """Return the way point that a file ends at.
+
+        Returns None while other way points are left, or when the file ends with a landing or a return.
+        """
+        leg = self.progress.leg
+        if leg is None:
+            return None
+        points, left = [*way_points(leg)], [*way_points(leg, self.progress.line)]
+        if self.mission.items[leg.origins[-1]].command in ENDINGS or len(left) > 1 or not points:
+            return None
+        return points[-1]
+
+    def _await_end(self, target: WayPoint | None, report: DroneReport, now: float) -> _Steps:
+        missing = frozenset[type[Message]]() if target is None else PROOF
+        self.phase = MissionPhase(S.ENDING, S.ENDING, until=now + END_WAIT, target=target, missing=missing)
+        yield from self._look(report)
+
+    def _look(self, report: DroneReport, *, last: bool = False) -> _Steps:
+        """Decide if the plan is complete. `last`: with what is known now."""
+        target, missing = self.phase.target, self.phase.missing
+        if target is None:
+            flown = self.progress.at_last_line and report.lands_or_returns
+            decided = flown or last
+        else:
+            flown = not report.is_in_trouble and not missing and _is_at(target, report)
+            decided = report.is_in_trouble or last
+        if not decided:
+            return
+        if flown and (leg := self.progress.leg) is not None:
+            yield from self._execute(len(leg.origins) - 1)
+            yield from self._part_over()
+        else:
+            yield from self._stopped_by_drone(stopped=True)
+
+
+def _is_at(target: WayPoint, report: DroneReport) -> bool:
+    if report.place is None or report.ato is None:
+        return False
+    away = math.hypot(geo.distance(*report.place.point, *target.place.point), report.ato - target.ato)
+    return away <= target.radius + GPS_MARGIN
+
+
+def _head_item(prepared: Prepared) -> int:
+    """Return the item that a start begins with."""
+    head = prepared.course.parts[0]
+    return head.item if isinstance(head, GatewayStep) else head.origins[min(prepared.line + 1, len(head.origins) - 1)]

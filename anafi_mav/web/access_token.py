@@ -1,0 +1,79 @@
+"""The token of a web server that is open to the network: a random text in a file.
+
+It stands in `web.token` of the state folder, readable by its owner only, so that a bookmark or the configuration of a
+Prometheus server survives a restart of the gateway. To withdraw it, delete the file and restart.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hmac
+import logging
+import os
+import re
+import secrets
+from pathlib import Path
+
+logger = logging.getLogger(__name__)
+
+FILE = "web.token"
+
+BYTES = 32
+"""Of randomness: it cannot be guessed over a network."""
+
+_VALID = re.compile(r"[A-Za-z0-9_-]{32,128}")
+
+
+class AccessToken:
+    """A secret that requests are compared with. It has no text of its own for logs."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+    def __repr__(self) -> str:
+        return "<AccessToken>"
+
+    def equals(self, given: str) -> bool:
+        """Compare in a time that does not depend on the text."""
+        return hmac.compare_digest(self.text.encode(), given.encode(errors="replace"))
+
+    def is_in(self, cookie: str | None, authorization: str | None) -> bool:
+        """True when the cookie or the Authorization header of a request has it."""
+        if cookie is not None and self.equals(cookie):
+            return True
+        scheme, _, given = (authorization or "").partition(" ")
+        return scheme.lower() == "bearer" and self.equals(given.strip())
+
+
+def read_token(folder: Path | None) -> AccessToken | None:
+    """Return the token of a state folder; None where there is none that this user may read."""
+    if folder is None:
+        return None
+    try:
+        text = (folder / FILE).read_text(encoding="ascii").strip()
+    except (OSError, ValueError):
+        return None
+    return AccessToken(text) if _VALID.fullmatch(text) else None
+
+
+def load_token(folder: Path | None) -> AccessToken:
+    """Return the token of a state folder, made and stored where there is none."""
+    found = read_token(folder)
+    if found is not None:
+        return found
+    made = AccessToken(secrets.token_urlsafe(BYTES))
+    if folder is not None:
+        try:
+            _store(folder / FILE, made.text)
+        except OSError as error:
+            logger.warning("%s: %s: the token of the web server ends with the gateway", folder, error.strerror)
+    return made
+
+
+def _store(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with contextlib.suppress(FileNotFoundError):
+        path.unlink()  # one that is not valid, perhaps with other permissions
+    file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    with os.fdopen(file, "w", encoding="ascii") as stream:
+        stream.write(text + "\n")

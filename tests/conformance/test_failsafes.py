@@ -1,0 +1,106 @@
+"""Failsafes of docs/failsafes.md that no other test flies, and the texts about dangerous settings."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fault_scenarios import ACCEPTED, REJECTED, RTL, goto
+from support.mav import Client
+from support.missions import said
+from support.world import LAND, RETURN, World, world
+
+from anafi_mav.arsdk.messages import ardrone3, rth
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState
+from anafi_mav.arsdk.messages.rth import RthAutoTriggerMode
+from anafi_mav.sim.autopilot import power
+
+AT_CONNECTION = {
+    "common.Common.CurrentDateTime",
+    "common.Common.AllStates",
+    "common.Settings.AllSettings",
+    "user_storage.start_monitoring",
+}
+"""Commands of every connection."""
+
+DANGERS = (
+    "Return at low battery is off (ANF_RTH_AUTO)",
+    "Return height low: 12 m < 20 m",
+    "Return delay 0 s: each link loss is a return",
+    "Geofence off: max. 2000 m > radio 100 m",
+)
+
+
+def warned(client: Client) -> list[str]:
+    return [m.text for _, m in client.since(0, "STATUSTEXT") if m.text in DANGERS]
+
+
+async def test_dangerous_settings_are_reported_once_and_not_written() -> None:
+    async with world() as w:
+        greeting = dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3)
+        w.client.send(greeting)
+        await said(w, " firmware ")  # the banner's last line; it has none of them yet
+        assert warned(w.client) == []
+        for setting in (
+            rth.AutoTriggerMode(RthAutoTriggerMode.OFF),
+            rth.MinAltitude(12.0, 5.0, 100.0),
+            rth.Delay(0, 0, 120),
+            ardrone3.MaxDistanceChanged(2000.0, 10.0, 4000.0),
+        ):
+            w.drone.inject(setting)
+        second = await w.connect(254)
+        second.send(greeting)
+        # The banner's last line comes behind them.
+        await second.wait("STATUSTEXT", lambda m: " firmware " in m.text, since=0)
+        assert sorted(warned(second)) == sorted(DANGERS)
+        assert warned(w.client) == []
+        assert {entry.name for entry in w.drone.log if entry.kind == "command"} <= AT_CONNECTION
+
+
+async def afar(w: World) -> None:
+    """Hover 40 m north of the take-off point, at 10 m."""
+    await w.take_off(10.0)
+    assert await goto(w, 40.0, 10.0) == ACCEPTED
+    await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 39.0, 30.0)
+
+
+async def test_low_battery_return_is_announced_shown_and_flown() -> None:
+    async with world(speed=8.0) as w:
+        await afar(w)
+        mark = w.client.mark()
+        firmware = w.drone.firmware
+        firmware.battery.charge = power.CRITICAL + firmware.endurance.needed(w.drone.pose, (0.0, 0.0))
+        await said(w, "Drone returns home", mark)
+        await said(w, "Battery low", mark)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN, since=mark, timeout=20.0)
+        await w.drone.wait_log(lambda e: math.hypot(w.drone.pose.north, w.drone.pose.east) < 2.0, 40.0)
+        assert [entry.name for entry in w.drone.log if entry.name == "rth.return_to_home"] == []
+
+
+async def test_critical_battery_lands_and_refuses_a_goto() -> None:
+    async with world(speed=4.0) as w:
+        await w.take_off(10.0)
+        mark = w.client.mark()
+        w.drone.firmware.battery.charge = float(power.EMPTY)
+        await said(w, "Drone lands", mark)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == LAND, since=mark, timeout=10.0)
+        assert await goto(w, 40.0, 10.0) == REJECTED
+        await w.drone.wait_log(lambda e: w.drone.flying_state is FlyingState.LANDED, 30.0)
+
+
+async def test_gps_loss_in_flight_hovers_and_refuses_goto_and_return() -> None:
+    async with world(speed=4.0) as w:
+        await w.take_off(10.0)
+        assert await goto(w, 200.0, 10.0) == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 2.0, 20.0)
+        mark = w.client.mark()
+        w.drone.faults.gps = False
+        await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.hold, since=mark, timeout=10.0)
+        lost = asyncio.get_running_loop().time()
+        await w.drone.wait_log(
+            lambda e: e.kind == "pose" and math.hypot(e.args["vn"], e.args["ve"]) < 0.3, 10.0, since=lost
+        )
+        assert await goto(w, 150.0, 10.0) == REJECTED
+        assert (await w.client.command(RTL)).result != ACCEPTED
+        assert w.drone.flying_state is FlyingState.HOVERING

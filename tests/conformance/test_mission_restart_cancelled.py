@@ -1,0 +1,103 @@
+"""A mission whose restart is withdrawn by COMMAND_CANCEL: the client's state and the drone's are the same."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from support.flavours import both
+from support.missions import MISSION_MODE, PAUSED, first, on_the_way, put, state, takeoff, way, whole
+from support.world import World, world
+
+from anafi_mav import mav_enums
+from anafi_mav.mavlink import dialect as newer
+from anafi_mav.sim.world.faults import Impairment
+
+SET_CURRENT = mav_enums.MAV_CMD_DO_SET_MISSION_CURRENT
+NOT_IN_MISSION_MODE = 2
+
+LATE = Impairment(delay=0.5)
+"""Of the drone's answers."""
+
+
+def commanded(w: World, name: str) -> list[float]:
+    """When the simulated drone received a command."""
+    return [e.t for e in w.drone.log if e.kind == "command" and e.name.endswith(name)]
+
+
+async def cancelled_restart(w: World, moment: str) -> int:
+    """Fly to a corner, restart at the first way point and cancel that when the drone has received a command.
+
+    Returns a mark behind the acknowledgement.
+    """
+    await on_the_way(w, 2)
+    w.drone.faults.down = LATE
+    mark, seen = w.client.mark(), len(commanded(w, moment))
+    w.client.send_command(SET_CURRENT, 1.0 + first(w), 0.0)
+    await w.drone.wait_log(lambda e: len(commanded(w, moment)) > seen, 20.0)
+    w.client.send(newer.MAVLink_command_cancel_message(1, 1, SET_CURRENT))
+    ack = await w.client.wait(
+        "COMMAND_ACK", lambda m: m.command == SET_CURRENT and m.result != mav_enums.MAV_RESULT_IN_PROGRESS, since=mark
+    )
+    assert ack.result == mav_enums.MAV_RESULT_CANCELLED
+    return w.client.mark()
+
+
+@both
+@pytest.mark.parametrize("moment", ["Mavlink.Pause", "Mavlink.Stop", "Mavlink.Start"])
+async def test_cancelled_mission_restart_leaves_a_paused_mission(flavour: str, moment: str) -> None:
+    """Cancelled while control is acquired, or while the start is on its way and the drone begins it late."""
+    async with world(flavour=flavour, web=True) as w:
+        mark = await cancelled_restart(w, moment)
+        for _ in range(6):  # one a second: longer than reports are late, and than Mission is shown after a mission
+            await w.client.heartbeat(lambda beat: True, since=w.client.mark())
+        states = [whole(m).mission_state for _, m in w.client.since(mark, "MISSION_CURRENT")]
+        assert {*states} <= {PAUSED}
+        assert whole(await state(w, PAUSED)).mission_mode == NOT_IN_MISSION_MODE
+        modes = [m.custom_mode for _, m in w.client.since(mark, "HEARTBEAT") if m.get_srcComponent() == 1]
+        shown = [mode == MISSION_MODE[flavour] for mode in modes]
+        assert not shown[-1]
+        assert shown == sorted(shown, reverse=True), "once another mode is shown, Mission is not shown again"
+        assert [e.args["state"] for e in w.drone.log if e.name == "plan"][-1] != "playing"
+        last = w.drone.pose
+        await w.client.heartbeat(lambda beat: True, since=w.client.mark())
+        here = w.drone.pose
+        assert math.dist((here.north, here.east, here.up), (last.north, last.east, last.up)) < 0.3
+
+
+@both
+async def test_mission_replaced_during_its_restart_is_not_shown_as_flown(flavour: str) -> None:
+    """A client uploads another mission while control is acquired for the old one."""
+    async with world(flavour=flavour, web=True) as w:
+        await on_the_way(w, 2)
+        w.drone.faults.down = LATE
+        mark, seen = w.client.mark(), len(commanded(w, "Mavlink.Pause"))
+        w.client.send_command(SET_CURRENT, 1.0 + first(w), 0.0)
+        await w.drone.wait_log(lambda e: len(commanded(w, "Mavlink.Pause")) > seen, 20.0)
+        await put(w, [takeoff(6.0), way(5.0, 5.0, 6.0)])
+        ack = await w.client.wait(
+            "COMMAND_ACK",
+            lambda m: m.command == SET_CURRENT and m.result != mav_enums.MAV_RESULT_IN_PROGRESS,
+            since=mark,
+            timeout=20.0,
+        )
+        assert ack.result != mav_enums.MAV_RESULT_ACCEPTED
+        for _ in range(4):  # one a second: longer than reports are late, and than Mission is shown after a mission
+            beat = await w.client.heartbeat(lambda beat: True, since=w.client.mark())
+        assert beat.custom_mode != MISSION_MODE[flavour]
+        assert [e.args["state"] for e in w.drone.log if e.name == "plan"][-1] != "playing"
+
+
+@both
+async def test_paused_mission_sends_mission_current_once(flavour: str) -> None:
+    async with world(flavour=flavour, web=True) as w:
+        await on_the_way(w, 2)
+        ack = await w.client.command(mav_enums.MAV_CMD_SET_MESSAGE_INTERVAL, newer.MAVLINK_MSG_ID_MISSION_CURRENT, -1)
+        assert ack.result == mav_enums.MAV_RESULT_ACCEPTED
+        mark = w.client.mark()
+        ack = await w.client.command(mav_enums.MAV_CMD_DO_PAUSE_CONTINUE, 0)
+        assert ack.result == mav_enums.MAV_RESULT_ACCEPTED
+        for _ in range(3):
+            await w.client.heartbeat(lambda beat: True, since=w.client.mark())
+        sent = {bytes(m.get_payload()) for _, m in w.client.since(mark, "MISSION_CURRENT")}
+        assert len(sent) == 1

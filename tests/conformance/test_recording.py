@@ -1,0 +1,78 @@
+"""A recorded flight: what is in its two files, and what a ground station sees of it at a replay."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from pathlib import Path
+
+from pymavlink import mavutil
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.lines import UdpClient
+from support.world import HOLD, LAND, world
+
+from anafi_mav.cli.replay import files_of, read_tlogs, read_traces
+from anafi_mav.config import RecordingConfig
+
+KEY = bytes(range(32))
+
+
+async def flown(folder: Path) -> Path:
+    """Record a short flight; the folder of its session."""
+    async with world(speed=8.0, recording=RecordingConfig(folder=str(folder))) as w:
+        await w.take_off(5.0)
+        w.client.send(dialect.MAVLink_setup_signing_message(1, 1, KEY, 1))
+        assert (await w.client.command(dialect.MAV_CMD_NAV_LAND)).result == dialect.MAV_RESULT_ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode != LAND, timeout=30.0)
+        (line,) = (line for line in w.gateway.lines() if line.startswith("recording "))
+    return Path(line.removeprefix("recording "))
+
+
+async def test_recording_has_both_wires_on_one_clock_and_no_key(tmp_path: Path) -> None:
+    session = await flown(tmp_path)
+    tlogs, traces = files_of(session)
+    assert KEY not in b"".join(path.read_bytes() for path in tlogs)
+    log = mavutil.mavlink_connection(str(tlogs[0]))
+    messages = []
+    while (message := log.recv_match()) is not None:
+        messages.append((log.timestamp, message))
+    kinds = {(message.get_srcSystem(), message.get_type()) for _, message in messages}
+    assert {(1, "HEARTBEAT"), (1, "ATTITUDE"), (1, "COMMAND_ACK"), (255, "COMMAND_LONG")} <= kinds
+    land = next(at for at, m in messages if m.get_type() == "COMMAND_LONG" and m.command == dialect.MAV_CMD_NAV_LAND)
+    trace = list(read_traces(traces))
+    assert {entry.drone for entry in trace} == {"alpha"}
+    landing = next(entry for entry in trace if entry.name == "ardrone3.Piloting.Landing")
+    state = next(
+        entry
+        for entry in trace
+        if entry.name.endswith("FlyingStateChanged") and entry.args["state"] == 4 and entry.t > landing.t
+    )
+    ack = next(at for at, m in messages if m.get_type() == "COMMAND_ACK" and m.command == dialect.MAV_CMD_NAV_LAND)
+    assert land <= landing.t <= state.t
+    assert landing.t <= ack + 1e-5
+    times = [entry.time for entry in read_tlogs(tlogs)]
+    assert times == sorted(times)
+
+
+async def test_replay_shows_a_station_the_vehicle_alone(tmp_path: Path) -> None:
+    session = await flown(tmp_path)
+    station = await UdpClient(255).open("127.0.0.1")
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "anafi_mav", "replay", str(session), "--speed", "20", "--trace"),
+        *("--endpoint", f"udpout://127.0.0.1:{station.port}"),
+        stdout=asyncio.subprocess.PIPE,
+    )
+    try:
+        out, _ = await process.communicate()
+        assert process.returncode == 0
+        await station.heartbeat(lambda beat: beat.custom_mode == LAND, since=0)
+        modes = [m.custom_mode for _, m in station.since(0, "HEARTBEAT")]
+        assert modes.index(HOLD) < modes.index(LAND)
+        assert {m.get_srcSystem() for _, m in station.received} == {1}
+        assert b"alpha command ardrone3.Piloting.Landing {}" in out
+        assert out.decode().splitlines()[-1].endswith("frames played")
+    finally:
+        if process.returncode is None:
+            process.kill()
+            await process.wait()
+        await station.close()

@@ -1,0 +1,88 @@
+"""The status of a gateway with a flying drone: record, page, metrics and command line say the same."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import re
+import sys
+from pathlib import Path
+
+import aiohttp
+import pytest
+from prometheus_client.parser import text_string_to_metric_families
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fault_scenarios import ACCEPTED, DENIED, goto
+from support.statuses import NASTY, STATUS
+from support.world import World, world
+
+from anafi_mav.cli import status as command
+from anafi_mav.errors import ConfigError
+from anafi_mav.status_record import VERSION, GatewayStatus
+
+
+def url(w: World, path: str) -> str:
+    assert w.gateway.web is not None
+    return f"http://127.0.0.1:{w.gateway.web.port}{path}"
+
+
+async def fetched(w: World) -> GatewayStatus:
+    async with aiohttp.ClientSession() as session:
+        return command.decode(await command.fetch(session, command.AskedGateway(url(w, "/"), None)))
+
+
+async def test_status_of_a_flight_has_drone_client_and_refusal() -> None:
+    async with world(speed=4.0) as w:
+        await w.take_off(10.0)
+        assert await goto(w, 20.0, 10.0) == ACCEPTED
+        ack = await w.client.command(dialect.MAV_CMD_DO_CHANGE_SPEED, 1, 900.0)
+        assert ack.result == DENIED
+        assert (await w.client.command(dialect.MAV_CMD_DO_PARACHUTE, 1)).result == dialect.MAV_RESULT_UNSUPPORTED
+        await w.client.wait("ATTITUDE")
+        await asyncio.sleep(5.0)  # two measurements of the rates
+        status = await fetched(w)
+        assert status.version == VERSION
+        (drone,) = status.drones
+        assert (drone.name, drone.connected, drone.mode, drone.flying) == ("alpha", True, "Hold", "IN_AIR")
+        assert drone.serial == w.drone.identity.serial
+        assert drone.height_m is not None
+        assert abs(drone.height_m - w.drone.pose.up) < 0.5
+        assert drone.commands.results["ACCEPTED"] >= 3
+        assert drone.commands.latency.count >= 3
+        parachute, speed = drone.commands.refused[:2]
+        assert (parachute.command, parachute.result) == ("DO_PARACHUTE", "UNSUPPORTED")
+        assert (speed.command, speed.result, speed.sender) == ("DO_CHANGE_SPEED", "DENIED", "255/190")
+        assert speed.reason.startswith("Speed refused: ")
+        (client,) = status.endpoints[0].clients
+        assert client.systems == ("255/190",)
+        assert client.sent_rate > 1000.0
+        assert status.counters.keys() == dict(w.gateway.counters()).keys()
+        async with aiohttp.ClientSession() as session, session.get(url(w, "/metrics")) as answer:
+            assert answer.headers["Content-Type"] == "text/plain; version=0.0.4; charset=utf-8"
+            families = {one.name: one for one in text_string_to_metric_families(await answer.text())}
+        assert families["anafi_mav_drone_in_air"].samples[0].value == 1.0
+
+
+async def test_status_command_finds_the_gateway_by_its_state_folder() -> None:
+    async with world() as w:
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-m", "anafi_mav", "status", "--json"),
+            stdout=asyncio.subprocess.PIPE,
+        )
+        out, _ = await process.communicate()
+        assert process.returncode == 0
+        assert json.loads(out)["drones"][0]["serial"] == w.drone.identity.serial
+
+
+def test_status_command_without_a_gateway_names_the_folder(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=re.escape(str(tmp_path))):
+        command.find(str(tmp_path), None)
+
+
+def test_tables_of_the_status_show_what_was_refused() -> None:
+    drones, clients, refused, peers = command.tables(STATUS)
+    assert [row[2] for row in drones.rows] == ["in air, armed", "not connected"]
+    assert drones.rows[1][-1] == "no answer yet"
+    assert clients.rows[0][3] == "2.5 kB/s"
+    assert refused.rows[0][3:] == ("NAV_TAKEOFF", "DENIED", NASTY)  # the terminal cleans it
+    assert peers.rows == [("tcpin://127.0.0.1:5760", "all places taken", "2")]

@@ -1,0 +1,78 @@
+"""The log of the long-running commands: its file, and its lines as JSON."""
+
+from __future__ import annotations
+
+import json
+import logging
+from pathlib import Path
+
+import pytest
+
+from anafi_mav.cli import log
+from anafi_mav.errors import ConfigError
+from anafi_mav.subject import DRONE
+
+
+def line(formatter: logging.Formatter, text: str, *arguments: object) -> str:
+    return formatter.format(logging.LogRecord("anafi_mav.x", logging.WARNING, "f", 1, text, arguments, None))
+
+
+def test_json_line_names_level_logger_and_drone() -> None:
+    token = DRONE.set("alpha")
+    try:
+        entry = json.loads(line(log.JsonFormatter(), "lost: %s", "no answer"))
+    finally:
+        DRONE.reset(token)
+    assert entry.pop("time").endswith("Z")
+    assert entry == {
+        "level": "WARNING",
+        "logger": "anafi_mav.x",
+        "drone": "alpha",
+        "message": "lost: no answer",
+    }
+
+
+def test_json_line_of_hostile_text_is_ascii_without_controls() -> None:
+    text = line(log.JsonFormatter(), "\x1b[31m\n\x7f\u202e")
+    assert text.isascii()
+    assert text.isprintable()
+    assert json.loads(text)["message"] == "\x1b[31m\n\x7f\u202e"
+
+
+def test_log_file_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(log, "FILE_BYTES", 200)
+    path = tmp_path / "gateway.log"
+    handler = log.BoundedLogFile(path)
+    try:
+        for number in range(300):
+            handler.handle(logging.LogRecord("x", logging.WARNING, "f", 1, "line %d", (number,), None))
+    finally:
+        handler.close()
+    files = sorted(one.name for one in tmp_path.iterdir())
+    assert files == ["gateway.log", *(f"gateway.log.{number}" for number in range(1, log.OLD_FILES + 1))]
+    assert all(one.stat().st_size <= 200 for one in tmp_path.iterdir())
+    assert path.read_text().endswith("line 299\n")
+
+
+def test_repeated_line_is_counted_once_for_all_outputs(tmp_path: Path) -> None:
+    first, second = log.BoundedLogFile(tmp_path / "a"), log.BoundedLogFile(tmp_path / "b")
+    outputs = log.LogOutputs([first, second])
+    try:
+        for number in range(3):
+            outputs.handle(logging.LogRecord("x", logging.WARNING, "f", 1, "%s: line %d", ("alpha", number), None))
+    finally:
+        first.close()
+        second.close()
+    assert (tmp_path / "a").read_text() == (tmp_path / "b").read_text() == "alpha: line 0\n"
+
+
+def test_full_disk_is_reported_once(capsys: pytest.CaptureFixture[str]) -> None:
+    handler = log.BoundedLogFile(Path("/dev/full"))
+    for _ in range(3):
+        handler.handle(logging.LogRecord("x", logging.WARNING, "f", 1, "line", (), None))
+    assert capsys.readouterr().err.count("/dev/full cannot be written: [Errno 28]") == 1
+
+
+def test_log_file_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"^--log-file: expected a file that can be written"):
+        log.set_up(path=tmp_path / "absent" / "gateway.log")

@@ -1,0 +1,351 @@
+"""The table of phases, and which command an event is about: by hand-made sequences, then by random ones."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from anafi_mav.arsdk.messages import ardrone3, common
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState
+from anafi_mav.arsdk.messages.common import MavlinkType, PlayingState
+from anafi_mav.drone.sent_commands import (
+    AUTOMATIC,
+    KEPT,
+    PLAN_MEMORY,
+    STAYS_DOWN,
+    TAKE_OFF_MEMORY,
+    TAKEN_OFF,
+    TRANSITIONS,
+    Event,
+    Phase,
+    SentCommand,
+    SentCommands,
+    Slot,
+)
+
+Q, D, C, E, R, W, A = Phase
+"""QUEUED, DELIVERED, CONFIRMED, ENDED, REFUSED, WITHDRAWN, ABANDONED."""
+
+NEXT = {  # after DELIVERED, EXECUTED, OVER, REFUSED, WITHDRAWN, ABANDONED
+    Q: (D, C, Q, R, W, A),
+    D: (D, C, D, R, W, A),
+    C: (C, C, E, C, W, C),
+    E: (E, E, E, E, E, E),
+    R: (R, R, R, R, R, R),
+    W: (W, W, E, R, W, W),
+    A: (A, C, E, R, W, A),
+}
+
+
+def playing(state: PlayingState, uid: str = "a") -> common.MavlinkFilePlayingStateChanged:
+    return common.MavlinkFilePlayingStateChanged(state, uid, MavlinkType.FLIGHT_PLAN)
+
+
+PLAYING, PAUSED, STOPPED = PlayingState.PLAYING, PlayingState.PAUSED, PlayingState.STOPPED
+ERROR = common.StartingErrorEvent()
+
+
+def flying(state: FlyingState) -> ardrone3.FlyingStateChanged:
+    return ardrone3.FlyingStateChanged(state)
+
+
+def plan(uid: str = "a", before: str = "") -> SentCommand:
+    return SentCommand(Slot.PLAN, uid, common.Stop(), plan_before=before)
+
+
+def launch() -> SentCommand:
+    return SentCommand(Slot.LAUNCH, TAKEN_OFF)
+
+
+@pytest.fixture
+def sent() -> SentCommands:
+    return SentCommands()
+
+
+# -- the table
+
+
+@pytest.mark.parametrize("phase", Phase)
+@pytest.mark.parametrize("event", Event)
+@pytest.mark.parametrize("slot", Slot)
+def test_every_event_in_every_phase_has_its_next_phase(phase: Phase, event: Event, slot: Slot) -> None:
+    one = SentCommand(slot, phase=phase)
+    one.apply(event, 5.0)
+    assert one.phase is NEXT[phase][list(Event).index(event)]
+    closed = one.phase is not phase and one.phase in (W, A)
+    assert one.may_begin(5.0) is (one.awaited or (closed and slot in (Slot.LAUNCH, Slot.LANDING_END, Slot.PLAN)))
+    assert one.awaited is (one.phase in (Q, D))
+
+
+def test_table_lists_every_phase_and_each_is_reached() -> None:
+    assert list(TRANSITIONS) == list(Phase)
+    assert {Q, *(phase for row in TRANSITIONS.values() for phase in row.values())} == {*Phase}
+
+
+# -- take-off
+
+
+def test_withdrawn_queued_take_off_may_begin_for_ten_seconds(sent: SentCommands) -> None:
+    one = launch()
+    sent.place(one, 0.0)
+    one.apply(Event.WITHDRAWN, 2.0)
+    assert sent.may_start_motors(2.0 + TAKE_OFF_MEMORY - 0.1)
+    assert not sent.may_start_motors(2.0 + TAKE_OFF_MEMORY)
+    assert sent.attribute(flying(FlyingState.TAKINGOFF), 3.0) is one
+    assert not sent.is_unwanted(one, 3.0)  # a drone that has lifted off is landed on command only
+
+
+def test_withdrawn_take_off_is_ruled_out_by_a_delivered_landing(sent: SentCommands) -> None:
+    one, other = launch(), plan()
+    for command in (one, other):
+        sent.place(command, 0.0)
+        command.apply(Event.WITHDRAWN, 2.0)
+    sent.rule_out()
+    assert not sent.may_start_motors(2.1)
+    assert sent.attribute(playing(PLAYING), 2.2) is other
+    assert sent.is_unwanted(other, 2.2)  # should it begin all the same, it is stopped
+
+
+def test_delivered_take_off_is_refused_when_motors_stop(sent: SentCommands) -> None:
+    one = launch()
+    sent.place(one, 0.0)
+    one.apply(Event.DELIVERED)
+    for state, phase in (
+        (FlyingState.LANDED, D),  # repeated: the drone stood there before
+        (FlyingState.MOTOR_RAMPING, D),
+        (FlyingState.LANDED, R),
+    ):
+        assert sent.attribute(flying(state), 1.0) is one
+        assert one.phase is phase
+    assert not sent.may_start_motors(1.0)
+
+
+def test_cut_motors_refuse_a_take_off_at_once(sent: SentCommands) -> None:
+    one = launch()
+    sent.place(one, 0.0)
+    sent.attribute(flying(FlyingState.EMERGENCY), 1.0)
+    assert one.phase is R
+
+
+def test_executed_take_off_cannot_begin_after_the_touchdown(sent: SentCommands) -> None:
+    one = launch()
+    sent.place(one, 0.0)
+    one.apply(Event.WITHDRAWN, 0.5)
+    for state in (FlyingState.MOTOR_RAMPING, FlyingState.TAKINGOFF, FlyingState.LANDING):
+        sent.attribute(flying(state), 1.0)
+    assert sent.may_start_motors(1.0)
+    sent.attribute(flying(FlyingState.LANDED), 4.0)
+    assert one.phase is E
+    assert not sent.may_start_motors(4.0)
+
+
+def test_two_take_offs_are_confirmed_by_one_event(sent: SentCommands) -> None:
+    first, second = launch(), launch()
+    assert sent.place(first, 0.0) == sent.place(second, 0.1) == []
+    sent.attribute(flying(FlyingState.TAKINGOFF), 1.0)
+    assert (first.phase, second.phase) == (C, C)
+
+
+def test_take_off_replaces_a_hand_launch_without_stopping_it(sent: SentCommands) -> None:
+    """UserTakeOff(0) would end the take-off that follows it."""
+    hand = SentCommand(Slot.LAUNCH, TAKEN_OFF | {FlyingState.USERTAKEOFF}, ardrone3.UserTakeOff(0), undo_refused=True)
+    sent.place(hand, 0.0)
+    assert sent.place(launch(), 0.1) == [hand]
+    assert hand.phase is A
+    assert not sent.is_unwanted(hand, 0.2)
+
+
+@pytest.mark.parametrize("withdrawn", [False, True])
+def test_take_off_against_landing_is_unwanted_from_touchdown_on(sent: SentCommands, withdrawn: bool) -> None:
+    one = SentCommand(Slot.LANDING_END)
+    sent.place(one, 0.0)
+    if withdrawn:
+        one.apply(Event.WITHDRAWN, 1.0)
+    assert sent.attribute(flying(FlyingState.FLYING), 1.5) is None  # in the air it has done its work
+    sent.attribute(flying(FlyingState.LANDED), 2.0)
+    assert sent.attribute(flying(FlyingState.MOTOR_RAMPING), 2.0 + STAYS_DOWN - 0.1) is one
+    assert sent.is_unwanted(one, 2.0 + STAYS_DOWN - 0.1)
+    assert sent.attribute(flying(FlyingState.MOTOR_RAMPING), 2.0 + STAYS_DOWN) is None
+
+
+@pytest.mark.parametrize("newer", [launch(), plan(), SentCommand(Slot.LANDING_END)], ids=lambda one: one.slot.value)
+def test_newer_start_makes_running_motors_wanted(sent: SentCommands, newer: SentCommand) -> None:
+    one = SentCommand(Slot.LANDING_END)
+    sent.place(one, 0.0)
+    sent.attribute(flying(FlyingState.LANDED), 1.0)
+    sent.place(newer, 2.0)
+    assert sent.attribute(flying(FlyingState.MOTOR_RAMPING), 2.1) is not one
+
+
+# -- flight plans
+
+
+def test_plan_start_goes_through_its_phases(sent: SentCommands) -> None:
+    one = plan()
+    sent.place(one, 0.0)
+    one.apply(Event.DELIVERED)
+    for event, phase in ((PLAYING, C), (PLAYING, C), (PAUSED, E), (PAUSED, E), (STOPPED, E)):
+        assert sent.attribute(playing(event), 1.0) is one
+        assert one.phase is phase
+    assert sent.attribute(playing(PLAYING), 1.0) is None  # resumed by another controller
+
+
+def test_late_playing_of_a_withdrawn_start_is_unwanted(sent: SentCommands) -> None:
+    one = plan()
+    sent.place(one, 0.0)
+    one.apply(Event.WITHDRAWN, 1.0)
+    assert sent.attribute(playing(STOPPED, ""), 1.1) is one  # the answer to the command against it
+    for now in (1.2, 1.2, 1.0 + PLAN_MEMORY - 0.1):
+        assert sent.attribute(playing(PLAYING), now) is one
+        assert sent.is_unwanted(one, now)
+    assert sent.attribute(playing(PLAYING), 1.0 + PLAN_MEMORY) is None
+    assert sent.attribute(playing(PLAYING, "another's"), 1.3) is None
+
+
+def test_late_playing_before_a_newer_start_is_not_undone(sent: SentCommands) -> None:
+    """The Stop against it would end the newer plan; it is behind the older start anyway."""
+    older, newer = plan("a"), plan("b")
+    sent.place(older, 0.0)
+    older.apply(Event.WITHDRAWN, 1.0)
+    sent.place(newer, 1.1)
+    assert sent.attribute(playing(PLAYING, "a"), 1.2) is older
+    assert not sent.is_unwanted(older, 1.2)
+    assert newer.phase is Q
+    assert sent.attribute(playing(PLAYING, "b"), 1.3) is newer
+    assert newer.phase is C
+
+
+def test_playing_of_a_plan_started_twice_confirms_the_newer(sent: SentCommands) -> None:
+    older, newer = plan(), plan()
+    sent.place(older, 0.0)
+    older.apply(Event.WITHDRAWN, 1.0)
+    sent.place(newer, 1.1)
+    assert sent.attribute(playing(PLAYING), 1.2) is newer
+    assert newer.phase is C
+
+
+def test_stopped_of_the_older_plan_leaves_the_newer_playing(sent: SentCommands) -> None:
+    older, newer = plan("a"), plan("b")
+    for one in (older, newer):
+        sent.place(one, 0.0)
+        sent.attribute(playing(PLAYING, one.target), 0.1)
+    assert (older.phase, newer.phase) == (E, C)
+    assert sent.attribute(playing(STOPPED, "a"), 0.2) is older
+    assert newer.phase is C
+    assert sent.is_executed(Slot.PLAN)
+    assert sent.attribute(playing(STOPPED, ""), 0.3) is newer
+    assert not sent.is_executed(Slot.PLAN)
+
+
+def test_stopped_before_a_start_is_answered_says_nothing_of_it(sent: SentCommands) -> None:
+    one = plan()
+    sent.place(one, 0.0)
+    assert sent.attribute(playing(STOPPED), 0.1) is None
+    assert one.phase is Q
+
+
+@pytest.mark.parametrize(("uid", "confirms"), [("renamed", True), ("", True), ("before", False), ("older", False)])
+def test_unknown_plan_name_confirms_the_awaited_start(sent: SentCommands, uid: str, confirms: bool) -> None:
+    older, one = plan("older"), plan("a", before="before")
+    sent.place(older, 0.0)
+    sent.attribute(ERROR, 0.1)
+    sent.place(one, 0.2)
+    assert (sent.attribute(playing(PLAYING, uid), 0.3) is one) is confirms
+    assert one.phase is (C if confirms else Q)
+
+
+def test_plan_of_another_controller_is_of_no_start(sent: SentCommands) -> None:
+    assert sent.attribute(playing(PLAYING), 0.0) is None
+    one = plan()
+    sent.place(one, 0.0)
+    assert sent.attribute(ERROR, 0.1) is one
+    assert one.phase is R
+    assert sent.attribute(playing(PLAYING), 0.2) is None  # of the same name, and refused to this program
+    assert sent.attribute(ERROR, 0.3) is None
+
+
+def test_error_of_a_withdrawn_start_does_not_refuse_the_newer(sent: SentCommands) -> None:
+    older, newer = plan(), plan()
+    sent.place(older, 0.0)
+    older.apply(Event.DELIVERED)
+    older.apply(Event.WITHDRAWN, 1.0)
+    sent.place(newer, 1.1)
+    assert sent.attribute(ERROR, 1.2) is older
+    assert (older.phase, newer.phase) == (R, Q)
+    assert sent.attribute(ERROR, 1.3) is newer
+    assert newer.phase is R
+
+
+@pytest.mark.parametrize(
+    "answer", [None, playing(PLAYING), playing(STOPPED, "")], ids=["undelivered", "begun", "ended"]
+)
+def test_error_is_the_newers_when_the_older_is_answered(
+    sent: SentCommands, answer: common.MavlinkFilePlayingStateChanged | None
+) -> None:
+    older, newer = plan(), plan()
+    sent.place(older, 0.0)
+    if answer is not None:
+        older.apply(Event.DELIVERED)
+    older.apply(Event.WITHDRAWN, 1.0)
+    if answer is not None:
+        sent.attribute(answer, 1.05)
+    sent.place(newer, 1.1)
+    assert sent.attribute(ERROR, 1.2) is newer
+
+
+def test_replaced_start_is_abandoned_and_ends_with_the_newer(sent: SentCommands) -> None:
+    older, newer = plan("a"), plan("b")
+    assert sent.place(older, 0.0) == []
+    assert sent.place(newer, 0.1) == [older]
+    assert older.phase is A
+    assert sent.attribute(playing(PLAYING, "a"), 0.2) is older
+    assert sent.attribute(playing(PLAYING, "b"), 0.3) is newer
+    assert (older.phase, newer.phase) == (E, C)
+
+
+def test_start_unanswered_at_a_lost_link_is_not_undone(sent: SentCommands) -> None:
+    """The session goes on when the drone is heard again; a flight plan goes on without a link."""
+    one = plan()
+    sent.place(one, 0.0)
+    sent.abandon(1.0)
+    assert sent.may_start_motors(1.1)
+    assert sent.attribute(playing(PLAYING), 4.0) is one
+    assert not sent.is_unwanted(one, 4.0)
+    sent.clear()
+    assert sent.attribute(playing(PLAYING), 4.1) is None
+
+
+# -- any order
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_random_events_leave_at_most_one_plan_active(seed: int) -> None:
+    chance, sent, now = random.Random(seed), SentCommands(), 0.0
+    placed: list[SentCommand] = []
+    for _ in range(500):
+        now += chance.choice((0.0, 0.1, 1.0, 6.0))
+        match chance.randrange(6):
+            case 0:
+                target = TAKEN_OFF if (slot := chance.choice([*Slot])) is Slot.LAUNCH else chance.choice("ab")
+                one = SentCommand(slot, target, common.Stop() if slot in AUTOMATIC else None)
+                assert all(not old.awaited for old in sent.place(one, now))
+                placed.append(one)
+            case 1 if placed:
+                chance.choice(placed[-KEPT:]).apply(chance.choice((Event.DELIVERED, Event.WITHDRAWN)), now)
+            case 2:
+                sent.abandon(now)
+            case 3:
+                about = sent.attribute(flying(chance.choice([*FlyingState])), now)
+                assert about is None or about.slot in (Slot.LAUNCH, Slot.LANDING_END)
+            case 4:
+                sent.attribute(ERROR, now)
+            case _:
+                about = sent.attribute(playing(chance.choice([*PlayingState]), chance.choice(("a", "b", "c", ""))), now)
+                assert about is None or about.slot is Slot.PLAN
+                assert about is None or about.phase not in (Q, D)
+        for slot in AUTOMATIC:
+            assert len(sent.awaited(slot)) <= 1
+            assert sum(one.phase is C for one in placed if one.slot is Slot.PLAN) <= 1
+        unwanted = [one for one in placed[-KEPT:] if one.phase is not W and sent.is_unwanted(one, now)]
+        assert unwanted == []
