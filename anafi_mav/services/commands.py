@@ -365,7 +365,8 @@ class CommandHistory:
         ended (`landing_ended_at` is when a client last ended one); a return and a target while no other client has
         replaced it;
         and modes that have ended by themselves (`mode` is the vehicle's). A command that another client has replaced
-        is neither executed against that client nor confirmed: it is answered with CANCELLED.
+        is neither executed against that client nor confirmed: it is answered with CANCELLED. One that was refused had
+        nothing to replace, and keeps its result.
         """
         newest = self._newest.get((client, command.group))
         if newest is None or not newest.command.same_as(command):
@@ -381,7 +382,7 @@ class CommandHistory:
             return None
         if not is_in_window(newest, now):
             return None
-        if newest.superseded:
+        if newest.superseded and newest.succeeded:
             return dialect.MAV_RESULT_CANCELLED
         ended = effect is Effect.LAPSING and mode is not None and mode is not command.mode
         return None if effect is Effect.RETURN or ended or not newest.still_holds else newest.result

@@ -15,9 +15,9 @@ from anafi_mav.services.command.modes_service import ModesService
 from anafi_mav.services.flavours import ARDUPILOT, PX4
 from anafi_mav.services.statustext import TextNumbers
 from anafi_mav.vehicle.base.height import HeightReference, TakeoffRecord
-from anafi_mav.vehicle.base.link_loss import GcsWatch
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.link_loss import GcsWatch
 
 NAN = math.nan
 
@@ -288,6 +288,14 @@ def test_replaced_command_of_another_client_is_not_repeated() -> None:
     assert history.retransmission("a", command(), 1.0) == dialect.MAV_RESULT_CANCELLED
     assert history.retransmission("b", command(), 1.0) == dialect.MAV_RESULT_ACCEPTED
     assert history.retransmission("c", stop, 1.0) is None  # an order to stop is always carried out
+
+
+def test_repeated_refused_command_keeps_its_refusal_though_another_client_commanded() -> None:
+    history = commands.CommandHistory()
+    execution = history.begin("a", command())
+    execution.result, execution.ended = dialect.MAV_RESULT_DENIED, 0.0
+    history.supersede("b")
+    assert history.retransmission("a", command(), 0.5) == dialect.MAV_RESULT_DENIED
 
 
 def test_repeated_return_runs_again_unless_another_client_commanded() -> None:
