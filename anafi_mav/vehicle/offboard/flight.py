@@ -139,7 +139,7 @@ class OffboardFlight(PlainTask):
     @property
     def yaw(self) -> float | None:
         """The heading (rad from north) that is turned to or held; None when none is."""
-        return None if self._stream.steering is None else self._stream.steering.course.yaw
+        return None if self._stream.steering is None else self._stream.steering.heading.yaw
 
     # What programs ask for.
 
@@ -281,7 +281,7 @@ class OffboardFlight(PlainTask):
             self._vehicle.control.lose(texts.NOT_ITS_TAKEOFF)
 
     def _objection(self, sender: Hashable, setpoint: Setpoint) -> OperatorText | None:
-        """Why a setpoint cannot be flown; None when it can, is being flown, or asks a drone that stands to stay."""
+        """Return why a setpoint cannot be flown; None when it can, is, or leaves the drone standing."""
         if isinstance(setpoint, AttitudeSetpoint) or (self._stands and not climbs(setpoint, self._vehicle.height.ato)):
             return None
         if self._vehicle.roll.sign is RollSign.INVERTED and setpoint.needs_loop:
@@ -493,7 +493,7 @@ class OffboardFlight(PlainTask):
             steering = steering.resolve(setpoint, vehicle)
             if setpoint.moves and steering.goal is not None:
                 self._stream = stream.note(steering=steering)
-                return self._moves.go(steering.goal, steering.course.yaw, now, asked=stream.state is not State.SINGLE)
+                return self._moves.go(steering.goal, steering.heading.yaw, now, asked=stream.state is not State.SINGLE)
             steering = self._judge_speed(setpoint, limits, steering)
             steering = steering.close_loop(setpoint, limits, now, located=vehicle.place is not None)
         except Refused as refusal:  # what the drone told when the setpoint arrived is not known any more
@@ -529,7 +529,7 @@ class OffboardFlight(PlainTask):
     # Silence.
 
     def _expired(self) -> None:
-        """End an engagement whose pilot has been silent for too long: the drone hovers, or is disarmed."""
+        """End an engagement whose pilot is silent: the drone hovers, or is disarmed."""
         vehicle, ended = self._vehicle, self._stream
         self._stream = ended.expire(self._clock.monotonic())
         self._watch()

@@ -120,7 +120,7 @@ class OffboardMoves:
         return tasks
 
     def _note(self, wanted: _Wanted, **facts: Any) -> bool:
-        """Note facts of an attempt; False for one that was replaced or stopped, of which there is nothing to say."""
+        """Note facts of an attempt; return False for one that was replaced or stopped."""
         if self._attempt is None or self._attempt.wanted is not wanted:
             return False
         self._attempt = replace(self._attempt, **facts)

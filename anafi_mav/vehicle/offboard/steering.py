@@ -17,7 +17,7 @@ from anafi_mav.vehicle.offboard.goals import Goal, demand, resolve
 from anafi_mav.vehicle.offboard.setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint
 
 
-class Course(NamedTuple):
+class AskedHeading(NamedTuple):
     """A heading as it was asked for, and what it meant when it first arrived (rad from north)."""
 
     body: bool
@@ -25,7 +25,7 @@ class Course(NamedTuple):
     yaw: float | None
 
 
-NO_COURSE = Course(False, None, None)
+NO_HEADING = AskedHeading(False, None, None)
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Steering:
     """Remembers the demands of this engagement."""
     goal: Goal | None = None
     """The position, resolved; None when the setpoint has none."""
-    course: Course = NO_COURSE
+    heading: AskedHeading = NO_HEADING
     sticks: PilotingCommand | None = None
     """The sticks that are held; None while the drone makes a move by itself."""
     warned_of: float = STILL
@@ -53,33 +53,33 @@ class Steering:
             yaw_rate_dps=turn * units.DEG_PER_RAD,
             climb_mps=setpoint.climb * limits.climb_mps,
         )
-        return replace(self, goal=None, course=Course(False, setpoint.yaw, setpoint.yaw), sticks=sticks)
+        return replace(self, goal=None, heading=AskedHeading(False, setpoint.yaw, setpoint.yaw), sticks=sticks)
 
     def resolve(self, setpoint: MotionSetpoint, vehicle: Aircraft) -> Steering:
-        """Return the flight to a setpoint's position and heading, as resolved when they first arrived; no sticks.
+        """Return the flight to a setpoint's position and heading, without sticks.
 
-        Raises `Refused`.
+        Both are as resolved when they first arrived. Raises `Refused`.
         """
-        motion, goal, course = self.controller.motion, self.goal, self.course
+        motion, goal, heading = self.controller.motion, self.goal, self.heading
         if setpoint.position == NOTHING:
             goal = None
         elif goal is None or not goal.is_of(setpoint):
             goal = resolve(setpoint, vehicle, motion)
-        if course[:2] != (setpoint.body, setpoint.yaw):
+        if heading[:2] != (setpoint.body, setpoint.yaw):
             yaw = setpoint.yaw
             if yaw is not None and setpoint.body:
                 if motion.yaw is None:
                     raise Refused(texts.SETPOINT, texts.HEADING_UNKNOWN)
                 yaw = units.wrap_pi(motion.yaw + yaw)
-            course = Course(setpoint.body, setpoint.yaw, yaw)
-        return replace(self, goal=goal, course=course, sticks=None)
+            heading = AskedHeading(setpoint.body, setpoint.yaw, yaw)
+        return replace(self, goal=goal, heading=heading, sticks=None)
 
     def close_loop(self, setpoint: MotionSetpoint, limits: Limits, now: float, *, located: bool) -> Steering:
         """Return the flight by the sticks of the velocity loop.
 
         `located`: GPS locates the drone. Raises `Refused` when the loop lacks a value.
         """
-        wanted = demand(setpoint, self.goal, self.course.yaw, located=located)
+        wanted = demand(setpoint, self.goal, self.heading.yaw, located=located)
         sticks = self.controller.sticks(wanted, limits, now)
         if sticks is None:
             raise Refused(texts.SETPOINT, texts.MOTION_UNKNOWN)

@@ -140,7 +140,7 @@ class Received:
 
 @dataclass(frozen=True)
 class Engagement:
-    """Flight by the setpoints of one client, or its wish to take off; replaced and ended as a whole."""
+    """Flight by the setpoints of one client, or its wish to take off; ends as a whole."""
 
     pilot: Hashable
     state: State = State.IDLE
