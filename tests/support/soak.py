@@ -48,8 +48,8 @@ SILENCE, GUIDED_TIMEOUT, TARGET_SILENCE = 0.5, 1.5, 2.6
 WATCH_EVERY = 0.1
 """s between two looks at what flies."""
 
-SLACK = 0.1
-"""s of the simulator's and the gateway's own timers."""
+SLACK = 0.2
+"""s of the simulator's and the gateway's own timers, and of a host that is slow for a moment."""
 
 FINAL_WITHIN = 45.0
 """s for the final acknowledgement of every command, after the last step."""
@@ -67,6 +67,9 @@ STANDS_WITHIN = 20.0
 """s after a Hold within which the drone stands still."""
 
 LANDS_WITHIN = 20.0
+
+SAME_HEIGHT = 0.1
+"""m between a position's height and that of its moveTo. A command to the same place has another height."""
 
 RESEND = 3.6
 """s after a final acknowledgement within which an equal command is a retransmission."""
@@ -270,8 +273,8 @@ class Stream:
     client: int | None
     """None: the pilot at the Skycontroller."""
     ended: float = math.inf
-    place: tuple[float, float] | None = None
-    """Of a stream of positions."""
+    place: tuple[float, float, float] | None = None
+    """Of a stream of positions: deg, deg, m above take-off."""
 
 
 @dataclass
@@ -324,7 +327,7 @@ class Flight:
         seconds: float,
         every: float = EVERY,
         lasts: float = SILENCE,
-        place: tuple[float, float] | None = None,
+        place: tuple[float, float, float] | None = None,
     ) -> None:
         entry = Stream(now(), lasts, index, place=place)
         self.streams.append(entry)
@@ -410,7 +413,7 @@ class Flight:
                 self.stream(n, earth(POSITION_ONLY, 6, first, second, height), 0.0)
             case "positions":
                 message = earth(POSITION_ONLY, 6, first, second, height)
-                self.stream(n, message, 0.5 + third, place=(message.lat_int / 1e7, message.lon_int / 1e7))
+                self.stream(n, message, 0.5 + third, place=(message.lat_int / 1e7, message.lon_int / 1e7, height))
                 self.mode(n, "offboard")
             case "attitude":
                 self.stream(n, attitude(first / 300.0, 0.5), third)
@@ -788,10 +791,11 @@ def _judge_moves(flight: Flight) -> None:
             flight.wrong.append(f"a move of a stream is flown {over - stream.ended:.2f} s after its end")
 
 
-def _flies_to(entry: Any, place: tuple[float, float]) -> bool:
+def _flies_to(entry: Any, place: tuple[float, float, float]) -> bool:
     if not entry.name.lower().replace("_", "").endswith("moveto") or entry.name.endswith("CancelMoveTo"):
         return False
-    return math.dist((entry.args["latitude"], entry.args["longitude"]), place) < 1e-6
+    away = math.dist((entry.args["latitude"], entry.args["longitude"]), place[:2])
+    return away < 1e-6 and abs(entry.args["altitude"] - place[2]) < SAME_HEIGHT
 
 
 def target(place: tuple[float, float]) -> Any:
