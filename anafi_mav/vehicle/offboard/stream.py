@@ -197,7 +197,7 @@ class OffboardStream:
         return self.engagement.climbs_since if self.engagement is not None and self.state in COUNTS else None
 
     def stick_age(self, now: float) -> float:
-        """Return the s since the pilot's newest setpoint; 0 for longer when it lasts longer than `SILENCE`.
+        """Return the s since the pilot's newest setpoint; less when it lasts longer than `SILENCE`.
 
         Sticks expire `SILENCE` after an age of 0.
         """
