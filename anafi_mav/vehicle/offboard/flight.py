@@ -110,7 +110,13 @@ class OffboardFlight(PlainTask):
         setpoint = self._stream.setpoint
         needs_roll = isinstance(setpoint, MotionSetpoint) and setpoint.needs_loop
         needs = (_GROUND if self._stands else _AIR) | (Needs.ROLL_SIGN if needs_roll else Needs.NONE)
-        return TaskRules(texts.OFFBOARD, needs=needs)
+        return TaskRules(
+            texts.OFFBOARD,
+            needs=needs,
+            ends_landing=Extent.COMMANDED,
+            ends_return=Extent.COMMANDED,
+            follows=True,
+        )
 
     @property
     def mode(self) -> FlightMode | None:
