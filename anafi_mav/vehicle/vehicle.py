@@ -712,7 +712,7 @@ class Vehicle(Aircraft):
         self.intended = None
         self._last_flying = None
         self._located_at, self._location_every = -math.inf, 0.0
-        for task in (self.offboard, self.manual, self.follow):
+        for task in (self.offboard, self.manual):
             task.link_down()
 
     @property
