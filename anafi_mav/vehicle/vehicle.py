@@ -179,8 +179,6 @@ class Vehicle(Aircraft):
         self.control.policy = first_refusal(self.pilot_switch.refusal)
         self.controller_inputs = ControllerInputs(drone.controller)
         self.follow = FollowFlight(self, lambda: self.offboard.motion, clock)
-        self.plan_ids: dict[int, int] = {}
-        """Opaque ids of the plans that are in force, by MAV_MISSION_TYPE."""
 
     # What the vehicle is.
 
