@@ -28,6 +28,7 @@ KIT = {
     "units",
     "geo",
     "clock",
+    "disk_writer",
     "documents",
     "endpoint_options",
     "models",
