@@ -107,6 +107,11 @@ class ManualFlight(PlainTask):
         self._said = -math.inf
         self._silence = Alarm(self._expired)
 
+    @property
+    def holder(self) -> Hashable:
+        """The client that holds deflected sticks; None: no client does."""
+        return self._pilot if self.state is State.HELD else None
+
     def receive(self, sender: Hashable, sticks: Sticks, *, overrides: bool = False) -> OperatorText | None:
         """Take a client's stick positions; return why they do not fly the drone, or None.
 

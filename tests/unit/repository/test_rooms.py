@@ -71,7 +71,7 @@ CORES = [
     *("vehicle/circle.py", "vehicle/follow.py", "vehicle/hold_rule.py", "vehicle/initiator.py"),
     *("vehicle/failsafe_settings.py", "vehicle/joystick_override.py", "web/h264_offer.py", "web/metrics.py"),
     *("recording/tlog.py", "recording/trace.py", "services/command/command_log.py"),
-    "vehicle/flight_policy.py",
+    *("vehicle/flight_policy.py", "vehicle/operator_control.py", "services/command/operator_need.py"),
     *("services/capabilities.py", "services/checksum.py", "services/commands.py", "services/component_metadata.py"),
     *("services/camera/camera_messages.py", "services/camera/photo_log.py", "services/camera/pose_track.py"),
     "services/camera/shot_tracker.py",
