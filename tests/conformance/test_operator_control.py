@@ -16,7 +16,7 @@ from support.flavours import both
 from support.gimbal import LEVEL, NAN, PITCHYAW, looks
 from support.mav import Client
 from support.params import write
-from support.setpoints import VELOCITY_ONLY, engage, local, motion, said, streaming, texts
+from support.setpoints import COPTER_GUIDED, VELOCITY_ONLY, engage, local, motion, said, streaming, texts
 from support.world import HOLD, OPTIONS_PORT, World, world
 
 from anafi_mav.mavlink import dialect as own
@@ -92,6 +92,16 @@ async def shown(client: Client, mark: int = 0) -> tuple[int, int, list[int]]:
     message = await client.wait("CONTROL_STATUS", since=mark or client.mark(), timeout=3.0)
     assert (message.get_srcSystem(), message.get_srcComponent()) == (1, 1)
     return message.flags, message.gcs_main, [system for system in message.gcs_secondary if system]
+
+
+async def fast(w: World, since: float) -> None:
+    """The drone itself flies north after a moment."""
+    await w.drone.wait_log(lambda entry: entry.kind == "pose" and entry.args["vn"] > 1.0, 20.0, since=since)
+
+
+async def slow(w: World, since: float) -> None:
+    """The drone itself has stopped after a moment at which it flew."""
+    await w.drone.wait_log(lambda entry: entry.kind == "pose" and abs(entry.args["vn"]) < 0.2, 20.0, since=since)
 
 
 async def result(client: Client, command: int, *params: float, **place: Any) -> int:
@@ -328,19 +338,23 @@ async def test_takeover_ends_the_setpoints_of_the_operator_before(flavour: str) 
         teacher, student = await stations(w, OPTIONS_PORT, OPTIONS_PORT)
         await w.take_off(8.0)
         assert await sent(teacher, control_request(teacher, takeover=1)) == ACCEPTED
+        began = now()
         async with streaming(teacher, NORTH):
             await engage(teacher, flavour)
-            await w.drone.wait_log(lambda entry: entry.kind == "pose" and entry.args["vn"] > 1.0, 20.0)
+            await fast(w, began)
             mark, began = teacher.mark(), now()
             assert await sent(student, control_request(student)) == ACCEPTED
             await said(teacher, "Offboard ended: operator is system 254", mark)
             await said(teacher, "Setpoint refused: operator is system 254", mark)
-            await w.drone.wait_log(lambda entry: entry.kind == "pose" and abs(entry.args["vn"]) < 0.2, 20.0)
+            await slow(w, began)
         after = [entry for entry in motion(w, began) if entry.t > began + 0.2]
         assert after == []
+        began = now()
+        if flavour == "ardupilot":
+            assert await result(student, SET_MODE, 1, COPTER_GUIDED) == ACCEPTED
         async with streaming(student, NORTH):
             await engage(student, flavour)
-            await w.drone.wait_log(lambda entry: entry.kind == "pose" and entry.args["vn"] > 1.0, 20.0)
+            await fast(w, began)
 
 
 async def test_takeover_centres_the_sticks_of_the_operator_before() -> None:
@@ -349,11 +363,13 @@ async def test_takeover_centres_the_sticks_of_the_operator_before() -> None:
         await w.take_off(8.0)
         assert await result(teacher, SET_MODE, 1, 3, 0) == ACCEPTED
         assert await sent(teacher, control_request(teacher, takeover=1)) == ACCEPTED
+        began = now()
         async with streaming(teacher, STICK, 0.1):
-            await w.drone.wait_log(lambda entry: entry.kind == "pose" and entry.args["vn"] > 1.0, 20.0)
+            await fast(w, began)
+            began = now()
             assert await sent(student, control_request(student)) == ACCEPTED
             await said(teacher, "Sticks ignored: operator is system 254")
-            await w.drone.wait_log(lambda entry: entry.kind == "pose" and abs(entry.args["vn"]) < 0.2, 20.0)
+            await slow(w, began)
         assert "Sticks silent: hovering" not in texts(teacher)  # they were centred before they were missed
 
 
@@ -413,9 +429,10 @@ async def test_sticks_of_the_skycontroller_are_above_the_operator() -> None:
         (teacher,) = await stations(w, OPTIONS_PORT, ids=(TEACHER,))
         await w.take_off(8.0)
         assert await sent(teacher, control_request(teacher)) == ACCEPTED
+        began = now()
         async with streaming(teacher, NORTH):
             await engage(teacher, "px4")
-            await w.drone.wait_log(lambda entry: entry.kind == "pose" and entry.args["vn"] > 1.0, 20.0)
+            await fast(w, began)
             mark = teacher.mark()
             assert w.drone.skycontroller is not None
             w.drone.skycontroller.stick(PITCH_STICK, 40)
