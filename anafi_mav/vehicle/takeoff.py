@@ -9,13 +9,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Callable, Coroutine, Hashable
+from dataclasses import replace
 from typing import Any
 
 from anafi_mav import texts
 from anafi_mav.clock import Alarm
 from anafi_mav.drone.events import AltitudeChanged, FlyingState, FlyingStateChanged
 from anafi_mav.errors import AnafiMavError
-from anafi_mav.texts import Subject
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import check_height
 from anafi_mav.vehicle.base.control import Control
@@ -24,7 +24,7 @@ from anafi_mav.vehicle.base.flying import AIRBORNE
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, Rejected, Unfinished, not_ready, reason_of
 from anafi_mav.vehicle.base.requester import By
-from anafi_mav.vehicle.base.right import Right
+from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.takeoff_machine import Event, RunningTakeoff, State, TakeoffSituation, WaitingTakeoff, step
 
@@ -63,8 +63,8 @@ class _Waiting(PlainTask):
 
     mode = None
 
-    def __init__(self, what: Subject, control: Control) -> None:
-        self.rules = TaskRules(what, keeps_below=True)
+    def __init__(self, rules: TaskRules, control: Control) -> None:
+        self.rules = replace(rules, keeps_below=True)
         self._control = control
         self._task = asyncio.current_task()
 
@@ -81,7 +81,7 @@ class _Waiting(PlainTask):
 class Takeoff(PlainTask):
     """The way of one vehicle from standing disarmed to hovering at a height."""
 
-    rules = TaskRules(texts.TAKEOFF, keeps_below=True)
+    rules = TaskRules(texts.TAKEOFF, keeps_below=True, ends_landing=Extent.ALL)
     mode = None
     """The drone reports that it takes off."""
 
@@ -223,18 +223,18 @@ class Takeoff(PlainTask):
         await self._land(by)
         self._set_disarmed()
 
-    async def over(self, what: Subject) -> None:
+    async def over(self, rules: TaskRules) -> None:
         """Wait until an accepted take-off has reached its height.
 
         Returns at once when the drone does not rise. When a Hold has ended the climb, the drone still rises to its
         own height: the wait is then for its first hover. (MAVSDK's goto_location sends Hold first.) Of several
-        commands that wait the newest stays, the others are cancelled. Raises `Unfinished` when the take-off fails, or
-        lasts for longer than `TAKEOFF_WAIT`.
+        commands that wait the newest stays, the others are cancelled. `rules` are those of the flight task that waits.
+        Raises `Unfinished` when the take-off fails, or lasts for longer than `TAKEOFF_WAIT`.
         """
         if not self.rises:
             return
-        control = self._vehicle.control
-        waiting = _Waiting(what, control)
+        control, what = self._vehicle.control, rules.what
+        waiting = _Waiting(rules, control)
         control.succeed(waiting)
         end = asyncio.get_running_loop().create_task(self._until_risen())
         try:
