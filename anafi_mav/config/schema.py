@@ -346,7 +346,7 @@ class WarningsConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
 class VideoConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The gateway's video server (RTSP), which passes on the live video of every drone.
 
-    It has no password.
+    Viewers on other computers need a token as password (docs/video.md).
     """
 
     host: Annotated[

@@ -162,7 +162,7 @@ class SessionFolder:
             self.counters["written_bytes"] += len(data)
 
     def _make_room(self, size: int) -> None:
-        """Delete the oldest parts, so that a new part may become full: of this session, then of others."""
+        """Delete the oldest parts of this session, then of others: a new part may become full."""
         held = {Path(file.name) for file, _ in self._parts.values()}
         needed = max(self._part_bytes, size) * (1 + len(held))
         sizes = {part: part.stat().st_size for part in parts_of(self._folder)}
