@@ -731,7 +731,7 @@ def states() -> str:
     from anafi_mav.services.ftp import ftp
     from anafi_mav.services.plan import plan_transfer
     from anafi_mav.sim.autopilot import machine
-    from anafi_mav.vehicle import flight_policy, follow, manual_flight
+    from anafi_mav.vehicle import flight_policy, follow, manual_flight, takeoff_machine
     from anafi_mav.vehicle.base import control_machine
     from anafi_mav.vehicle.fence import fence_watch
     from anafi_mav.vehicle.mission import machine as mission_machine
@@ -740,6 +740,7 @@ def states() -> str:
     tables: list[tuple[str, Any]] = [
         ("Transfer of a mission, a fence or rally points", plan_transfer),
         ("Control: the active flight task", control_machine),
+        ("Arming and take-off", takeoff_machine),
         ("The flight of a mission", mission_machine),
         ("The fence: zones, floor and ceiling each", fence_watch),
         ("Setpoints of a program", stream),

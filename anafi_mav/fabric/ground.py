@@ -1,4 +1,4 @@
-"""Leads the peers of MAVLink endpoints to the systems on the fabric: a station for each peer."""
+"""Leads the peers of MAVLink endpoints to systems on the fabric: each is a station."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ def session_text(session: int) -> str:
 
 
 def station_id(session: int, number: int) -> str:
-    """Return the id of a station: the session of its ground process and the number of the peer there."""
+    """Return the id of a station: of the session of its ground process and its number there."""
     return f"{session_text(session)}-{number}"
 
 

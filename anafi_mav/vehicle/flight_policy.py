@@ -68,10 +68,9 @@ BY_NUMBER: dict[int, State] = {number: state for state, number in NUMBERS.items(
 def refusal_of(state: State, request: Request) -> Refused | None:
     """Return the refusal of a request behind a Skycontroller; None: it is permitted.
 
-    The fence and the loss of stations only stop, land and return; whether they act is decided elsewhere. A changed
-    setting never moves an aircraft that the pilot has.
+    A changed setting never moves an aircraft that the pilot has.
     """
-    is_of_program = request.by not in (Source.FENCE, Source.LOST_LINK, Source.SWITCH)
+    is_of_program = not isinstance(request.by, Source) or request.by.is_program
     if state is State.PILOT and is_of_program and request.rules.is_flight:
         return Refused(request.rules.what, texts.PILOT_SWITCH)
     return None

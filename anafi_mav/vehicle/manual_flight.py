@@ -81,7 +81,14 @@ class Sticks:
 class ManualFlight(PlainTask):
     """Flies one vehicle by the sticks of ground stations: the hovering mode Position."""
 
-    rules = TaskRules(texts.Subject(FlightMode.POSITION.value), wait=STOP_WAIT, is_hover=True, is_flight=False)
+    rules = TaskRules(
+        texts.Subject(FlightMode.POSITION.value),
+        wait=STOP_WAIT,
+        is_hover=True,
+        ends_landing=Extent.ALL,
+        ends_return=Extent.ALL,
+        is_flight=False,
+    )
     mode = FlightMode.POSITION
 
     def __init__(

@@ -284,15 +284,14 @@ class Vehicle(Aircraft):
             raise Refused(texts.RETURN, texts.ON_GROUND)
         if self.return_end.shown:
             return  # it waits above home or lands there, and would climb and fly home once more
-        commanded = replace(by, extent=Extent.COMMANDED) if isinstance(by, Right) else None
         if lands := self.landing:
-            self._require_endable(texts.RETURN, commanded)
+            self._require_endable(self.return_end, by)
             if self.drone.home.state.rth == RthState.UNAVAILABLE:  # the landing would be ended for nothing
                 raise Refused(texts.RETURN, texts.RETURN_UNAVAILABLE)
         async with self.control.acquire(self.return_end, by=by):
             if (lands or self.landing) and await self.drone.piloting.settle_landing():
-                self._require_endable(texts.RETURN, commanded)
-                await self._end_landing(texts.RETURN, commanded)
+                self._require_endable(self.return_end, by)
+                await self._end_landing(by)
             self._initiators.return_commanded(self._clock.monotonic())
             attempt = self.return_end.command()
             try:
@@ -308,18 +307,15 @@ class Vehicle(Aircraft):
         `chosen`: a client has chosen the mode by name or number. `pause`: setpoints of every client are ignored from
         now on; what flew is what DO_PAUSE_CONTINUE goes on with.
         """
-        what, right = texts.Subject(mode.value), right_of(by)
-        self._require_endable(what, right)
+        hover = Hover(mode, client_of(by) if chosen else None, self._paused_task if pause else None)
+        task = self.manual if mode is FlightMode.POSITION else hover
+        self._require_endable(task, by)
         own = self.returning_by_itself
         rising = self.drone.piloting.about_to_fly
         pauses = pause or (self.control.paused and mode is self.mode)
-        resumes = self._paused_task if pause else None
-        hover = Hover(mode, client_of(by) if chosen else None, resumes)
-        async with self.control.acquire(
-            self.manual if mode is FlightMode.POSITION else hover, by=by, pauses=pauses
-        ) as grant:
+        async with self.control.acquire(task, by=by, pauses=pauses) as grant:
             if not self.on_ground or rising:
-                await self._stop(what, right, own=own)
+                await self._stop(task, by, own=own)
             grant.begin(pauses=pauses and (rising or not self.on_ground))
         if rising:
             self.text(Severity.WARNING, texts.MODE_MAY_RISE.fill(mode=mode.value))
@@ -344,9 +340,9 @@ class Vehicle(Aircraft):
         if may_rise or self.flying_state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF):
             await self.takeoff.abort(by)
             return
-        async with control.acquire(Hover(), by=by):
+        async with control.acquire(hold := Hover(), by=by):
             if not self.on_ground and not self.descends:
-                await self._stop(texts.Subject(FlightMode.HOLD.value), None)
+                await self._stop(hold, by)
 
     @property
     def _paused_task(self) -> FlightTask | None:
@@ -368,22 +364,21 @@ class Vehicle(Aircraft):
         if not self.landing or self.on_ground:
             await self.takeoff.take_off(ato, by)
             return
-        self._require_endable(texts.TAKEOFF, by)
+        self._require_endable(self.takeoff, by)
         async with self.control.acquire(Hover(), by=by):
             if await self.drone.piloting.settle_landing():
-                await self._end_landing(texts.TAKEOFF, by, take_off=True)
+                await self._end_landing(by, take_off=True)
             if self.on_ground:
                 raise Refused(texts.LANDING, texts.ALREADY_LANDED, form=texts.NOT_ABORTED)
 
     async def set_mode(self, mode: FlightMode, by: Right) -> None:
         """Do what this mode means, for the client that chose it: Offboard flies its setpoints."""
         self.intended = mode
-        commanded = replace(by, extent=Extent.COMMANDED)
         match mode:
             case FlightMode.HOLD | FlightMode.POSITION:
                 await self.hold(mode, by)
             case FlightMode.GUIDED:
-                await self.hold(mode, commanded, chosen=True)
+                await self.hold(mode, by, chosen=True)
             case FlightMode.LAND:
                 await self.land(by)
             case FlightMode.RETURN:
@@ -394,12 +389,12 @@ class Vehicle(Aircraft):
                 if self.descends and not self.offboard.streamed_for(by.client):
                     raise Refused(texts.OFFBOARD, texts.NO_SETPOINTS)
                 self.control.require_allowed(self.offboard, by)
-                await self._free(texts.OFFBOARD, commanded)
+                await self._free(self.offboard, by)
                 await self.offboard.engage(by)
             case FlightMode.MISSION:
                 if self.mission.there and not self.mission.flying:
                     self.control.require_allowed(self.mission, by)
-                    await self._free(texts.MISSION, commanded)
+                    await self._free(self.mission, by)
                 await self.mission.engage(by)
             case FlightMode.TERMINATED:
                 await self.terminate(by)
@@ -436,26 +431,29 @@ class Vehicle(Aircraft):
         forced = alerts.forced_landing not in (None, ForcedLandingReason.NONE) and not alerts.forced_landing_delay_s
         return self.flying_state == FlyingState.EMERGENCY_LANDING or (forced and self.flying_state in LANDING)
 
-    def _require_endable(self, what: OperatorText, by: Right | None) -> None:
-        """Raise `Refused` when the drone lands or returns, and `by` may not end that."""
-        all_of_them = by is not None and by.extent is Extent.ALL
-        if self.landing:
+    def _require_endable(self, task: FlightTask, by: By) -> None:
+        """Raise `Refused` when the drone lands or returns, and the task or `by` may not end that."""
+        what, right = task.rules.what, right_of(by)
+        lands = self.landing
+        ends = task.rules.ends_landing if lands else task.rules.ends_return
+        extent = None if right is None else right.covered(ends)
+        if lands:
             initiator = self._initiators.landing or Initiator.CLIENT
             if self._forced_landing:
                 raise Refused(what, texts.FORCED)
             if initiator is Initiator.PILOT:
                 raise Refused(what, texts.PILOT_LANDS)
-            if by is None or (initiator is Initiator.DRONE and not all_of_them):
+            if extent is None or (initiator is Initiator.DRONE and extent is not Extent.ALL):
                 raise Refused(what, texts.LANDS)
         elif self.returning:
             initiator = self._initiators.returning or Initiator.CLIENT
             if self.returning_by_itself:
-                self._require_own_endable(what, by if all_of_them else None)
+                self._require_own_endable(what, right if extent is Extent.ALL else None)
             elif initiator is Initiator.PILOT:
                 raise Refused(what, texts.PILOT_RETURNS)
-            elif by is None:
+            elif extent is None:
                 raise Refused(what, texts.RETURNS)
-        elif by is None and self.control.next is self.return_end:
+        elif extent is None and self.control.next is self.return_end:
             raise Refused(what, texts.RETURNS)
 
     def _require_own_endable(self, what: OperatorText, by: Right | None) -> None:
@@ -466,41 +464,41 @@ class Vehicle(Aircraft):
         if not by.counted:
             raise Refused(what, NOT_COUNTED)
 
-    async def _free(self, what: OperatorText, by: Right) -> None:
-        """End a landing or return that `by` may end; returns when the drone hovers.
+    async def _free(self, task: FlightTask, by: Right) -> None:
+        """End a landing or return that the task and `by` may end; returns when the drone hovers.
 
         Returns at once when the drone neither lands nor returns.
         """
         if self.descends:
-            self._require_endable(what, by)
+            self._require_endable(task, by)
             async with self.control.acquire(Hover(), by=by):
-                await self._stop(what, by)
+                await self._stop(task, by)
 
-    async def _stop(self, what: OperatorText, by: Right | None, *, own: bool = False) -> None:
-        """Hover, and end the landing or return that `by` may end.
+    async def _stop(self, task: FlightTask, by: By, *, own: bool = False) -> None:
+        """Hover, and end the landing or return that the task and `by` may end.
 
         `own`: the drone returned by itself when the command arrived. A return that it begins afterwards goes on.
         """
-        piloting, home = self.drone.piloting, self.drone.home
+        piloting, home, right = self.drone.piloting, self.drone.home, right_of(by)
         if self.landing:  # it may have begun during the wait for what flew
-            self._require_endable(what, by)
-        await self._end_landing(what, by)
-        announced = None if by is None else self._announced_for(by)
-        if own and by is not None and self.returning_by_itself:
+            self._require_endable(task, by)
+        await self._end_landing(by)
+        announced = None if right is None else self._announced_for(task, right)
+        if own and right is not None and self.returning_by_itself:
             reason = home.state.reason
             await piloting.cancel_return_home(even_its_own=True)
-            self._return_aborted(by, reason)
+            self._return_aborted(right, reason)
         await piloting.stop()
         # One asked for through another controller, or before the link was lost. Raises when it is the drone's own.
         await piloting.cancel_return_home()
         if await piloting.settle_landing() or self.landing:  # one that began meanwhile
-            self._require_endable(what, by)
-            await self._end_landing(what, by)
+            self._require_endable(task, by)
+            await self._end_landing(by)
             await piloting.stop()
-        if announced is not None and by is not None:
-            await self._answer_announced(announced, by)
+        if announced is not None and right is not None:
+            await self._answer_announced(announced, right)
 
-    def _announced_for(self, by: Right) -> bool | None:
+    def _announced_for(self, task: FlightTask, by: Right) -> bool | None:
         """A return is announced and this Hold counts.
 
         True: it cancels it, False: it is the first; None otherwise.
@@ -510,7 +508,7 @@ class Vehicle(Aircraft):
         if not cancellable:
             self.holds.withdraw()
             return None
-        if self.returning or by.extent is not Extent.ALL or not by.counted:
+        if self.returning or by.covered(task.rules.ends_return) is not Extent.ALL or not by.counted:
             return None
         return self.holds.answers(by.client, by.at)
 
@@ -538,7 +536,7 @@ class Vehicle(Aircraft):
         self.aborted_return = AbortedReturn(by.system, reason)
         self.aborted_return.report(self, self._clock.monotonic())
 
-    async def _end_landing(self, what: OperatorText, by: Right | None, *, take_off: bool = False) -> None:
+    async def _end_landing(self, by: By, *, take_off: bool = False) -> None:
         """End the landing that the drone flies; at once when it flies none."""
         if self.flying_state not in LANDING:
             return
@@ -547,8 +545,8 @@ class Vehicle(Aircraft):
         except CommandRejected as error:
             raise Refused(texts.LANDING, texts.from_below(error.reason), form=texts.NOT_ABORTED) from None
         self.landing_ended_at = self._clock.monotonic()
-        if by is not None:
-            self.text(Severity.NOTICE, texts.LANDING_ABORTED.fill(system=by.system))
+        if (right := right_of(by)) is not None:
+            self.text(Severity.NOTICE, texts.LANDING_ABORTED.fill(system=right.system))
 
     # What the drone reports.
 
@@ -735,7 +733,7 @@ class Vehicle(Aircraft):
             if not self.landing:
                 self.control.release(self.return_end)
             return
-        if self.drone.controller.pilot_has_source:
+        if self.control.leaves_to_pilot(Source.GATEWAY):
             if self.drone.piloting.about_to_fly:
                 await self.drone.piloting.land()
             return

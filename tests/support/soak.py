@@ -48,8 +48,8 @@ SILENCE, GUIDED_TIMEOUT, TARGET_SILENCE = 0.5, 1.5, 2.6
 WATCH_EVERY = 0.1
 """s between two looks at what flies."""
 
-SLACK = 0.1
-"""s of the simulator's and the gateway's own timers."""
+SLACK = 0.2
+"""s of the simulator's and the gateway's own timers, and of a host that is slow for a moment."""
 
 FINAL_WITHIN = 45.0
 """s for the final acknowledgement of every command, after the last step."""
@@ -67,6 +67,9 @@ STANDS_WITHIN = 20.0
 """s after a Hold within which the drone stands still."""
 
 LANDS_WITHIN = 20.0
+
+SAME_HEIGHT = 0.1
+"""m between a position's height and that of its moveTo. A command to the same place has another height."""
 
 RESEND = 3.6
 """s after a final acknowledgement within which an equal command is a retransmission."""
@@ -267,9 +270,11 @@ class Stream:
 
     begun: float
     lasts: float
+    client: int | None
+    """None: the pilot at the Skycontroller."""
     ended: float = math.inf
-    place: tuple[float, float] | None = None
-    """Of a stream of positions."""
+    place: tuple[float, float, float] | None = None
+    """Of a stream of positions: deg, deg, m above take-off."""
 
 
 @dataclass
@@ -322,9 +327,9 @@ class Flight:
         seconds: float,
         every: float = EVERY,
         lasts: float = SILENCE,
-        place: tuple[float, float] | None = None,
+        place: tuple[float, float, float] | None = None,
     ) -> None:
-        entry = Stream(now(), lasts, place=place)
+        entry = Stream(now(), lasts, index, place=place)
         self.streams.append(entry)
 
         async def send() -> None:
@@ -344,7 +349,7 @@ class Flight:
         if controller is None:
             return
         controller.stick(axis, percent)
-        self.streams.append(Stream(now(), SILENCE, now() + seconds))
+        self.streams.append(Stream(now(), SILENCE, None, now() + seconds))
         asyncio.get_running_loop().call_later(seconds, controller.stick, axis, 0)
 
     @asynccontextmanager
@@ -408,7 +413,7 @@ class Flight:
                 self.stream(n, earth(POSITION_ONLY, 6, first, second, height), 0.0)
             case "positions":
                 message = earth(POSITION_ONLY, 6, first, second, height)
-                self.stream(n, message, 0.5 + third, place=(message.lat_int / 1e7, message.lon_int / 1e7))
+                self.stream(n, message, 0.5 + third, place=(message.lat_int / 1e7, message.lon_int / 1e7, height))
                 self.mode(n, "offboard")
             case "attitude":
                 self.stream(n, attitude(first / 300.0, 0.5), third)
@@ -718,11 +723,22 @@ def _judge_retransmissions(flight: Flight) -> None:
                 continue
             before = [result for at, result in finals if original.at <= at < again.at]
             after = [result for at, result in finals if at >= again.at][:1]
-            others = [s for s in flight.sent if s.client != index and original.at <= s.at <= again.at + 1.0]
+            others = _interventions(flight, index, original.at, again.at + 1.0)
             recent = again.at - original.at < RESEND
             if len(before) == 1 and recent and not others and after != before:
                 name = dialect.enums["MAV_CMD"][command].name
                 flight.wrong.append(f"client {index} {name}: result {before}, of its retransmission {after}")
+
+
+def _interventions(flight: Flight, index: int, begin: float, end: float) -> list[Sent | Stream]:
+    """Commands and streams of others than client `index` that were under way between two times."""
+    commands = [
+        s
+        for s in flight.sent
+        if s.client != index and s.at <= end and not any(at < begin for at, _ in _finals(flight, s))
+    ]
+    streams = [s for s in flight.streams if s.client != index and s.begun <= end and s.ended + s.lasts >= begin]
+    return [*commands, *streams]
 
 
 def _judge_sticks(flight: Flight) -> None:
@@ -757,7 +773,9 @@ def _judge_sticks(flight: Flight) -> None:
 def _judge_moves(flight: Flight) -> None:
     """A move that a stream of positions has commanded ends with the stream."""
     log = [e for e in flight.w.drone.log if e.t >= flight.began]
-    late = flight.delay + SLACK
+    # The acknowledged buffer of ARSDK has one command on its way: a stop leaves after the acknowledgement of the one
+    # before, for which a round trip is needed.
+    late = 2.0 * flight.delay + flight.drawn.down.delay + SLACK
     if flight.drawn.up.loss or any(step.kind == "cut" for step in flight.drawn.steps):
         late += LONGEST_CUT + RESENT_WITHIN
     for stream in flight.streams:
@@ -767,16 +785,17 @@ def _judge_moves(flight: Flight) -> None:
         if any(other.place and other.begun < stream.ended < other.ended for other in flight.streams):
             # Another client's positions are flown instead, once the drone has answered the move before: at most one
             # is on its way.
-            over += flight.drawn.down.delay + MOVE_EVERY + SLACK
+            over += MOVE_EVERY + SLACK
         begun = [e for e in log if e.kind == "command" and e.t <= over and _flies_to(e, stream.place)]
         if begun and not any(begun[-1].t < e.t <= over and _ends_move(e) for e in log):
             flight.wrong.append(f"a move of a stream is flown {over - stream.ended:.2f} s after its end")
 
 
-def _flies_to(entry: Any, place: tuple[float, float]) -> bool:
+def _flies_to(entry: Any, place: tuple[float, float, float]) -> bool:
     if not entry.name.lower().replace("_", "").endswith("moveto") or entry.name.endswith("CancelMoveTo"):
         return False
-    return math.dist((entry.args["latitude"], entry.args["longitude"]), place) < 1e-6
+    away = math.dist((entry.args["latitude"], entry.args["longitude"]), place[:2])
+    return away < 1e-6 and abs(entry.args["altitude"] - place[2]) < SAME_HEIGHT
 
 
 def target(place: tuple[float, float]) -> Any:
@@ -870,7 +889,7 @@ def _judge_motors(flight: Flight) -> None:
                 if s.at >= stops[-1][0]
                 and s.at <= entry.t
                 and s.command in (ARM, TAKEOFF, START, SET_MODE, SET_CURRENT)
-                and s.values[:1] != (0.0,)
+                and not (s.command == ARM and s.values[:1] == (0.0,))
             ] + [s.begun for s in flight.streams if s.ended + s.lasts >= stops[-1][0]]
             if not newer:
                 flight.wrong.append(f"{name} is received after an accepted landing, without a newer command")

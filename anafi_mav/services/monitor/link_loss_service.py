@@ -51,12 +51,12 @@ class LinkLossService(Service):
             self._lost(round(silence, 1))
 
     def _lost(self, seconds: float) -> None:
-        vehicle, policy, controller = self.host.vehicle, self.host.vehicle.gcs_loss, self.host.drone.controller
+        vehicle, policy = self.host.vehicle, self.host.vehicle.gcs_loss
         if vehicle.landed not in (Landed.IN_AIR, Landed.TAKEOFF):
             self.host.text(Severity.WARNING, texts.STATION_LOST.fill(seconds=seconds))
         elif vehicle.mode is FlightMode.RETURN:
             self.host.text(Severity.WARNING, texts.STATION_LOST_STATE.fill(seconds=seconds, state=texts.RETURNS))
-        elif controller.pilot_has_source or controller.pilot_acquired_control:
+        elif vehicle.control.leaves_to_pilot(Source.LOST_LINK):
             self.host.text(Severity.WARNING, texts.STATION_LOST_STATE.fill(seconds=seconds, state=texts.MISSION_PILOT))
         else:
             self.host.text(

@@ -12,6 +12,7 @@ import asyncio
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 from anafi_mav import texts
 from anafi_mav.clock import Clock
@@ -49,6 +50,16 @@ _ACTIVITIES: Mapping[FlyingState | None, OperatorText] = {
 }
 
 
+@dataclass(frozen=True)
+class FlightSettings:
+    """Values that clients set for all take-offs, as parameters."""
+
+    takeoff_height: float = 2.5
+    """m above take-off for a take-off that names no height (PX4's default of MIS_TAKEOFF_ALT)."""
+    hand_launch: bool = False
+    """Arming starts the motors and waits for the drone to be thrown (Parrot's UserTakeOff)."""
+
+
 class Aircraft(ABC):
     """One drone that can be flown. All methods run on the event loop's thread."""
 
@@ -64,6 +75,7 @@ class Aircraft(ABC):
         self.height = HeightReference()
         self.roll = RollCheck()
         """Verifies the sign of the roll that the drone reports, for the loops over velocity."""
+        self.settings = FlightSettings()
         self.cruise_speed: float | None = None
         """m/s over ground that moves keep to; None: the drone's own (MAV_CMD_DO_CHANGE_SPEED)."""
         self.climb_speed: float | None = None

@@ -173,6 +173,7 @@ TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
         E.GRANTED: (S.STARTING, S.FLYING_ITEM),
         E.FAILED: (*_REST, S.CANCELLING),
         E.WITHDRAWN: (*_REST, S.CANCELLING),
+        E.PLAYING: (S.TAKING_OVER,),
         E.HALTED: (S.TAKING_OVER,),
         E.LINK_DOWN: _REST,
     },
@@ -286,7 +287,7 @@ class MissionPhase:
     rest: State
     """What the mission is during a start, and when it fails; in the other states the state itself."""
     attempt: MissionAttempt | None = None
-    """The start or continuation under way; in CANCELLING the withdrawn start, None: a flight."""
+    """The start or continuation under way; in CANCELLING the withdrawn one, None: a flight."""
     prepared: Prepared | None = None
     client: Hashable = None
     """AWAIT_ARM: who has to arm."""
@@ -297,7 +298,9 @@ class MissionPhase:
     again: bool = False
     """The same mission was uploaded during the start: if it fails, nothing of that mission has been flown."""
     uid: str = ""
-    """The file that the drone must not fly any longer."""
+    """The file that the drone must not fly any longer, until it has confirmed that."""
+    is_start_withdrawn: bool = False
+    """The start of that file is withdrawn, and the drone may still begin it; False: its flight is ended."""
     played: bool = False
     """The drone has reported that it flies that file, and not yet that it does not."""
     target: WayPoint | None = None
@@ -394,7 +397,7 @@ class MissionMachine:
     @property
     def has_withdrawn_start(self) -> bool:
         """The drone may still report that it flies a file whose start is withdrawn."""
-        return self.state is S.CANCELLING and self.phase.attempt is not None
+        return self.phase.is_start_withdrawn and self.state in (S.CANCELLING, S.TAKING_OVER)
 
     @property
     def needs_gimbal(self) -> bool:
@@ -525,15 +528,16 @@ class MissionMachine:
             return
         if self.flying or phase.state is S.STARTING:
             yield Suspend(starting=phase.state is S.STARTING)
-        self.phase = MissionPhase(
-            S.TAKING_OVER,
-            S.PAUSED if self.flying else self.rest,
-            attempt,
-            prepared,
+        ended = self._unconfirmed(math.inf) or MissionPhase(S.CANCELLING, self.rest)
+        self.phase = replace(
+            ended,
+            state=S.TAKING_OVER,
+            rest=S.PAUSED if self.flying else self.rest,
+            attempt=attempt,
+            prepared=prepared,
             interrupts=self.flying or phase.interrupts,
             again=phase.again and phase.attempt is attempt,
-            uid=self.progress.uid if phase.state is S.FLYING_FILE else phase.uid,
-            played=phase.played or phase.state is S.FLYING_FILE,
+            until=math.inf,
         )
         yield Acquire(attempt, prepared.resumes)
 
@@ -636,7 +640,7 @@ class MissionMachine:
     def playing(self, uid: str) -> list[Effect]:
         """The drone reports that it flies the plan of this name."""
         phase, known = self.phase, self._paused_file()
-        if phase.state is S.CANCELLING:
+        if phase.state in (S.CANCELLING, S.TAKING_OVER):
             own = uid == phase.uid
         elif phase.state is S.STARTING:
             own = phase.prepared is not None and uid == phase.prepared.uid
@@ -651,7 +655,7 @@ class MissionMachine:
         match self.state:
             case S.STARTING:
                 self._begin_file()
-            case S.CANCELLING:
+            case S.CANCELLING | S.TAKING_OVER:
                 self.phase = replace(self.phase, played=True)
             case S.ENDING:
                 self._be(S.FLYING_FILE)
@@ -675,11 +679,13 @@ class MissionMachine:
     def halted(self, *, stopped: bool, report: DroneReport, now: float) -> _Steps:
         """The drone reports its plan as paused, or as `stopped`."""
         progress = self.progress
-        if self.state is S.TAKING_OVER:
-            self.phase = replace(self.phase, played=False)
-        elif self.state is S.CANCELLING:
-            if self.phase.played:
+        if self.state in (S.TAKING_OVER, S.CANCELLING):
+            if not self.phase.played:
+                return
+            if self.state is S.CANCELLING:
                 self._be(self.rest)
+            else:
+                self.phase = replace(self.phase, uid="", is_start_withdrawn=False, played=False)
         elif progress.leg_done:
             yield from self._part_over()
         elif stopped and self.ending and progress.at_last_line:
@@ -823,13 +829,14 @@ class MissionMachine:
 
         Until the drone has confirmed that, what it reports of the file is of that start or flight. None: no file.
         """
-        phase, until = self.phase, now + START_TIMEOUT
+        phase = self.phase
+        withdrawn = MissionPhase(S.CANCELLING, phase.rest, phase.attempt, until=now + START_TIMEOUT)
         if phase.state is S.STARTING and phase.prepared is not None:
-            return MissionPhase(S.CANCELLING, phase.rest, phase.attempt, uid=phase.prepared.uid, until=until)
+            return replace(withdrawn, uid=phase.prepared.uid, is_start_withdrawn=True)
         if phase.state is S.FLYING_FILE:
-            return MissionPhase(S.CANCELLING, phase.rest, uid=self.progress.uid, played=True, until=until)
-        if phase.state is S.TAKING_OVER and phase.played:
-            return MissionPhase(S.CANCELLING, phase.rest, uid=phase.uid, played=True, until=until)
+            return replace(withdrawn, attempt=None, uid=self.progress.uid, played=True)
+        if phase.state in (S.TAKING_OVER, S.CANCELLING) and phase.uid:
+            return replace(withdrawn, uid=phase.uid, is_start_withdrawn=phase.is_start_withdrawn, played=phase.played)
         return None
 
     def _paused_text(self, why: OperatorText | None) -> SendText:

@@ -11,6 +11,7 @@ from support.mission_machine import (
     ITEMS,
     LAST,
     NOW,
+    START,
     RandomFlight,
     calls,
     flying,
@@ -84,6 +85,7 @@ EXPECTED: dict[State, dict[Event, tuple[State, str]]] = {
         E.GRANTED: (S.STARTING, "Select StartFile"),
         E.FAILED: (S.READY, "Release"),
         E.WITHDRAWN: (S.READY, "Release"),
+        E.PLAYING: (S.TAKING_OVER, ""),
         E.HALTED: (S.TAKING_OVER, ""),
         E.LINK_DOWN: (S.READY, ""),
     },
@@ -247,6 +249,29 @@ def test_withdrawn_start_playing_late_stays_silent() -> None:
     assert machine.halted(stopped=True, report=GONE, now=NOW) == []
     assert machine.state is S.READY
     assert names(machine.playing("a")) == "SendText"  # this one is another controller's
+
+
+def test_withdrawn_start_playing_late_stays_silent_when_the_start_after_it_is_withdrawn_too() -> None:
+    machine, _ = starting()
+    second = machine.attempt()
+    machine.prepared(second, START)
+    assert machine.has_withdrawn_start
+    machine.withdrawn(second, None, NOW)
+    assert machine.state is S.CANCELLING
+    assert machine.playing("a") == []
+    machine.halted(stopped=True, report=GONE, now=NOW)
+    assert machine.state is S.READY
+
+
+def test_withdrawn_start_playing_during_the_next_start_stays_silent_after_its_end() -> None:
+    machine, _ = starting()
+    second = machine.attempt()
+    machine.prepared(second, START)
+    assert machine.playing("a") == []
+    machine.halted(stopped=True, report=GONE, now=NOW)
+    assert not machine.has_withdrawn_start
+    machine.withdrawn(second, None, NOW)
+    assert machine.state is S.READY
 
 
 def test_restart_withdrawn_during_acquisition_pauses_and_releases() -> None:
