@@ -4,8 +4,6 @@ The anafi_ros paper has an explicit switch, `skycontroller/offboard`, between ma
 is its state; it decides in front of `Control.acquire`. Tasks that stop the drone, land it or lead it home are never
 refused (`TaskRules.is_flight`). Automatic is the state that nothing requests: the pilot's stick and a program's command
 take the aircraft from each other, as `drone.controller` arbitrates.
-
-A policy is a function of a request that returns a refusal or None; `first_refusal` joins several.
 """
 
 from __future__ import annotations
@@ -13,7 +11,7 @@ from __future__ import annotations
 import enum
 
 from anafi_mav import texts
-from anafi_mav.vehicle.base.control import Policy, Request
+from anafi_mav.vehicle.base.control import Request
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import Source
 
@@ -74,12 +72,3 @@ def refusal_of(state: State, request: Request) -> Refused | None:
     if state is State.PILOT and is_of_program and request.rules.is_flight:
         return Refused(request.rules.what, texts.PILOT_SWITCH)
     return None
-
-
-def first_refusal(*policies: Policy) -> Policy:
-    """Join policies: the first one that refuses a request decides."""
-
-    def refuse(request: Request) -> Refused | None:
-        return next((refusal for policy in policies if (refusal := policy(request)) is not None), None)
-
-    return refuse

@@ -53,7 +53,6 @@ from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.controller_inputs import ControllerInputs
 from anafi_mav.vehicle.fence.rally import RallyPoints
-from anafi_mav.vehicle.flight_policy import first_refusal
 from anafi_mav.vehicle.follow_flight import FollowFlight
 from anafi_mav.vehicle.guided_flight import GuidedFlight
 from anafi_mav.vehicle.hold_rule import APART, HoldRule
@@ -150,7 +149,7 @@ class Vehicle(Aircraft):
         self.offboard = OffboardFlight(self, clock, self.takeoff)
         self.manual = ManualFlight(self, clock, lambda: self.overridable, lambda: self.pilot_switch.objection)
         self.pilot_switch = PilotSwitch(self, drone.controller, lambda: self.control.perform(self.stop_for_pilot()))
-        self.control.policy = first_refusal(self.pilot_switch.refusal)
+        self.control.policy = self.pilot_switch.refusal
         self.controller_inputs = ControllerInputs(drone.controller)
         self.follow = FollowFlight(self, lambda: self.offboard.motion, clock)
         self.plan_ids: dict[int, int] = {}
