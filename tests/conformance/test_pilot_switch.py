@@ -118,6 +118,7 @@ async def test_goto_ends_when_aircraft_is_given_to_the_pilot() -> None:
         await switch(w, PILOT, other)  # confirmed once the Skycontroller has both
         assert skycontroller(w).source is Source.SKY_CONTROLLER
         await shown(w.client, PILOT, mark)
+        await said(w.client, f"Goto ended: {REFUSED}", mark)
         for client in (w.client, other):
             await said(client, "Aircraft: pilot only")
         await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
@@ -294,6 +295,7 @@ async def test_goto_during_hand_over_to_pilot_is_refused() -> None:
         await asyncio.sleep(0.5)
         assert await goto(w, 60.0, 8.0) == REJECTED
         await said(w.client, f"Goto refused: {REFUSED}", mark)
+        assert w.client.since(mark, "PARAM_VALUE") == [], "refused at once, without replacing the stop"
         await asyncio.sleep(8.0)
         assert heard(w, "moveTo", since=began) == []
         assert skycontroller(w).source is Source.SKY_CONTROLLER
