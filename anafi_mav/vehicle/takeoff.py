@@ -89,7 +89,7 @@ class Takeoff(PlainTask):
         self._vehicle = vehicle
         self._tell_armed = armed
         """Called with a client that has armed: a mission that waits for its arming begins."""
-        self._now: TakeoffSituation[asyncio.Task[Any]] = TakeoffSituation()
+        self._situation: TakeoffSituation[asyncio.Task[Any]] = TakeoffSituation()
         """Arming, and the take-off that waits for it or is under way; its task returns True at the asked height."""
         self._alarm = Alarm(self._on_alarm)
         """Set to the situation's deadline."""
@@ -100,17 +100,17 @@ class Takeoff(PlainTask):
 
         What flies is armed in any case (`Aircraft.armed`).
         """
-        return self._now.arming is not None
+        return self._situation.arming is not None
 
     @property
     def climbing(self) -> bool:
         """The climb that follows the drone's own take-off is under way."""
-        return self._now.state is State.CLIMBING
+        return self._situation.state is State.CLIMBING
 
     @property
     def under_way(self) -> bool:
         """An accepted take-off has not reached its height yet."""
-        return self._now.task is not None
+        return self._situation.task is not None
 
     @property
     def rises(self) -> bool:
@@ -119,7 +119,7 @@ class Takeoff(PlainTask):
 
     def is_armed_by(self, client: Hashable) -> bool:
         """Has this client armed the vehicle for the flight that begins now?"""
-        return self._now.arming is not None and client in self._now.arming.clients
+        return self._situation.arming is not None and client in self._situation.arming.clients
 
     # What clients ask for. Each returns when the drone confirmed, or raises.
 
@@ -142,8 +142,8 @@ class Takeoff(PlainTask):
             async with vehicle.control.acquire(HAND_LAUNCH, by=by):
                 await vehicle.drone.piloting.hand_launch()
             return
-        waiting = self._now.attempt
-        self._enter(step(self._now, Event.ARM, client=client, until=_after(AUTO_DISARM)))
+        waiting = self._situation.attempt
+        self._enter(step(self._situation, Event.ARM, client=client, until=_after(AUTO_DISARM)))
         vehicle.changed()
         if isinstance(waiting, WaitingTakeoff) and waiting.client == client:
             self._start(self._take_off_and_report(waiting.height, by))
@@ -176,7 +176,7 @@ class Takeoff(PlainTask):
             await self._vehicle.drone.piloting.land()
 
     def _set_disarmed(self) -> None:
-        self._enter(step(self._now, Event.DISARM))
+        self._enter(step(self._situation, Event.DISARM))
         self._vehicle.changed()
 
     @property
@@ -203,7 +203,7 @@ class Takeoff(PlainTask):
         if not self.armed:
             async with vehicle.control.acquire(self, by=by):  # what lifts off while it waits is replaced now
                 waiting = WaitingTakeoff(height, by.client, _after(ARM_WAIT))
-                self._enter(step(self._now, Event.REQUEST, attempt=waiting))
+                self._enter(step(self._situation, Event.REQUEST, attempt=waiting))
             return
         async with vehicle.control.acquire(self, by=by, below=self._below, rules=_RISES):
             await self._lift_off()
@@ -249,7 +249,7 @@ class Takeoff(PlainTask):
 
     async def _until_risen(self) -> bool:
         """Wait for the end of a take-off, or of a rise; True: it has reached its height."""
-        if (task := self._now.task) is not None:
+        if (task := self._situation.task) is not None:
             await asyncio.wait({task})
             return not task.cancelled() and task.result() is True
         with contextlib.suppress(AnafiMavError):
@@ -263,7 +263,7 @@ class Takeoff(PlainTask):
 
         Returns tasks that are about to end.
         """
-        return self._enter(step(self._now, Event.END))
+        return self._enter(step(self._situation, Event.END))
 
     @property
     def _below(self) -> FlightTask | None:
@@ -277,19 +277,19 @@ class Takeoff(PlainTask):
 
         A take-off that has yet to begin is not disturbed, and reports its own failure.
         """
-        return self._now.state is State.LIFTING
+        return self._situation.state is State.LIFTING
 
     def came_down(self) -> None:
         """The drone has come down: it is disarmed, and nothing of before lifts it off again."""
-        self._enter(step(self._now, Event.GROUND))
+        self._enter(step(self._situation, Event.GROUND))
 
     def left_ground(self) -> None:
         """The drone has left the ground: arming does not lapse any more."""
-        self._enter(step(self._now, Event.LIFT))
+        self._enter(step(self._situation, Event.LIFT))
 
     def link_down(self) -> None:
         """Disarm and cancel everything that was commanded before."""
-        self._enter(step(self._now, Event.LINK_DOWN))
+        self._enter(step(self._situation, Event.LINK_DOWN))
 
     # Taking off.
 
@@ -298,13 +298,13 @@ class Takeoff(PlainTask):
 
         Until it has succeeded or failed, the armed state does not lapse.
         """
-        self._enter(step(self._now, Event.LIFT))
+        self._enter(step(self._situation, Event.LIFT))
         self._vehicle.control.resume()  # a pause that comes from here on ends this take-off
         try:
             await self._vehicle.drone.piloting.take_off()
         finally:
             if self._vehicle.on_ground:
-                self._enter(step(self._now, Event.STAND, until=_after(AUTO_DISARM)))
+                self._enter(step(self._situation, Event.STAND, until=_after(AUTO_DISARM)))
 
     async def _take_off_and_report(self, height: float, by: By) -> bool:
         """Take off after the wait for arming; failures are sent as texts.
@@ -324,7 +324,7 @@ class Takeoff(PlainTask):
     async def _climb(self, height: float, by: By) -> bool:
         """From the drone's own hover height to the asked one; True when it is reached."""
         vehicle = self._vehicle
-        self._enter(step(self._now, Event.CLIMB))
+        self._enter(step(self._situation, Event.CLIMB))
         vehicle.changed()
         try:
             if not vehicle.in_air:
@@ -345,8 +345,8 @@ class Takeoff(PlainTask):
 
     def _over(self) -> None:
         """The background part has ended: its successor flies, or the drone hovers."""
-        if self._now.task is asyncio.current_task():
-            self._enter(step(self._now, Event.END))
+        if self._situation.task is asyncio.current_task():
+            self._enter(step(self._situation, Event.END))
             self._vehicle.control.release(self)
             self._vehicle.changed()
 
@@ -355,11 +355,11 @@ class Takeoff(PlainTask):
     def _start(self, work: Coroutine[Any, Any, bool]) -> None:
         """Begin the part of a take-off that no command waits for."""
         task = asyncio.get_running_loop().create_task(work)
-        self._enter(step(self._now, Event.START, attempt=RunningTakeoff(task)))
+        self._enter(step(self._situation, Event.START, attempt=RunningTakeoff(task)))
 
     def _enter(self, now: TakeoffSituation[asyncio.Task[Any]]) -> list[asyncio.Task[None]]:
         """Enter a situation; return the task of the take-off that ends thereby, if there is one."""
-        task, self._now = self._now.task, now
+        task, self._situation = self._situation.task, now
         if now.deadline is None:
             self._alarm.cancel()
         elif now.deadline != self._alarm.at:
@@ -371,7 +371,7 @@ class Takeoff(PlainTask):
 
     def _on_alarm(self) -> None:
         """A take-off has waited too long for its client to arm, or the armed state for a take-off."""
-        vehicle, now = self._vehicle, self._now
+        vehicle, now = self._vehicle, self._situation
         if isinstance(now.attempt, WaitingTakeoff) and now.attempt.until == now.deadline:
             self._enter(step(now, Event.END))
             vehicle.control.release(self)

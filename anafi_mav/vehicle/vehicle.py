@@ -12,7 +12,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from anafi_mav import texts
 from anafi_mav.clock import Clock
@@ -79,6 +79,12 @@ UNENDABLE = (
 )
 """Why a landing or a return is not ended."""
 
+POSITION_OLD = 3.0
+"""s without a GPS location, which an ANAFI reports once a second, after which the last one is no position in flight."""
+
+LOCATIONS_MISSED = 3
+"""A drone that reports its location more rarely (a slowed simulator) may miss as many."""
+
 LANDS_AFTER_RETURN = 2.0
 """s after a return that the drone ends by landing within which the landing begins."""
 
@@ -111,6 +117,35 @@ class Health(enum.Enum):
     EMERGENCY = 6
 
 
+@dataclass(frozen=True)
+class LinkFacts:
+    """Facts that end with the link to the drone."""
+
+    flying: FlyingState | None = None
+    """Newest flying state that was handled."""
+    located_at: float = -math.inf
+    """When the newest GPS location arrived (s)."""
+    location_every: float = 0.0
+    """s between it and the one before."""
+    intended: FlightMode | None = None
+    """The mode that a client last asked for by name or number."""
+    lands_next: tuple[int, float] | None = None
+    """A return has finished that the drone ends by landing: the epoch then, and until when it is due."""
+
+
+@dataclass(frozen=True)
+class FlightFacts:
+    """Facts of the present flight; on the ground those of the last one."""
+
+    origin: GeoPoint | None = None
+    earlier_takeoff: Position | None = None
+    """The take-off place that the drone reported when it landed: of the flight before."""
+    landing_ended_at: float = -math.inf
+    """When a client last ended a landing (s)."""
+    aborted_return: AbortedReturn | None = None
+    """The return of the drone's own that a client has ended, while that has to be repeated to everybody."""
+
+
 class Vehicle(Aircraft):
     """One drone, flown. All methods run on the event loop's thread."""
 
@@ -127,22 +162,13 @@ class Vehicle(Aircraft):
         self.gcs_loss = LossPolicy()
         """Reaction to the loss of all ground stations (a parameter)."""
         self.rally = RallyPoints()
-        self.intended: FlightMode | None = None
-        """The mode that a client last asked for by name or number."""
+        self.link_facts = LinkFacts()
+        self.flight_facts = FlightFacts()
         self.allow_kill = allow_kill
-        self._lands_next: tuple[int, float] | None = None
-        """A return has finished that the drone ends by landing: the epoch then, and until when it is due."""
         self._initiators = Initiators()
-        self.landing_ended_at = -math.inf
-        """When a client last ended a landing."""
         self.holds = HoldRule()
         """Which Holds of clients count against a return of the drone's own."""
-        self.aborted_return: AbortedReturn | None = None
-        """The return of the drone's own that a client has ended, while that has to be repeated to everybody."""
-        self._last_flying: FlyingState | None = None
         self.return_end = ReturnEnd(self, self._land_after_return)
-        self._takeoff_before: Position | None = None
-        """The take-off place that the drone reported when it landed: of the flight that has ended."""
         self.mission = MissionFlight(self, clock)
         self.takeoff = Takeoff(self, self.mission.armed)
         self.guided = GuidedFlight(self)
@@ -152,14 +178,24 @@ class Vehicle(Aircraft):
         self.control.policy = self.pilot_switch.refusal
         self.controller_inputs = ControllerInputs(drone.controller)
         self.follow = FollowFlight(self, lambda: self.offboard.motion, clock)
-        self.plan_ids: dict[int, int] = {}
-        """Opaque ids of the plans that are in force, by MAV_MISSION_TYPE."""
 
     # What the vehicle is.
 
     @property
     def armed(self) -> bool:
         return self.takeoff.armed or (self.flying_state is not None and not self.on_ground)
+
+    @property
+    def origin(self) -> GeoPoint | None:
+        return self.flight_facts.origin
+
+    @property
+    def position_is_old(self) -> bool:
+        gps, facts = self.drone.gps.state, self.link_facts
+        if not gps.fixed or gps.location is None or self.flying_state is None or self.on_ground:
+            return False
+        patience = max(POSITION_OLD, LOCATIONS_MISSED * facts.location_every)
+        return self._clock.monotonic() - facts.located_at > patience
 
     @property
     def landed(self) -> Landed:
@@ -193,9 +229,9 @@ class Vehicle(Aircraft):
     @property
     def _is_about_to_land(self) -> bool:
         """Between a return and its landing the drone reports neither; no mode is shown in between."""
-        if self._lands_next is None or not self.in_air:
+        if self.link_facts.lands_next is None or not self.in_air:
             return False
-        epoch, until = self._lands_next
+        epoch, until = self.link_facts.lands_next
         return epoch == self.control.epoch and self._clock.monotonic() < until
 
     @property
@@ -372,7 +408,7 @@ class Vehicle(Aircraft):
 
     async def set_mode(self, mode: FlightMode, by: Right) -> None:
         """Do what this mode means, for the client that chose it: Offboard flies its setpoints."""
-        self.intended = mode
+        self.link_facts = replace(self.link_facts, intended=mode)
         match mode:
             case FlightMode.HOLD | FlightMode.POSITION:
                 await self.hold(mode, by)
@@ -532,8 +568,17 @@ class Vehicle(Aircraft):
 
         They are notified at once, and repeatedly.
         """
-        self.aborted_return = AbortedReturn(by.system, reason)
-        self.aborted_return.report(self, self._clock.monotonic())
+        aborted = AbortedReturn(by.system, reason)
+        self.flight_facts = replace(self.flight_facts, aborted_return=aborted)
+        aborted.report(self, self._clock.monotonic())
+
+    def remind_of_aborted_return(self, now: float) -> None:
+        """Remind every client of a return that one of them has ended, while its reason lasts."""
+        aborted = self.flight_facts.aborted_return
+        if aborted is not None and not aborted.lasts(self):
+            self.flight_facts = replace(self.flight_facts, aborted_return=None)
+        elif aborted is not None and aborted.due(self, now):
+            aborted.report(self, now)
 
     async def _end_landing(self, by: By, *, take_off: bool = False) -> None:
         """End the landing that the drone flies; at once when it flies none."""
@@ -543,7 +588,7 @@ class Vehicle(Aircraft):
             await self.drone.piloting.end_landing(take_off=take_off)
         except CommandRejected as error:
             raise Refused(texts.LANDING, texts.from_below(error.reason), form=texts.NOT_ABORTED) from None
-        self.landing_ended_at = self._clock.monotonic()
+        self.flight_facts = replace(self.flight_facts, landing_ended_at=self._clock.monotonic())
         if (right := right_of(by)) is not None:
             self.text(Severity.NOTICE, texts.LANDING_ABORTED.fill(system=right.system))
 
@@ -564,10 +609,11 @@ class Vehicle(Aircraft):
 
     def on_flying_state(self) -> None:
         """The drone's flying state changed."""
-        state, before = self.flying_state, self._last_flying
-        self._last_flying = state
+        state, before = self.flying_state, self.link_facts.flying
+        self.link_facts = replace(self.link_facts, flying=state)
         if state == before:
             return
+        takeoff = self.drone.home.state.takeoff_location
         self._note_landing(before)
         if state in ON_GROUND and before is not None:
             self.return_end.on_ground()
@@ -580,12 +626,11 @@ class Vehicle(Aircraft):
         elif state in TAKING_OFF and before in ON_GROUND:
             self.height.take_off()
             self._report_accuracy()
-            if (place := self.place) is not None:
-                self.origin = place
-            if self.drone.home.state.takeoff_location != self._takeoff_before:
+            self._set_origin(self.place)
+            if takeoff != self.flight_facts.earlier_takeoff:
                 self.on_takeoff_location()  # it was reported before the state
         if state in ON_GROUND:
-            self._takeoff_before = self.drone.home.state.takeoff_location
+            self.flight_facts = replace(self.flight_facts, earlier_takeoff=takeoff, aborted_return=None)
         if not self.on_ground:
             self.takeoff.left_ground()
             if before in ON_GROUND:
@@ -602,10 +647,9 @@ class Vehicle(Aircraft):
 
     def on_location(self) -> None:
         """A new GPS location."""
-        now = self._clock.monotonic()
-        if self._located_at > -math.inf:
-            self._location_every = now - self._located_at
-        self._located_at = now
+        now, facts = self._clock.monotonic(), self.link_facts
+        every = now - facts.located_at if facts.located_at > -math.inf else facts.location_every
+        self.link_facts = replace(facts, located_at=now, location_every=every)
         self.on_position()
 
     def on_position(self) -> None:
@@ -615,7 +659,7 @@ class Vehicle(Aircraft):
         if self.flying_state == FlyingState.LANDED:
             self.height.on_ground(amsl, ato)
             if self.origin is None:
-                self.origin = self.place
+                self._set_origin(self.place)
         elif self.flying_state is not None and self.height.in_flight(self.drone.product.state.flight_id, amsl, ato):
             self.text(Severity.WARNING, ESTIMATED)
 
@@ -632,7 +676,12 @@ class Vehicle(Aircraft):
         """
         location = self.drone.home.state.takeoff_location
         if location is not None and self.flying_state is not None and not self.on_ground:
-            self.origin = GeoPoint(location.latitude, location.longitude)
+            self._set_origin(GeoPoint(location.latitude, location.longitude))
+
+    def _set_origin(self, origin: GeoPoint | None) -> None:
+        """Adopt the origin of the local frame; None keeps the one of before."""
+        if origin is not None:
+            self.flight_facts = replace(self.flight_facts, origin=origin)
 
     def link_up(self, kept: TakeoffRecord | None) -> None:
         """Begin with a drone that has reported all its states.
@@ -643,7 +692,7 @@ class Vehicle(Aircraft):
         self.on_flying_state()
         self.on_location()  # the one that it has reported counts for as long as a new one
         if self.flying_state is not None and not self.on_ground:
-            self.origin = self._origin_in_flight(kept)
+            self.flight_facts = replace(self.flight_facts, origin=self._origin_in_flight(kept))
 
     def _origin_in_flight(self, kept: TakeoffRecord | None) -> GeoPoint | None:
         """Return where a drone took off that was found in the air; None when nothing reports it."""
@@ -685,7 +734,8 @@ class Vehicle(Aircraft):
         home = self.drone.home.state
         finished = home.rth == RthState.AVAILABLE and home.reason == ReturnReason.FINISHED
         lands = finished and home.ending == RthEndingBehavior.LANDING
-        self._lands_next = (self.control.epoch, self._clock.monotonic() + LANDS_AFTER_RETURN) if lands else None
+        due = self.control.epoch, self._clock.monotonic() + LANDS_AFTER_RETURN
+        self.link_facts = replace(self.link_facts, lands_next=due if lands else None)
         if self.returning:
             if self.mission.returns and not (self.returning_by_itself or self.return_end.active):
                 self.return_end.announce(self.return_end.command(), None)  # the mission's last item
@@ -706,10 +756,8 @@ class Vehicle(Aircraft):
         self.control.link_down()
         self.pilot_switch.link_down()
         self.takeoff.link_down()
-        self.intended = None
-        self._last_flying = None
-        self._located_at, self._location_every = -math.inf, 0.0
-        for task in (self.offboard, self.manual, self.follow):
+        self.link_facts = LinkFacts()
+        for task in (self.offboard, self.manual):
             task.link_down()
 
     @property
@@ -755,8 +803,6 @@ class Vehicle(Aircraft):
                 plan_lands=self.mission.ending,
                 skycontroller=self.drone.controller.present,
             )
-        if self.on_ground:
-            self.aborted_return = None
 
     def _note_return(self) -> None:
         """Record the initiator of the return that begins or ends."""

@@ -189,7 +189,7 @@ class CommandService(Service):
         command = replace(command, at=now, counted=counted, component=self.host.compid)
         flies = command.group is ActionGroup.FLIGHT
         if flies:
-            ended_at = self.host.vehicle.landing_ended_at
+            ended_at = self.host.vehicle.flight_facts.landing_ended_at
             repeated = self._history.retransmission(command.client, command, now, mode, ended_at)
         else:
             repeated = self.host.payload_history.retransmission(command, now)
