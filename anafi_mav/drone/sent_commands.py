@@ -210,7 +210,7 @@ class SentCommands:
         return sent.phase is Phase.WITHDRAWN and not in_force and now < sent.reported_until
 
     def withdraw(self, sent: SentCommand, now: float) -> Message | None:
-        """Withdraw a command, and the older ones that it has replaced; return what is to be sent against them.
+        """Withdraw a command and those that it has replaced; return the command against them.
 
         A hand launch that a take-off has replaced may still start the motors when the take-off has failed.
         """

@@ -9,8 +9,8 @@ telemetry walk is a datagram of the drone, so its figures hold all messages of t
 A call is a function of the package that is entered, once however often it is resumed. A change is a call in another
 file, or another room, than the call before. An observer is what the drone's and the system's delivery of an event
 calls, in a later iteration too, and the services that learn of a changed mode or armed state; for telemetry the service
-that sends messages is one of them. A room is a folder of the
-package; in `services` each folder is one, below `system.py` and `component.py`, and above the modules beside it.
+that sends messages is one of them. A room is a folder of the package; in `services` each folder is one, below
+`system.py` and `component.py`, and above the modules beside it.
 `--against` prints an earlier result of `--json` beside this one, its files in the rooms in which git finds them today:
 in one folder of a hundred files no walk would change its room.
 """
