@@ -87,7 +87,8 @@ class Channel:
         """Called by `prove`."""
         self.counters: Counter[str] = Counter()
         """sent_frames, dropped_frames (queue full, or sent after the channel had closed), refused_access (frames that
-        need more than its access, also by name), refused_forwards (from senders that the gateway does not sign for),
+        need more than its access, also by name), refused_operator (of a station while another one is the operator, also
+        by name), refused_forwards (from senders that the gateway does not sign for),
         refused_observer (what observers send to all, or in the name of others),
         withheld_frames (the peer has not proved to be at its address)."""
         self.sent_bytes = 0
@@ -98,6 +99,8 @@ class Channel:
         self.is_open = True
         self.is_local = False
         """True when only programs of this computer can be its peer."""
+        self.ends_with_station = False
+        """True when the channel closes as soon as its station is gone, and only then."""
         self.parser = Parser()
         self.signing: Signing | None = None
         """The key of the endpoint; None where there is no place for one."""

@@ -8,13 +8,13 @@ import pytest
 
 from anafi_mav import texts
 from anafi_mav.services.command.orbit_service import OrbitService
-from anafi_mav.vehicle.base.control import Request
+from anafi_mav.vehicle.base.control import Request, allow_all
 from anafi_mav.vehicle.base.flight_task import DISARM, HAND_LAUNCH, LAND, MAINTENANCE, MOTOR_CUT, FlightTask, Hover
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import By, Source
 from anafi_mav.vehicle.base.right import Extent, Right
-from anafi_mav.vehicle.flight_policy import BY_NUMBER, NUMBERS, TRANSITIONS, Event, State, refusal_of
+from anafi_mav.vehicle.flight_policy import BY_NUMBER, NUMBERS, TRANSITIONS, Event, State, first_refusal, refusal_of
 from anafi_mav.vehicle.follow_flight import FollowFlight
 from anafi_mav.vehicle.manual_flight import ManualFlight
 from anafi_mav.vehicle.mission.flight import MissionFlight
@@ -80,3 +80,11 @@ def test_return_and_mode_position_are_never_refused(kind: type) -> None:
 def test_gateway_is_refused_for_changed_settings(source: Source) -> None:
     refusal = refusal_of(State.PILOT, request(HAND_LAUNCH, source))
     assert (refusal is not None) is (source is Source.GATEWAY)
+
+
+def test_first_policy_that_refuses_decides() -> None:
+    first, second = (Refused(texts.GOTO, reason) for reason in (texts.PILOT_SWITCH, texts.PILOT))
+    asked = request(HAND_LAUNCH)
+    assert first_refusal()(asked) is None
+    assert first_refusal(allow_all, lambda request: first, lambda request: second)(asked) is first
+    assert first_refusal(allow_all, lambda request: second)(asked) is second
