@@ -139,7 +139,9 @@ class StatusReport:
             video=None
             if relay is None
             else ServerStatus(
-                url=f"rtsp://{relay.host}:{relay.port}/", clients=relay.viewers, counters={"sessions": relay.sessions}
+                url=f"rtsp://{relay.host}:{relay.port}/",
+                clients=relay.viewers,
+                counters={"sessions": relay.sessions, "refused_token": relay.refused["token"]},
             ),
             web=None
             if web is None
