@@ -143,7 +143,11 @@ class FabricEndpoint(Endpoint):
         return f"{self.url}: connected, {count} station{'' if count == 1 else 's'}{kept_off}"
 
     async def problems(self) -> list[str]:
-        await asyncio.wait([asyncio.ensure_future(self._listed.wait())], timeout=LIST_LIMIT)
+        listed = asyncio.ensure_future(self._listed.wait())
+        try:
+            await asyncio.wait({listed}, timeout=LIST_LIMIT)
+        finally:
+            listed.cancel()
         if not self._listed.is_set():
             return []  # a router that is not there yet is no mistake
         return [

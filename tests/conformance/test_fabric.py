@@ -18,6 +18,8 @@ from support import missions
 from support.fabric import FabricStation, RouterProcess, StallingRelay, ground, router
 from support.ftp import Ftp
 from support.media import DAY, add_photo
+from support.params import write
+from support.process import gateway_process
 from support.setpoints import VELOCITY_ONLY, engage, local, streaming
 from support.world import HOME, World, loopback, world
 
@@ -136,3 +138,39 @@ async def test_system_id_of_another_gateway_is_left_to_it(tmp_path: Path, monkey
             mark = station.mark()
             await station.heartbeat(lambda beat: True, since=mark, timeout=10.0)
             assert "1 station" in "".join(other.gateway.lines())
+
+
+async def test_killed_gateway_that_returns_is_found_by_its_stations(tmp_path: Path) -> None:
+    file = tmp_path / "fleet.yaml"
+    async with router() as node, ground(node.url) as port:
+        file.write_text(
+            f"state: {tmp_path}/state\nendpoints: ['{node.url}']\nhttp: off\nvideo: off\n"
+            "drones: [{name: alpha, sysid: 1, sim: {}}]\n"
+        )
+        station = FabricStation()
+        try:
+            async with gateway_process(file, 10.0) as gateway:
+                await station.join(port)
+                gateway.kill()
+                await gateway.wait()
+            await station.silence("HEARTBEAT", 2.0)
+            async with gateway_process(file, 10.0):
+                await station.heartbeat(lambda beat: True, timeout=20.0)
+                await station.heartbeat(lambda beat: True)  # a ping has been answered since the first
+                assert (await station.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
+        finally:
+            await station.close()
+
+
+async def test_station_whose_token_ends_is_lost_at_once() -> None:
+    async with router() as node, world(endpoints=(node.url,)) as w:
+        await write(w.client, "ANF_GCS_LOSS", 1, dialect.MAV_PARAM_TYPE_INT32)  # a hold, after 10 s of silence
+        async with ground(node.url) as port:
+            station = await FabricStation().join(port)
+            for _ in range(3):  # it sends one for each: the first are dropped until a ping has been answered
+                await station.heartbeat(lambda beat: True)
+            mark = w.client.mark()
+        await station.close()
+        text = await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("No ground station"), since=mark)
+        seconds = float(text.text.removeprefix("No ground station for ").partition(" s")[0])
+        assert seconds < 9.0
