@@ -142,9 +142,9 @@ class Hover(PlainTask):
 
     @property
     def rules(self) -> TaskRules:
-        """Rules of a hover; one that is chosen ends what clients commanded alone.
+        """Rules of a stop; a chosen Guided ends only what clients commanded.
 
-        It is Guided, which programs set routinely.
+        Programs choose it routinely.
         """
         ends, what = Extent.ALL if self.client is None else Extent.COMMANDED, texts.Subject(self.mode.value)
         return TaskRules(what, wait=STOP_WAIT, is_hover=True, ends_landing=ends, ends_return=ends, is_flight=False)
