@@ -19,6 +19,7 @@ from types import TracebackType
 from typing_extensions import Self
 
 from anafi_mav import texts
+from anafi_mav.access_token import load_token
 from anafi_mav.arsdk.video.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.config import Config, DroneConfig, MediaConfig
@@ -56,7 +57,6 @@ from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.flying import ON_GROUND
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.failsafe_settings import FailsafeLimits
-from anafi_mav.web.access_token import load_token
 from anafi_mav.web.definition_routes import DefinitionRoutes
 from anafi_mav.web.live_page import DroneEntry, LivePage
 from anafi_mav.web.live_video import LiveVideo
@@ -345,11 +345,15 @@ class Gateway:
         try:
             self._recorder = self._start_recording()
             await self._node.start(self.config.endpoints)
+            if any(one is not None and one.is_open_to_network for one in (self.relay, self.web)):
+                token = load_token(self._state if self._saves else None)
+                if self.relay is not None and self.relay.is_open_to_network:
+                    self.relay.token = token
+                if self.web is not None and self.web.is_open_to_network:
+                    self.web.token = token
             if self.relay is not None:
                 await self.relay.start()
             if self.web is not None:
-                if self.web.is_open_to_network:
-                    self.web.token = load_token(self._state if self._saves else None)
                 await self.web.start()
             if self._live is not None:
                 await self._live.load()

@@ -125,6 +125,10 @@ def _serve(arguments: argparse.Namespace) -> int:
             "put a reverse proxy with TLS before it"
         )
         complain(f"warning: http.host: {http.host} {what}", "yellow")
+    video = config.video_server
+    if video is not None and not is_loopback(video.host):
+        what = "is open to the network without TLS: a program on the way can watch"
+        complain(f"warning: video.host: {video.host} {what}", "yellow")
     heap.settle()
     problems = asyncio.run(_run(config, arguments.sim_log.absolute() if arguments.sim_log else None))
     for problem in problems:

@@ -143,6 +143,11 @@ class ManualFlight(PlainTask):
         """The state of the sticks."""
         return self._input.state
 
+    @property
+    def holder(self) -> Hashable:
+        """The client that holds deflected sticks; None: no client does."""
+        return self._input.client
+
     def receive(self, sender: Hashable, sticks: Sticks, *, overrides: bool = False) -> OperatorText | None:
         """Take a client's stick positions; return why they do not fly the drone, or None.
 

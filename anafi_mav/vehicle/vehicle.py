@@ -53,7 +53,7 @@ from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.controller_inputs import ControllerInputs
 from anafi_mav.vehicle.fence.rally import RallyPoints
-from anafi_mav.vehicle.flight_policy import first_refusal
+from anafi_mav.vehicle.flight_policy import first_refusal, operator_refusal_of
 from anafi_mav.vehicle.follow_flight import FollowFlight
 from anafi_mav.vehicle.guided_flight import GuidedFlight
 from anafi_mav.vehicle.hold_rule import APART, HoldRule
@@ -63,6 +63,7 @@ from anafi_mav.vehicle.link_loss import LossPolicy
 from anafi_mav.vehicle.manual_flight import ManualFlight
 from anafi_mav.vehicle.mission.flight import MissionFlight
 from anafi_mav.vehicle.offboard.flight import OffboardFlight
+from anafi_mav.vehicle.operator_control import Need, OperatorControl
 from anafi_mav.vehicle.pilot_switch import PilotSwitch
 from anafi_mav.vehicle.return_end import ReturnEnd
 from anafi_mav.vehicle.takeoff import Takeoff
@@ -176,7 +177,11 @@ class Vehicle(Aircraft):
         self.offboard = OffboardFlight(self, clock, self.takeoff)
         self.manual = ManualFlight(self, clock, lambda: self.overridable, lambda: self.pilot_switch.objection)
         self.pilot_switch = PilotSwitch(self, drone.controller, lambda: self.control.perform(self.stop_for_pilot()))
-        self.control.policy = first_refusal(self.pilot_switch.refusal)
+        self.operators = OperatorControl()
+        """The operator among the stations, if one has requested control."""
+        self.control.policy = first_refusal(
+            self.pilot_switch.refusal, lambda request: operator_refusal_of(self.operators, request)
+        )
         self.controller_inputs = ControllerInputs(drone.controller)
         self.follow = FollowFlight(self, lambda: self.offboard.motion, clock)
 
@@ -355,6 +360,17 @@ class Vehicle(Aircraft):
             grant.begin(pauses=pauses and (rising or not self.on_ground))
         if rising:
             self.text(Severity.WARNING, texts.MODE_MAY_RISE.fill(mode=mode.value))
+
+    def end_inputs_of_others(self) -> None:
+        """End flight by setpoints or sticks of a station that is not the operator.
+
+        The drone hovers. A goto, a mission and what else flies by itself continue: the new operator decides about them.
+        """
+        pilot = self.offboard.streaming_pilot
+        if pilot is not None and (reason := self.operators.objection(system_of(pilot) or 0, Need.FLY)) is not None:
+            self.control.lose(reason)
+        if (holder := self.manual.holder) is not None and self.operators.objection(system_of(holder) or 0, Need.FLY):
+            self.manual.silent(holder)
 
     async def stop_for_pilot(self) -> None:
         """End what flies or is about to fly, for the pilot; return when the drone hovers or stands.

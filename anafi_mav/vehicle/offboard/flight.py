@@ -105,6 +105,11 @@ class OffboardFlight(PlainTask):
         """Setpoints fly the drone."""
         return self._stream.flying
 
+    @property
+    def streaming_pilot(self) -> Hashable:
+        """The client whose stream of setpoints flies the drone; None for a single position."""
+        return self._stream.pilot if self._stream.state is State.ENGAGED else None
+
     # Flight task.
 
     @property

@@ -24,6 +24,7 @@ FOLDERS = sorted(path.parent.relative_to(PACKAGE).as_posix() for path in PACKAGE
 """Of the package, as "drone/status"."""
 
 KIT = {
+    "access_token",
     "errors",
     "units",
     "geo",
@@ -59,7 +60,7 @@ CORES = [
     ),
     *("drone/contention.py", "drone/piloting/sticks.py", "drone/sent_commands.py", "drone/video/picture_clock.py"),
     "drone/video/stream_intrinsics.py",
-    *("relay/admission.py", "relay/dialogue.py", "relay/feed.py", "relay/uri_host.py"),
+    *("relay/admission.py", "relay/dialogue.py", "relay/digest.py", "relay/feed.py", "relay/uri_host.py"),
     *("sim/autopilot/firmware.py", "sim/autopilot/flight.py", "sim/world/scramble.py"),
     *("vehicle/base/clients.py", "vehicle/base/control_machine.py", "vehicle/base/height.py"),
     *("vehicle/link_loss.py", "vehicle/base/modes.py", "vehicle/base/requester.py"),
@@ -73,7 +74,8 @@ CORES = [
     *("vehicle/circle.py", "vehicle/follow.py", "vehicle/hold_rule.py", "vehicle/initiator.py"),
     *("vehicle/failsafe_settings.py", "vehicle/joystick_override.py", "web/h264_offer.py", "web/metrics.py"),
     *("recording/tlog.py", "recording/trace.py", "services/command/command_log.py"),
-    *("vehicle/flight_policy.py", "vehicle/takeoff_machine.py"),
+    *("vehicle/flight_policy.py", "vehicle/operator_control.py", "vehicle/takeoff_machine.py"),
+    "services/command/operator_need.py",
     *("services/capabilities.py", "services/checksum.py", "services/commands.py", "services/component_metadata.py"),
     *("services/camera/camera_messages.py", "services/camera/photo_log.py", "services/camera/pose_track.py"),
     "services/camera/shot_tracker.py",
