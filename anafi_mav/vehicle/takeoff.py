@@ -311,25 +311,29 @@ class Takeoff(PlainTask):
 
         Failures are sent as texts: the command was answered long ago, and its permission may have ended since.
         """
-        control, failed = self._vehicle.control, texts.TAKEOFF_FAILED
+        vehicle, control, climbs = self._vehicle, self._vehicle.control, False
         try:
             if lifts_off:
                 control.check(self, by)
                 await self._lift_off()
                 control.adopt(self, below=self._below)
+            climbs = True
             self._enter(step(self._situation, Event.CLIMB))
-            self._vehicle.changed()
-            failed = texts.CLIMB_ABORTED
+            vehicle.changed()
             await self._climb(height, by)
             return True
         except AnafiMavError as error:
-            self._vehicle.text(Severity.ERROR, failed.fill(height=height, error=reason_of(error)))
+            reason = reason_of(error)
+            if climbs:
+                vehicle.text(Severity.ERROR, texts.CLIMB_ABORTED.fill(height=height, error=reason))
+            else:
+                vehicle.text(Severity.ERROR, texts.TAKEOFF_FAILED.fill(error=reason))
             return False
         finally:  # its successor flies, or the drone hovers
             if self._situation.task is asyncio.current_task():
                 self._enter(step(self._situation, Event.END))
                 control.release(self)
-                self._vehicle.changed()
+                vehicle.changed()
 
     async def _climb(self, height: float, by: By) -> None:
         """From the drone's own hover height to the asked one."""
