@@ -161,6 +161,10 @@ class Endpoint(ABC):
     async def close(self) -> None:
         """End every channel and release every socket."""
 
+    async def problems(self) -> list[str]:
+        """Return what keeps it from its work though it is open, once that is known."""
+        return []
+
     @abstractmethod
     def describe(self) -> str:
         """One line for people: the URL and how it stands."""

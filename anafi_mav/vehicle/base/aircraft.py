@@ -45,7 +45,7 @@ _ACTIVITIES: Mapping[FlyingState | None, OperatorText] = {
 
 @dataclass(frozen=True)
 class FlightSettings:
-    """Values that clients set for all take-offs and moves, by parameters and commands."""
+    """Values that clients set for all flights, by parameters and commands."""
 
     takeoff_height: float = 2.5
     """m above take-off for a take-off that names no height (PX4's default of MIS_TAKEOFF_ALT)."""
@@ -57,6 +57,11 @@ class FlightSettings:
     """m/s up and down that moves keep to; None: the drone's own."""
     move_heading: MoveHeading = MoveHeading.KEEP
     """Heading of moves whose command names none."""
+    guided_timeout: float = 1.5
+    """s that a velocity of ArduPilot's Guided lasts.
+
+    dronekit's documents send one a second; ArduCopter's GUID_TIMEOUT is 3 s.
+    """
 
 
 class Aircraft(ABC):
