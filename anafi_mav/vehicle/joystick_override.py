@@ -39,32 +39,15 @@ class Override(enum.IntFlag):
     """Setpoints."""
 
 
+@dataclass(frozen=True)
 class StickEdge:
     """The sticks of one client."""
 
-    def __init__(self) -> None:
-        self._since = math.inf
-        """Time at which they came to rest; infinite while they are deflected."""
-        self._armed = False
-        self._newest = -math.inf
-
-    def moved(self, largest: float, threshold: float, now: float) -> bool:
-        """Note the largest deflection of the three sticks; True when it starts a stick override.
-
-        It does so once for each rest of the sticks.
-        """
-        if now - self._newest > GAP:
-            self._since, self._armed = math.inf, False
-        self._newest = now
-        if largest <= CENTRE:
-            self._since = min(self._since, now)
-            self._armed = self._armed or now - self._since >= REST
-            return False
-        self._since = math.inf
-        if not self._armed or largest <= threshold:
-            return False
-        self._armed = False
-        return True
+    newest: float
+    since: float = math.inf
+    """Time at which they came to rest; infinite while they are deflected."""
+    armed: bool = False
+    """They have rested for long enough, and have not overridden since."""
 
 
 @dataclass
@@ -81,12 +64,21 @@ class JoystickOverride:
         """Side of a client's throttle when it overrode; absent once it has passed the middle."""
 
     def moved(self, client: Hashable, largest: float, now: float) -> bool:
-        """Note the largest deflection of a client's three sticks; True when it overrides."""
-        edge = self._edges.pop(client, None) or StickEdge()
-        self._edges[client] = edge
+        """Note the largest deflection of a client's three sticks; True when it overrides.
+
+        It does so once for each rest of the sticks.
+        """
+        edge = self._edges.pop(client, None)
+        if edge is None or now - edge.newest > GAP:
+            edge = StickEdge(now)
+        is_at_rest = largest <= CENTRE
+        since = min(edge.since, now) if is_at_rest else math.inf
+        armed = edge.armed or now - since >= REST
+        overrides = armed and not is_at_rest and largest > self.threshold
+        self._edges[client] = StickEdge(now, since, armed and not overrides)
         if len(self._edges) > MAX_CLIENTS:
             del self._edges[next(iter(self._edges))]
-        return edge.moved(largest, self.threshold, now)
+        return overrides
 
     def take_over(self, client: Hashable, climb: float) -> None:
         """Note that a client has overridden with its throttle at `climb`."""

@@ -146,7 +146,7 @@ class Takeoff(PlainTask):
         self._enter(step(self._situation, Event.ARM, client=client, until=_after(AUTO_DISARM)))
         vehicle.changed()
         if isinstance(waiting, WaitingTakeoff) and waiting.client == client:
-            self._start(self._take_off_and_report(waiting.height, by))
+            self._start(self._rise(waiting.height, by, lifts_off=True))
         else:
             self._tell_armed(client)
 
@@ -207,7 +207,7 @@ class Takeoff(PlainTask):
             return
         async with vehicle.control.acquire(self, by=by, below=self._below, rules=_RISES):
             await self._lift_off()
-        self._start(self._climb(height, by))
+        self._start(self._rise(height, by))
 
     async def launch(self) -> None:
         """Take off to the drone's own height, for setpoints; returns when the drone confirmed it."""
@@ -306,49 +306,47 @@ class Takeoff(PlainTask):
             if self._vehicle.on_ground:
                 self._enter(step(self._situation, Event.STAND, until=_after(AUTO_DISARM)))
 
-    async def _take_off_and_report(self, height: float, by: By) -> bool:
-        """Take off after the wait for arming; failures are sent as texts.
+    async def _rise(self, height: float, by: By, *, lifts_off: bool = False) -> bool:
+        """Take off where that is still to be done, then climb; True when the height is reached.
 
-        The command was answered long ago, and its permission may have ended since.
+        Failures are sent as texts: the command was answered long ago, and its permission may have ended since.
         """
+        vehicle, control, climbs = self._vehicle, self._vehicle.control, False
         try:
-            self._vehicle.control.check(self, by)
-            await self._lift_off()
-        except AnafiMavError as error:
-            self._vehicle.text(Severity.ERROR, texts.TAKEOFF_FAILED.fill(error=reason_of(error)))
-            self._over()
-            return False
-        self._vehicle.control.adopt(self, below=self._below)
-        return await self._climb(height, by)
-
-    async def _climb(self, height: float, by: By) -> bool:
-        """From the drone's own hover height to the asked one; True when it is reached."""
-        vehicle = self._vehicle
-        self._enter(step(self._situation, Event.CLIMB))
-        vehicle.changed()
-        try:
-            if not vehicle.in_air:
-                await vehicle.drone.expect(FlyingStateChanged, lambda m: m.state in AIRBORNE, CLIMB_WAIT)
-            # What it told last is from while it rose.
-            present = (await vehicle.drone.expect(AltitudeChanged, timeout=ALTITUDE_WAIT)).altitude
-            if not vehicle.in_air or vehicle.returning:
-                raise Rejected(vehicle.activity)
-            vehicle.control.check(self, by)
-            if abs(height - present) > CLOSE_ENOUGH:
-                await vehicle.drone.piloting.move_by(0.0, 0.0, present - height, 0.0)
+            if lifts_off:
+                control.check(self, by)
+                await self._lift_off()
+                control.adopt(self, below=self._below)
+            climbs = True
+            self._enter(step(self._situation, Event.CLIMB))
+            vehicle.changed()
+            await self._climb(height, by)
             return True
         except AnafiMavError as error:
-            vehicle.text(Severity.ERROR, texts.CLIMB_ABORTED.fill(height=height, error=reason_of(error)))
+            reason = reason_of(error)
+            if climbs:
+                vehicle.text(Severity.ERROR, texts.CLIMB_ABORTED.fill(height=height, error=reason))
+            else:
+                vehicle.text(Severity.ERROR, texts.TAKEOFF_FAILED.fill(error=reason))
             return False
-        finally:
-            self._over()
+        finally:  # its successor flies, or the drone hovers
+            if self._situation.task is asyncio.current_task():
+                self._enter(step(self._situation, Event.END))
+                control.release(self)
+                vehicle.changed()
 
-    def _over(self) -> None:
-        """The background part has ended: its successor flies, or the drone hovers."""
-        if self._situation.task is asyncio.current_task():
-            self._enter(step(self._situation, Event.END))
-            self._vehicle.control.release(self)
-            self._vehicle.changed()
+    async def _climb(self, height: float, by: By) -> None:
+        """From the drone's own hover height to the asked one."""
+        vehicle = self._vehicle
+        if not vehicle.in_air:
+            await vehicle.drone.expect(FlyingStateChanged, lambda m: m.state in AIRBORNE, CLIMB_WAIT)
+        # What it told last is from while it rose.
+        present = (await vehicle.drone.expect(AltitudeChanged, timeout=ALTITUDE_WAIT)).altitude
+        if not vehicle.in_air or vehicle.returning:
+            raise Rejected(vehicle.activity)
+        vehicle.control.check(self, by)
+        if abs(height - present) > CLOSE_ENOUGH:
+            await vehicle.drone.piloting.move_by(0.0, 0.0, present - height, 0.0)
 
     # Machinery.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import itertools
 import math
 import time
@@ -13,6 +14,7 @@ from support.params import value_of, write
 from support.world import ARMED, HOLD, HOME, LAND, POSITION, RETURN, World, world
 
 from anafi_mav import geo
+from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.rth import StateReason
 from anafi_mav.mavlink import dialect as newer
 from anafi_mav.vehicle.takeoff import ARM_WAIT, AUTO_DISARM
@@ -67,6 +69,22 @@ async def test_takeoff_without_arming_expires(flavour: str) -> None:
         await w.client.wait("HEARTBEAT")
         assert w.commands("ardrone3.Piloting.TakeOff") == []
         assert w.drone.flying_state.name == "LANDED"
+
+
+async def test_takeoff_before_arming_that_the_drone_ends_is_reported() -> None:
+    """Motors that stop again fail the take-off; the next one waits for arming, and is flown."""
+    async with world(speed=1.0) as w:
+        mark = w.client.mark()
+        assert (await w.client.command(TAKE_OFF, -1, NAN, NAN, NAN)).result == ACCEPTED
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "motor_ramping", 10.0)
+        w.drone.firmware.receive(ardrone3.UserTakeOff(0), asyncio.get_running_loop().time())
+        await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Takeoff failed: "), since=mark)
+        await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED)
+        assert (await w.client.command(TAKE_OFF, -1, NAN, NAN, NAN)).result == ACCEPTED
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.name.endswith("moveByEnd"), 30.0)
+        assert abs(w.drone.pose.up - 2.5) < 0.5
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 from anafi_mav import texts, units
 from anafi_mav.drone.events import RthHomeType
@@ -151,11 +152,11 @@ class GuidedService(Service):
         if speed != DEFAULT and not SLOWEST <= speed <= FASTEST:
             raise Refused(texts.SPEED, texts.PARAM2_SPEED.fill(slowest=SLOWEST, fastest=FASTEST), lasting=True)
         wanted = None if speed == DEFAULT else speed
-        vehicle = self.host.vehicle
+        vehicle, settings = self.host.vehicle, self.host.vehicle.settings
         if kind in (_AIRSPEED, _GROUNDSPEED):
-            vehicle.cruise_speed = wanted
+            vehicle.settings = replace(settings, cruise_speed=wanted)
         else:
-            vehicle.climb_speed = wanted
+            vehicle.settings = replace(settings, climb_speed=wanted)
         if (goto := vehicle.guided.goto) is not None:
             await vehicle.guided.go(goto, by=command.right)
 

@@ -131,7 +131,7 @@ class OrbitService(Service, PlainTask):
         start = entry(circle, here)
         for point in outline(circle, here):
             check_place(vehicle, point)
-        orbit = _Orbit(Lap(self._held_back(circle)), vehicle.cruise_speed)
+        orbit = _Orbit(Lap(self._held_back(circle)), vehicle.settings.cruise_speed)
         circle = orbit.lap.circle
         bearing = _bearing(circle.centre, start)
         off = abs(geo.distance(*circle.centre.point, *here.point) - circle.radius)
@@ -230,9 +230,9 @@ class OrbitService(Service, PlainTask):
         if orbit is None or orbit.controller is None or not vehicle.control.keeps(self):
             return
         lap = orbit.lap
-        if vehicle.cruise_speed != orbit.cruise:
-            orbit.cruise = vehicle.cruise_speed
-            lap.circle = self._held_back(replace(lap.circle, speed=vehicle.cruise_speed or DEFAULT_SPEED))
+        if (cruise := vehicle.settings.cruise_speed) != orbit.cruise:
+            orbit.cruise = cruise
+            lap.circle = self._held_back(replace(lap.circle, speed=cruise or DEFAULT_SPEED))
         limits = vehicle.drone.piloting.limits
         demand = None if vehicle.place is None else lap.demand(vehicle.offboard.motion)
         sticks = None if demand is None or limits is None else orbit.controller.sticks(demand, limits, now)

@@ -410,8 +410,12 @@ MODEL = Parameter(
 # The gateway's own.
 
 
+def _set(host: Host, **changes: Any) -> None:
+    host.vehicle.settings = replace(host.vehicle.settings, **changes)
+
+
 def _put_takeoff_height(host: Host, value: float) -> None:
-    host.vehicle.settings = replace(host.vehicle.settings, takeoff_height=value)
+    _set(host, takeoff_height=value)
 
 
 def _takeoff_limits(host: Host) -> Limits:
@@ -438,7 +442,7 @@ TAKEOFF_HEIGHT = Parameter(
 
 
 async def _set_hand_launch(host: Host, value: float) -> None:
-    host.vehicle.settings = replace(host.vehicle.settings, hand_launch=value == 1)
+    _set(host, hand_launch=value == 1)
 
 
 HAND_LAUNCH = Parameter(
@@ -461,12 +465,12 @@ MAX_CRUISE_SPEED = 15.0
 
 
 async def _set_cruise_speed(host: Host, value: float) -> None:
-    host.vehicle.cruise_speed = value or None
+    _set(host, cruise_speed=value or None)
     await _go_on(host)
 
 
 async def _set_climb_speed(host: Host, value: float) -> None:
-    host.vehicle.climb_speed = value or None
+    _set(host, climb_speed=value or None)
     await _go_on(host)
 
 
@@ -485,7 +489,7 @@ CRUISE_SPEED = Parameter(
     "ANF_CRUISE_SPEED",
     ParamType.REAL32,
     "Ground speed of moves",
-    read=lambda host: host.vehicle.cruise_speed or 0.0,
+    read=lambda host: host.vehicle.settings.cruise_speed or 0.0,
     write=_set_cruise_speed,
     limits=lambda host: (0.0, MAX_CRUISE_SPEED),
     polled=True,
@@ -501,7 +505,7 @@ CLIMB_SPEED = Parameter(
     "ANF_CLIMB_SPEED",
     ParamType.REAL32,
     "Vertical speed of moves",
-    read=lambda host: host.vehicle.climb_speed or 0.0,
+    read=lambda host: host.vehicle.settings.climb_speed or 0.0,
     write=_set_climb_speed,
     limits=_climb_limits,
     polled=True,
@@ -516,14 +520,14 @@ CLIMB_SPEED = Parameter(
 
 
 def _put_yaw_mode(host: Host, value: float) -> None:
-    host.vehicle.move_heading = MoveHeading(int(value))
+    _set(host, move_heading=MoveHeading(int(value)))
 
 
 YAW_MODE = Parameter(
     "ANF_YAW_MODE",
     ParamType.INT32,
     "Heading of a move to a place whose command names none",
-    read=lambda host: float(host.vehicle.move_heading),
+    read=lambda host: float(host.vehicle.settings.move_heading),
     write=own(_put_yaw_mode),
     put=_put_yaw_mode,
     values={
@@ -626,7 +630,7 @@ RETURN_WAIT = Parameter(
 
 
 def _put_guided_time(host: Host, value: float) -> None:
-    host.vehicle.settings = replace(host.vehicle.settings, guided_timeout=value)
+    _set(host, guided_timeout=value)
 
 
 GUIDED_TIME = Parameter(

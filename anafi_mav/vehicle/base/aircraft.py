@@ -45,12 +45,18 @@ _ACTIVITIES: Mapping[FlyingState | None, OperatorText] = {
 
 @dataclass(frozen=True)
 class FlightSettings:
-    """Values that clients set for all flights, as parameters."""
+    """Values that clients set for all flights, by parameters and commands."""
 
     takeoff_height: float = 2.5
     """m above take-off for a take-off that names no height (PX4's default of MIS_TAKEOFF_ALT)."""
     hand_launch: bool = False
     """Arming starts the motors and waits for the drone to be thrown (Parrot's UserTakeOff)."""
+    cruise_speed: float | None = None
+    """m/s over ground that moves keep to; None: the drone's own (MAV_CMD_DO_CHANGE_SPEED)."""
+    climb_speed: float | None = None
+    """m/s up and down that moves keep to; None: the drone's own."""
+    move_heading: MoveHeading = MoveHeading.KEEP
+    """Heading of moves whose command names none."""
     guided_timeout: float = 1.5
     """s that a velocity of ArduPilot's Guided lasts.
 
@@ -74,12 +80,6 @@ class Aircraft(ABC):
         self.roll = RollCheck()
         """Verifies the sign of the roll that the drone reports, for the loops over velocity."""
         self.settings = FlightSettings()
-        self.cruise_speed: float | None = None
-        """m/s over ground that moves keep to; None: the drone's own (MAV_CMD_DO_CHANGE_SPEED)."""
-        self.climb_speed: float | None = None
-        """m/s up and down that moves keep to; None: the drone's own."""
-        self.move_heading = MoveHeading.KEEP
-        """Heading of moves whose command names none."""
         self.fence = FenceWatch()
         self.home_choice = asyncio.Lock()
         """Lock held while the drone's home is chosen.

@@ -157,8 +157,8 @@ class OffboardMoves:
             goal.place.longitude,
             height,
             heading_deg=heading,
-            horizontal_speed=vehicle.cruise_speed,
-            vertical_speed=vehicle.climb_speed,
+            horizontal_speed=vehicle.settings.cruise_speed,
+            vertical_speed=vehicle.settings.climb_speed,
             orientation=orientation,
         )
         self._note(wanted, failure=None)
@@ -171,7 +171,7 @@ class OffboardMoves:
         PX4's Offboard keeps the heading, ArduPilot's Guided follows WP_YAW_BEHAVIOR. A stream of places never turns
         first: the drone would stop at each of them.
         """
-        rule = self._vehicle.move_heading
+        rule = self._vehicle.settings.move_heading
         if self._vehicle.control.mode is not FlightMode.GUIDED or rule is MoveHeading.KEEP:
             return MoveHeading.KEEP
         return MoveHeading.TO_TARGET
