@@ -10,6 +10,8 @@ from support.missions import MISSION_MODE, PAUSED, first, on_the_way, put, state
 from support.world import World, world
 
 from anafi_mav import mav_enums
+from anafi_mav.arsdk.messages import common
+from anafi_mav.arsdk.messages.common import MavlinkType, PlayingState
 from anafi_mav.mavlink import dialect as newer
 from anafi_mav.sim.world.faults import Impairment
 
@@ -101,3 +103,25 @@ async def test_paused_mission_sends_mission_current_once(flavour: str) -> None:
             await w.client.heartbeat(lambda beat: True, since=w.client.mark())
         sent = {bytes(m.get_payload()) for _, m in w.client.since(mark, "MISSION_CURRENT")}
         assert len(sent) == 1
+
+
+@both
+async def test_withdrawn_start_reported_late_under_another_name_is_suspended(flavour: str) -> None:
+    """The drone layer cannot attribute the name to the start that it has withdrawn; the mission pauses it."""
+    async with world(flavour=flavour, web=True) as w:
+        await on_the_way(w, 2)
+        mark, seen = w.client.mark(), len(commanded(w, "Mavlink.Start"))
+        w.client.send_command(SET_CURRENT, 1.0 + first(w), 0.0)
+        await w.drone.wait_log(lambda e: len(commanded(w, "Mavlink.Stop")) > 0, 20.0)
+        w.drone.faults.untold = frozenset({common.MavlinkFilePlayingStateChanged.NAME})
+        await w.drone.wait_log(lambda e: len(commanded(w, "Mavlink.Start")) > seen, 20.0)
+        w.client.send(newer.MAVLink_command_cancel_message(1, 1, SET_CURRENT))
+        await w.client.wait(
+            "COMMAND_ACK",
+            lambda m: m.command == SET_CURRENT and m.result == mav_enums.MAV_RESULT_CANCELLED,
+            since=mark,
+        )
+        w.drone.faults.untold = frozenset()
+        pauses = len(commanded(w, "Mavlink.Pause"))
+        w.drone.inject(common.MavlinkFilePlayingStateChanged(PlayingState.PLAYING, "renamed", MavlinkType.FLIGHT_PLAN))
+        await w.drone.wait_log(lambda e: len(commanded(w, "Mavlink.Pause")) > pauses, 5.0)
