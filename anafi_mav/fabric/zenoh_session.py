@@ -7,6 +7,7 @@ declares and publishes: each of these may block. zenoh calls back in threads of 
 from __future__ import annotations
 
 import json
+import logging
 import threading
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -23,6 +24,8 @@ from anafi_mav.fabric.arrivals import (
     TokenChange,
     TokensListed,
 )
+
+logger = logging.getLogger(__name__)
 
 LOOK_EVERY = 0.5
 """s between looks whether the session has a link."""
@@ -160,6 +163,10 @@ class ZenohSession:
             session = self._open()
             if session is not None:
                 self._serve(session)
+        except Exception as error:
+            # Without this thread nothing is published: better off the fabric, and said so, than half on it.
+            logger.exception("the zenoh session has ended: a mistake of ours")
+            self._note(is_up=False, problem=f"ended by {error!r}")
         finally:
             self.opened.set()
             if session is not None:
