@@ -28,7 +28,10 @@ from anafi_mav.drone import Drone, events
 from anafi_mav.drone.contention import Contention
 from anafi_mav.drone.rest import HTTP_PORT
 from anafi_mav.errors import AnafiMavError, ConfigError, HandshakeRefused
+from anafi_mav.fabric.endpoint import FabricEndpoint
+from anafi_mav.fabric.system_state import StatePosition, SystemState
 from anafi_mav.gateway_status import ReportedDrone, StatusReport
+from anafi_mav.mavlink.base import Endpoint, EndpointUrl, Sink
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.key_ring import KeyRing, folder_of
 from anafi_mav.mavlink.node import Node
@@ -292,6 +295,7 @@ class Gateway:
             flavours=tuple(FLAVOURS),
             keys=self._keys,
             on_setup_signing=signing.receive,
+            factories={"zenoh": self._fabric_endpoint},
         )
         video = config.video_server
         self.relay = (
@@ -421,6 +425,11 @@ class Gateway:
         problems = [problem for problem in (self._state_problem, self._keys.problem) if problem]
         return problems + [s.system.memory.problem for s in self._supervised if s.system.memory.problem]
 
+    async def endpoint_problems(self) -> list[str]:
+        """Return a line for each problem of an open endpoint, once they are known."""
+        found = await asyncio.gather(*(endpoint.problems() for endpoint in self._node.endpoints))
+        return [problem for problems in found for problem in problems]
+
     def _recording_problems(self) -> list[str]:
         problem = "" if self._recorder is None else self._recorder.files.problem
         return [f"recording has gaps: {problem}"] if problem else []
@@ -470,6 +479,27 @@ class Gateway:
     def _position_of(self, sysid: int) -> SystemPosition | None:
         found = (supervised.system for supervised in self._supervised if supervised.config.sysid == sysid)
         return next((system.position for system in found), None)
+
+    def _fabric_endpoint(self, url: EndpointUrl, sink: Sink, clock: Clock) -> Endpoint:
+        return FabricEndpoint(url, sink, clock, _FabricSystems(self))
+
+    def supervised(self, sysid: int) -> _Supervised | None:
+        """Return the drone with this system id; None before `start`."""
+        return next((supervised for supervised in self._supervised if supervised.config.sysid == sysid), None)
+
+    def system_state(self, sysid: int, session: str) -> bytes | None:
+        """Return the state of a system for the fabric, as JSON; None before `start`."""
+        supervised = self.supervised(sysid)
+        if supervised is None:
+            return None
+        found = supervised.system.position
+        position = None
+        if found is not None:
+            latitude, longitude = found.place.point
+            age = round(self._clock.monotonic() - found.at, 2)
+            position = StatePosition(latitude=latitude, longitude=longitude, amsl_m=round(found.amsl, 2), age_s=age)
+        drone = self._report.drone(supervised.reported(), self.relay)
+        return SystemState(gateway=session, drone=drone, position=position).encode()
 
     def _uris(self) -> GatewayUris:
         """Return the addresses of the servers, which are open."""
@@ -589,3 +619,29 @@ class Gateway:
         if not opened:
             for supervised in self._supervised:
                 supervised.system.channel_closed(channel)
+
+
+class _FabricSystems:
+    """The systems of a gateway, as its fabric endpoints see them."""
+
+    def __init__(self, gateway: Gateway) -> None:
+        self._gateway = gateway
+
+    def sysids(self) -> list[int]:
+        return [drone.sysid for drone in self._gateway.config.drones]
+
+    def state(self, sysid: int, session: str) -> bytes | None:
+        return self._gateway.system_state(sysid, session)
+
+    def is_on_ground(self, sysid: int) -> bool:
+        supervised = self._gateway.supervised(sysid)
+        return supervised is not None and supervised.system.active and supervised.system.vehicle.on_ground
+
+    def is_started(self) -> bool:
+        return bool(self._gateway.systems)
+
+    def refused_id(self, sysid: int) -> bool:
+        supervised = self._gateway.supervised(sysid)
+        if supervised is not None:
+            supervised.system.announce(Severity.CRITICAL, texts.SYSTEM_ID_TAKEN.fill(sysid=sysid))
+        return supervised is not None
