@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import resource
 import signal
 import sys
 from pathlib import Path
@@ -70,6 +71,28 @@ async def test_unusable_state_folder_is_reported_and_sets_exit_status(tmp_path: 
         p.process.send_signal(signal.SIGTERM)
         assert await p.end() == 1
         assert any(line.startswith(f"anafi-mav: not kept: {tmp_path / 'state'}") for line in p.complaints), p
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the limit of another process's files is Linux's")
+async def test_full_disk_is_reported_to_each_client_that_uploads(tmp_path: Path) -> None:
+    """A limit on the size of the gateway's files stands for the disk: each write fails, as on one that is full."""
+    address = loopback()
+    config = fleet(address, loopback(), f"state: {tmp_path / 'state'}")
+    words = ("plan", "upload", str(MISSIONS / "loop.plan"), "--endpoint", f"tcpout://{address}:5760")
+    async with product(tmp_path, config) as p:
+        limits = resource.prlimit(p.process.pid, resource.RLIMIT_FSIZE)
+        resource.prlimit(p.process.pid, resource.RLIMIT_FSIZE, (0, limits[1]))
+        for _ in range(2):
+            async with program(sys.executable, "-m", "anafi_mav", *words) as upload:
+                assert await upload.end() == 1, upload
+                assert "system 1: Plans not kept: state folder cannot be used" in upload.lines
+                assert "mission: 9 items on system 1" in upload.lines  # the gateway has it until its end
+        assert any("changes end with gateway" in line for line in p.complaints), p
+        resource.prlimit(p.process.pid, resource.RLIMIT_FSIZE, limits)
+        async with program(sys.executable, "-m", "anafi_mav", *words) as upload:
+            assert await upload.end() == 0, upload
+        p.process.send_signal(signal.SIGTERM)
+        assert await p.end() == 0
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
