@@ -47,6 +47,12 @@ MAX_URL = 1000
 """Characters of a URL with its options."""
 
 
+SystemIds = Annotated[
+    Annotated[int, Meta(ge=1, le=MAX_SYSTEM)] | Annotated[str, Meta(pattern=r"\A\d{1,3}(-\d{1,3})?\Z")],
+    Meta(extra=expected("a system id from 1 to 255, or a range like 1-9")),
+]
+
+
 class EndpointOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The options of one endpoint."""
 
@@ -66,13 +72,7 @@ class EndpointOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
         ),
     ] = "all"
     systems: Annotated[
-        tuple[
-            Annotated[
-                Annotated[int, Meta(ge=1, le=MAX_SYSTEM)] | Annotated[str, Meta(pattern=r"\A\d{1,3}(-\d{1,3})?\Z")],
-                Meta(extra=expected("a system id from 1 to 255, or a range like 1-9")),
-            ],
-            ...,
-        ],
+        tuple[SystemIds, ...],
         Meta(
             max_length=MAX_LIST,
             description="The systems that this endpoint shows and that its clients reach; frames from and to others "
@@ -159,10 +159,33 @@ class EndpointOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
         ),
     ] = None
 
+    operator_control: Annotated[
+        bool,
+        Meta(
+            description="Its clients may request to be the operator of a drone, and receive CONTROL_STATUS "
+            "([operator control](security.md#operator-control)).",
+            extra=expected("true or false"),
+        ),
+    ] = False
+    secondaries: Annotated[
+        tuple[SystemIds, ...],
+        Meta(
+            max_length=MAX_LIST,
+            description="The ids of clients that may command beside an operator. Only together with "
+            "`operator_control`.",
+            extra=expected("a list of system ids and ranges, like [251, 253-254]"),
+        ),
+    ] = ()
+
     @property
     def system_ids(self) -> frozenset[int] | None:
         """The ids in `systems`; None: all. Raises `ConfigError` with the key's name."""
-        return _system_ids(self.systems) if self.systems else None
+        return _system_ids("systems", self.systems) if self.systems else None
+
+    @property
+    def secondary_ids(self) -> frozenset[int]:
+        """The ids in `secondaries`. Raises `ConfigError` with the key's name."""
+        return _system_ids("secondaries", self.secondaries)
 
     @property
     def networks(self) -> tuple[Network, ...] | None:
@@ -235,13 +258,13 @@ def from_texts(values: Mapping[str, str]) -> EndpointOptions:
 
 
 @functools.lru_cache(maxsize=64)
-def _system_ids(systems: tuple[int | str, ...]) -> frozenset[int]:
+def _system_ids(name: str, systems: tuple[int | str, ...]) -> frozenset[int]:
     ids: set[int] = set()
     for entry in systems:
         first, _, last = str(entry).partition("-")
         low, high = int(first), int(last or first)
         if not 1 <= low <= high <= MAX_SYSTEM:
-            raise ConfigError("systems", f"expected a system id from 1 to 255, or a range like 1-9, got {entry!r}")
+            raise ConfigError(name, f"expected a system id from 1 to 255, or a range like 1-9, got {entry!r}")
         ids.update(range(low, high + 1))
     return frozenset(ids)
 

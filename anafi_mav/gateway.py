@@ -22,6 +22,7 @@ from anafi_mav import texts
 from anafi_mav.arsdk.video.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.config import Config, DroneConfig, MediaConfig
+from anafi_mav.disk_writer import HANGS
 from anafi_mav.drone import Drone, events
 from anafi_mav.drone.contention import Contention
 from anafi_mav.drone.rest import HTTP_PORT
@@ -38,7 +39,17 @@ from anafi_mav.services.gateway_uris import GatewayUris
 from anafi_mav.services.ground_station.signing_setup import SigningSetup
 from anafi_mav.services.system import System
 from anafi_mav.services.system_position import SystemPosition
-from anafi_mav.state_lock import FILE, NO_LOCKS, HeldDrone, Holder, StateLock, state_folder
+from anafi_mav.state_lock import (
+    FILE,
+    NO_LOCKS,
+    STATE_WRITER,
+    HeldDrone,
+    Holder,
+    StateLock,
+    check_folder,
+    read_holder,
+    state_folder,
+)
 from anafi_mav.status_record import GatewayStatus
 from anafi_mav.subject import DRONE
 from anafi_mav.texts import OperatorText
@@ -61,6 +72,9 @@ again within five seconds."""
 
 CANCEL_WAIT = 0.1
 """s until a task that has not ended is cancelled once more."""
+
+DISK_LIMIT = 1.0
+"""s that closing waits for files of the state folder that are still being written."""
 
 HOVER_TIME = 2.0
 """s that closing stays with a flying drone after its moves have ended: as long as hover centres the sticks."""
@@ -258,14 +272,19 @@ class Gateway:
     Every drone of the configuration needs an address.
     """
 
-    def __init__(self, config: Config, *, clock: Clock | None = None) -> None:
+    def __init__(self, config: Config, *, clock: Clock | None = None, saves: bool = True) -> None:
+        """Without `saves` nothing is written to a disk, and the state folder is not locked.
+
+        `anafi-mav run --check` opens and closes such a gateway.
+        """
         for index, drone in enumerate(config.drones):
             if drone.address is None:
                 raise ConfigError(f"drones[{index}].address", "the gateway connects to addresses; expected one")
         self.config = config
         self._clock: Clock = clock or SystemClock()
         state = state_folder(config.state)
-        self._keys = KeyRing(None if state is None else folder_of(state), self._clock)
+        self._saves = saves
+        self._keys = KeyRing(None if state is None else folder_of(state), self._clock, saves=saves)
         signing = SigningSetup(self._keys, lambda: self._node.channels, lambda: self.systems)
         self._node = Node(
             on_channel=self._on_channel,
@@ -330,7 +349,7 @@ class Gateway:
                 await self.relay.start()
             if self.web is not None:
                 if self.web.is_open_to_network:
-                    self.web.token = load_token(self._state)
+                    self.web.token = load_token(self._state if self._saves else None)
                 await self.web.start()
             if self._live is not None:
                 await self._live.load()
@@ -339,10 +358,7 @@ class Gateway:
                 await self.web.close()
             if self.relay is not None:
                 await self.relay.close()
-            if self._recorder is not None:
-                await self._recorder.close()
-            await self._node.close()
-            self._unlock_state()
+            await self._close_node()
             raise
 
     def _start_recording(self) -> Recorder | None:
@@ -352,6 +368,9 @@ class Gateway:
             return None
         try:
             folder = Path(recording.folder).expanduser()
+            if not self._saves:
+                check_folder(folder)
+                return None
             recorder = Recorder(self._node, self._clock, folder, recording.max_megabytes * 1_000_000)
             recorder.start()
         except (OSError, RuntimeError) as error:  # RuntimeError: no such home
@@ -366,7 +385,11 @@ class Gateway:
             return
         lock = StateLock(self._state)
         try:
-            holder = lock.acquire()
+            if self._saves:
+                holder = lock.acquire()
+            else:
+                holder = read_holder(self._state)
+                check_folder(self._state, FILE)
         except OSError as error:
             if error.errno in NO_LOCKS:  # the folder itself may be as good as any
                 logger.warning("%s: cannot be locked: %s", self._state, error.strerror)
@@ -376,7 +399,8 @@ class Gateway:
             return
         if holder is not None:
             raise state_in_use(self._state, holder)
-        self._lock = lock
+        if self._saves:
+            self._lock = lock
 
     def _unlock_state(self) -> None:
         if self._lock is not None:
@@ -479,10 +503,17 @@ class Gateway:
             await _guarded("the video server", self.relay.close())
         if self.web is not None:
             await _guarded("the web server", self.web.close())
+        await self._close_node()
+
+    async def _close_node(self) -> None:
+        """Close endpoints and files. What waits for a disk comes last, each within a bound."""
+        await self._node.close()
+        if await STATE_WRITER.drain(DISK_LIMIT):
+            self._unlock_state()
+        else:  # what is late would overwrite the next gateway's files: the lock ends with this process
+            logger.warning("state folder: %s", HANGS)
         if self._recorder is not None:
             await _guarded("the recording", self._recorder.close())
-        await self._node.close()
-        self._unlock_state()
 
     async def _leave(self, supervised: _Supervised) -> None:
         drone, system = supervised.drone, supervised.system

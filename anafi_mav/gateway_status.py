@@ -52,6 +52,7 @@ REFUSALS = {
     "refused_addresses": "address not in allowed_peers",
     "refused_peers": "all places taken",
     "refused_access": "message beyond the access of the endpoint",
+    "refused_operator": "message while another station is the operator",
     "refused_unsigned": "frame without a signature",
     "refused_signature": "wrong signature",
     "refused_replay": "frame with an old time stamp",

@@ -26,6 +26,8 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from anafi_mav.disk_writer import DiskWriter
+
 logger = logging.getLogger(__name__)
 
 FILE = "gateway.lock"
@@ -38,6 +40,10 @@ MAX_BYTES = 256 * 1024
 TRIES, TRY_EVERY = 5, 0.05
 """Attempts and s between them: a program that looks whether the folder is held locks it for an instant, and a file
 that is being written may be read half."""
+
+STATE_WRITER = DiskWriter("anafi-mav-state")
+"""Writes the files of the state folder, in the order of their changes, and not in the event loop: a memory card may
+take a second."""
 
 NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
 """Errors of locking on a file system without locks, like some network drives."""
@@ -164,6 +170,21 @@ def _read(file: int) -> Holder:
             return msgspec.json.decode(line, type=Holder)
         time.sleep(TRY_EVERY)
     return Holder(VERSION, 0)
+
+
+def check_folder(folder: Path, *names: str) -> None:
+    """Raise `OSError` unless files can be made in a folder.
+
+    Those with these `names` can then be replaced. The folder may be absent. Nothing is made.
+    """
+    present = folder
+    while not os.path.lexists(present):
+        present = present.parent
+    if not present.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
+    files = (folder / name for name in names if (folder / name).exists())
+    if not os.access(present, os.W_OK | os.X_OK) or not all(os.access(file, os.W_OK) for file in files):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
 
 def replace_file(path: Path, data: bytes) -> None:

@@ -126,6 +126,7 @@ CAMERA_RESET = Subject("Camera reset")
 CAMERA_SOURCE = Subject("Camera source")
 COMPASS_CALIBRATION = Subject("Compass calibration")
 CONTINUE = Subject("Continue")
+CONTROL_REQUEST = Subject("Control request")
 CURRENT_ITEM = Subject("Current item")
 DISARM = Subject("Disarm")
 FENCE = Subject("Fence")
@@ -137,6 +138,7 @@ GOTO = Subject("Goto")
 HEIGHT = Subject("Height")
 HOME = Subject("Home")
 LANDING = Subject("Landing")
+MESSAGE = Subject("Message")
 MISSION = Subject("Mission")
 ITEM = Template("Item {number}", number=9999)
 MODE = Subject("Mode")
@@ -230,6 +232,19 @@ SIGNING_KEY_CHANGED = Template("Signing key changed by system {system}", system=
 SIGNING_SWITCHED_OFF = Template("Signing switched off by system {system}", system=255)
 SIGNING_ON = OperatorText("Signing on: key in use")
 SIGNING_OFF = OperatorText("Signing off")
+
+# == Operator control ==
+
+OTHER_OPERATOR = ReasonTemplate("operator is system {system}", system=255)
+SENDER_NOT_IN_RANGE = Reason("sender not in param4-5")
+PARAM2_BINARY = Reason("param2 must be 0 or 1")
+OPERATOR_IS = Template("Operator: system {system}", system=255)
+OPERATOR_REPLACED = Template("Operator: system {system}, was system {before}", system=255, before=255)
+OPERATOR_RELEASED = Template("Operator: none, released by system {system}", system=255)
+OPERATOR_SILENT = Template("Operator: none, system {system} is silent", system=255)
+CONTROL_REQUESTED = Template("Control requested: system {system} waits {seconds:.0f} s", system=255, seconds=60)
+CONTROL_OFFERED = Template("Control offered by system {system}: request again", system=255)
+CONTROL_NOT_OFFERED = Template("Control request expired: operator is system {system}", system=255)
 
 # == Reasons: clients ==
 

@@ -731,7 +731,7 @@ def states() -> str:
     from anafi_mav.services.ftp import ftp
     from anafi_mav.services.plan import plan_transfer
     from anafi_mav.sim.autopilot import machine
-    from anafi_mav.vehicle import flight_policy, follow, manual_flight
+    from anafi_mav.vehicle import flight_policy, follow, manual_flight, operator_control, takeoff_machine
     from anafi_mav.vehicle.base import control_machine
     from anafi_mav.vehicle.fence import fence_watch
     from anafi_mav.vehicle.mission import machine as mission_machine
@@ -740,12 +740,14 @@ def states() -> str:
     tables: list[tuple[str, Any]] = [
         ("Transfer of a mission, a fence or rally points", plan_transfer),
         ("Control: the active flight task", control_machine),
+        ("Arming and take-off", takeoff_machine),
         ("The flight of a mission", mission_machine),
         ("The fence: zones, floor and ceiling each", fence_watch),
         ("Setpoints of a program", stream),
         ("Sticks of a ground station", manual_flight),
         ("Following a target", follow),
         ("The switch between the Skycontroller's pilot and programs", flight_policy),
+        ("The operator among several stations", operator_control),
         ("A session of MAVLink FTP", ftp),
         ("The simulated drone's flight", machine),
     ]
@@ -924,7 +926,8 @@ DROPPED_INPUTS = """\
 <!-- Made by docs/generate.py from anafi_mav/services/dropped_inputs.py. -->
 
 For programmers who stream setpoints, sticks, targets or gimbal rates. After reading you know each reason for which such
-an input is not flown, and its text. A command is answered by its COMMAND_ACK instead.
+an input is not flown, and its text. A command is answered by its COMMAND_ACK instead; one that is refused because
+another station is the [operator](security.md#operator-control) gets the text of the last table besides.
 
 - Only the channel of the sender receives the text. The gateway's terminal shows it with the sender's system id.
 - One text for each reason and episode, at most one in {every:g} s for each sender and reason. An episode ends when an

@@ -6,20 +6,27 @@ a refused command ten times a second must not hide other events.
 
 from __future__ import annotations
 
+import atexit
+import contextlib
+import errno
+import io
+import itertools
 import json
 import logging
-import logging.handlers
+import os
 import re
-import sys
 import time
 from collections.abc import Callable, Sequence
 from datetime import datetime, timezone
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 
 from anafi_mav.cli.terminal import complain
+from anafi_mav.disk_writer import DiskWriter
 from anafi_mav.errors import ConfigError
 from anafi_mav.printable import printable
+from anafi_mav.state_lock import check_folder
 from anafi_mav.subject import DRONE
 
 FORMAT = "%(asctime)s %(levelname)s %(name)s: %(message)s"
@@ -32,6 +39,12 @@ TEXT, JSON = FORMATS = ("text", "json")
 FILE_BYTES, OLD_FILES = 10_000_000, 5
 """Bytes of a log file before it is put aside as FILE.1, and files that are put aside: 60 MB in all, which is months of
 warnings, or some hours with -vv."""
+
+MAX_WAITING = 5000
+"""Lines that may wait for the disk: some 2 MB."""
+
+END_LIMIT = 0.5
+"""s that the end of the program waits for the disk, twice at most."""
 
 MAX_LINES = 200
 """Different lines whose repetition is noticed."""
@@ -119,19 +132,108 @@ class LogOutputs(logging.Handler):
             handler.handle(record)
 
 
-class BoundedLogFile(logging.handlers.RotatingFileHandler):
-    """A log file of bounded size. A full disk is reported once, and ends nothing."""
+class BoundedLogFile:
+    """A log file of bounded size. A full disk is reported once, and ends nothing.
+
+    No `logging.Handler`: `logging` closes those at its end, and would wait for a disk that hangs.
+    """
 
     def __init__(self, path: Path) -> None:
         """Open the file for appending. Raises OSError."""
-        super().__init__(path, maxBytes=FILE_BYTES, backupCount=OLD_FILES, encoding="utf-8")
         self._path = path
+        self._file = self._open()
         self._has_failed = False
 
-    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802
-        if not self._has_failed:
-            self._has_failed = True
-            complain(f"--log-file: {self._path} cannot be written: {sys.exc_info()[1]}")
+    def write(self, line: str) -> None:
+        """Append a line."""
+        data = line.encode(errors="backslashreplace") + b"\n"
+        try:
+            if self._size and self._size + len(data) > FILE_BYTES:
+                self._file.close()
+                self._put_aside()
+            if self._file.closed:
+                self._file = self._open()
+            self._size += len(data)
+            while data:
+                data = data[self._file.write(data) :]
+        except OSError as error:
+            if not self._has_failed:
+                self._has_failed = True
+                complain(f"--log-file: {self._path} cannot be written: {error}")
+
+    def _open(self) -> io.FileIO:
+        file = io.FileIO(self._path, "ab")
+        self._size = os.fstat(file.fileno()).st_size
+        return file
+
+    def _put_aside(self) -> None:
+        """Rename FILE to FILE.1, FILE.1 to FILE.2 and so on; the oldest one is replaced."""
+        names = [self._path, *(Path(f"{self._path}.{number}") for number in range(1, OLD_FILES + 1))]
+        for older, newer in reversed([*itertools.pairwise(names)]):
+            with contextlib.suppress(FileNotFoundError):
+                older.replace(newer)
+
+
+class LogFileHandler(logging.Handler):
+    """Passes lines to a log file in a thread: a disk that hangs stops no drone.
+
+    What the disk cannot take is dropped and counted; a line in the file says how many lines are lost.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Open the file for appending. Raises OSError."""
+        super().__init__()
+        self._path = path
+        self._file = BoundedLogFile(path)
+        self._writer = DiskWriter("anafi-mav-log", max_waiting=MAX_WAITING)
+        self._lost = 0
+        self._has_complained = False
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write a record later, or count it."""
+        try:
+            line = self.format(record)
+        except Exception:
+            self.handleError(record)
+            return
+        self._post_lost()
+        if self._lost or not self._writer.post(partial(self._file.write, line)):
+            self._lost += 1
+            if not self._has_complained:
+                self._has_complained = True
+                complain(f"--log-file: {self._path} is too slow: lines are lost")
+
+    def end(self, timeout: float = END_LIMIT) -> None:
+        """Wait until everything is written, `timeout` s at most."""
+        self._writer.wait(timeout)
+        self._post_lost()
+        self._writer.wait(timeout)
+
+    def _post_lost(self) -> None:
+        """Write how many lines were lost, when there is room for it."""
+        if not self._lost:
+            return
+        record = logging.LogRecord(
+            __name__, logging.WARNING, "", 0, "%d lines lost: disk too slow", (self._lost,), None
+        )
+        if self._writer.post(partial(self._file.write, self.format(record))):
+            self._lost = 0
+
+
+def check(path: Path) -> None:
+    """Raise `ConfigError` for a log file that cannot be written. Nothing is made."""
+    try:
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        if not path.parent.is_dir():
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
+        check_folder(path.parent, path.name)
+    except OSError as error:
+        raise _unusable(path, error) from error
+
+
+def _unusable(path: Path, error: OSError) -> ConfigError:
+    return ConfigError("--log-file", f"expected a file that can be written, got {path}: {error.strerror}")
 
 
 def set_up(level: int = logging.WARNING, *, path: Path | None = None, kind: str = TEXT) -> None:
@@ -142,10 +244,11 @@ def set_up(level: int = logging.WARNING, *, path: Path | None = None, kind: str 
     handlers: list[logging.Handler] = [logging.StreamHandler()]
     if path is not None:
         try:
-            handlers.append(BoundedLogFile(path))
+            file = LogFileHandler(path)
         except OSError as error:
-            problem = f"expected a file that can be written, got {path}: {error.strerror}"
-            raise ConfigError("--log-file", problem) from error
+            raise _unusable(path, error) from error
+        handlers.append(file)
+        atexit.register(file.end)
     for handler in handlers:
         handler.setFormatter(JsonFormatter() if kind == JSON else CleanFormatter(FORMAT))
     logging.basicConfig(level=level, handlers=[LogOutputs(handlers)])

@@ -73,9 +73,10 @@ def run(arguments: argparse.Namespace) -> int:
     Returns 1 when something could not be kept in the state folder. Raises `ConfigError` before anything is started.
     """
     level = (logging.WARNING, logging.INFO, logging.DEBUG)[min(arguments.verbose, 2)]
-    log.set_up(level, path=arguments.log_file, kind=arguments.log_format)
     if arguments.check:
+        log.set_up(level, kind=arguments.log_format)
         return _check(arguments)
+    log.set_up(level, path=arguments.log_file, kind=arguments.log_format)
     try:
         return _serve(arguments)
     except ConfigError as error:
@@ -85,6 +86,8 @@ def run(arguments: argparse.Namespace) -> int:
 def _check(arguments: argparse.Namespace) -> int:
     """Print a line for each thing that a start needs; 1 when one of them is wrong."""
     try:
+        if arguments.log_file is not None:
+            log.check(arguments.log_file)
         config = configuration(arguments.config, arguments.drone, arguments.endpoint, arguments.allow_kill)
         findings = asyncio.run(run_check.findings(config, place))
     except ConfigError as error:

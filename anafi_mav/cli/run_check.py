@@ -1,7 +1,8 @@
 """`anafi-mav run --check`: looks whether a gateway could start, without starting one.
 
-It opens what a start opens (state folder, keys, endpoints, video and web server) and closes it again, so that it and a
-start cannot disagree. No drone is connected to. An endpoint that connects (`tcpout`, `serial`) is open for a moment.
+It opens what a start opens (keys, endpoints, video and web server) and closes it again, so that it and a start cannot
+disagree. Nothing is written: of the folders it looks whether they could be. No drone is connected to. An endpoint that
+connects (`tcpout`, `serial`) is open for a moment.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ async def findings(config: Config, place: Place) -> list[Finding]:
             placed, _ = place(config, reservations)
         except ConfigError as error:
             return [*found, wrong(error.key_path, error.problem, "mend it at that key")]
-    gateway = Gateway(placed)
+    gateway = Gateway(placed, saves=False)
     try:
         await gateway.open()
     except ConfigError as error:
@@ -44,6 +45,8 @@ async def findings(config: Config, place: Place) -> list[Finding]:
         if not problems:
             found.append(ok("state", "folder can be written, and no other gateway uses it"))
         found += [ok("open", line) for line in gateway.lines()]
+        if config.recording.folder is not None:
+            found.append(ok("recording", f"folder can be written: {config.recording.folder}"))
     finally:
         await gateway.close()
     return found

@@ -1,7 +1,8 @@
 """`anafi-mav status`: shows the drones, clients and refused commands of a running gateway.
 
-It asks the gateway's web server, whose address and token it finds in the state folder. On a terminal the tables are
-shown again every second until Ctrl-C, elsewhere once. Nothing is commanded.
+It asks the gateway's web server, whose address and token it finds in the state folder. That token is sent to this
+computer only: a gateway elsewhere has another one, which the user gives. On a terminal the tables are shown again every
+second until Ctrl-C, elsewhere once. Nothing is commanded.
 """
 
 from __future__ import annotations
@@ -9,8 +10,10 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
+import os
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
+from urllib.parse import urlsplit
 
 import aiohttp
 import msgspec
@@ -18,6 +21,7 @@ import msgspec
 from anafi_mav.cli import interrupts, log
 from anafi_mav.cli.terminal import TableRows, is_live, live_tables, say, say_json, say_table
 from anafi_mav.errors import AnafiMavError, ConfigError
+from anafi_mav.relay.uri_host import is_loopback
 from anafi_mav.state_lock import read_holder, state_folder
 from anafi_mav.status_record import PATH, VERSION, ClientStatus, DroneStatus, GatewayStatus, Quantiles
 from anafi_mav.web.access_token import AccessToken, read_token
@@ -28,6 +32,9 @@ EVERY = 1.0
 
 LIMIT = 5.0
 """s for an answer."""
+
+TOKEN_VARIABLE = "ANAFI_MAV_TOKEN"
+"""Variable of the environment with the token of another gateway: arguments are readable by all users of a computer."""
 
 MAX_REFUSED = 10
 """Refused commands that are shown."""
@@ -45,6 +52,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `anafi-mav status`."""
     parser.add_argument("--state", metavar="FOLDER", help="state folder of the gateway, if it is not the usual one")
     parser.add_argument("--url", metavar="URL", help="web server of the gateway, like http://192.168.1.7:8088/")
+    parser.add_argument(
+        "--token",
+        metavar="TEXT",
+        help=f"token of that gateway, if it is another computer's; better in {TOKEN_VARIABLE}",
+    )
     parser.add_argument("--json", action="store_true", help="print the record once, as JSON")
     parser.add_argument(
         "--link", action="store_true", help="print the link that opens the page in a browser; it holds the token"
@@ -54,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Show the status. Raises `AnafiMavError` when no gateway answers."""
     log.set_up()
-    source = find(arguments.state, arguments.url)
+    source = find(arguments.state, arguments.url, arguments.token or os.environ.get(TOKEN_VARIABLE))
     if arguments.link:
         query = "" if source.token is None else f"?{QUERY}={source.token.text}"
         say(f"{source.url}status{query}")
@@ -63,26 +75,44 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def find(state: str | None, url: str | None) -> AskedGateway:
-    """Return where the gateway of a state folder, or of a URL, is asked. Raises `ConfigError`."""
+def find(state: str | None, url: str | None, token: str | None = None) -> AskedGateway:
+    """Return where the gateway of a state folder, or of a URL, is asked. Raises `ConfigError`.
+
+    `token`: of the gateway, as the user gave it.
+    """
     folder = state_folder(state)
-    if url is not None:
-        if not url.startswith(("http://", "https://")):
-            raise ConfigError("--url", f"expected a URL like http://192.168.1.7:8088/, got {url!r}")
-        return AskedGateway(url.rstrip("/") + "/", read_token(folder))
+    if token is not None and not (token.isascii() and token.isprintable()):
+        raise ConfigError("--token", "expected a text of ASCII characters")
+    given = AccessToken(token) if token else None
     holder = read_holder(folder)
+    if url is not None:
+        host = _host_of(url)
+        if not host or not url.startswith(("http://", "https://")):
+            raise ConfigError("--url", f"expected a URL like http://192.168.1.7:8088/, got {url!r}")
+        url = url.rstrip("/") + "/"
+        if given is None and not is_loopback(host) and (holder is None or holder.web != url):
+            raise ConfigError("--url", f"{host} is another computer: expected its token in {TOKEN_VARIABLE} or --token")
+        return AskedGateway(url, given or read_token(folder))
     if holder is None:
         raise ConfigError("--state", f"expected the folder of a running gateway; no gateway holds {folder}")
     if not holder.web:
         raise ConfigError("--state", f"expected a gateway with a web server; that of process {holder.pid} has none")
-    return AskedGateway(holder.web, read_token(folder))
+    return AskedGateway(holder.web, given or read_token(folder))
+
+
+def _host_of(url: str) -> str | None:
+    try:
+        return urlsplit(url).hostname
+    except ValueError:
+        return None
 
 
 async def fetch(session: aiohttp.ClientSession, source: AskedGateway) -> bytes:
     """Return the record as the gateway sends it. Raises `AnafiMavError`."""
     headers = {} if source.token is None else {"Authorization": f"Bearer {source.token.text}"}
     try:
-        async with session.get(source.url + PATH.lstrip("/"), headers=headers) as answer:
+        # A redirection would take the token to another server.
+        async with session.get(source.url + PATH.lstrip("/"), headers=headers, allow_redirects=False) as answer:
             body = await answer.read()
             if answer.status != 200:
                 raise AnafiMavError(f"{source.url}: {answer.status} {body.decode(errors='replace').strip()[:200]}")

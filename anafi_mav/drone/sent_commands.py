@@ -12,7 +12,7 @@ import enum
 import itertools
 import math
 from collections import deque
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import msgspec
@@ -140,8 +140,6 @@ class SentCommand(msgspec.Struct, eq=False):
     """Command that ends what it starts. A newer command of its slot replaces one that has it."""
     undo_refused: bool = False
     """It is undone when the drone refuses it, too: the drone would execute it later."""
-    attempt: Hashable = None
-    """The sender's own name for this sending."""
     plan_before: str | None = None
     """Id of the plan that the drone reported when this start was sent."""
     answered: bool = False

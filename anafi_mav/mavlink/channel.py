@@ -87,7 +87,8 @@ class Channel:
         """Called by `prove`."""
         self.counters: Counter[str] = Counter()
         """sent_frames, dropped_frames (queue full, or sent after the channel had closed), refused_access (frames that
-        need more than its access, also by name), refused_forwards (from senders that the gateway does not sign for),
+        need more than its access, also by name), refused_operator (of a station while another one is the operator, also
+        by name), refused_forwards (from senders that the gateway does not sign for),
         refused_observer (what observers send to all, or in the name of others),
         withheld_frames (the peer has not proved to be at its address)."""
         self.sent_bytes = 0

@@ -26,7 +26,10 @@ from anafi_mav.mavlink.serial_line import SerialLine
 from anafi_mav.mavlink.tcp import TcpIn, TcpOut
 from anafi_mav.mavlink.udp import UdpIn, UdpOut
 
-COMMON = ("flavour", "access", "systems", "allow_messages", "block_messages", "bytes_per_second", "signing")
+COMMON = (
+    *("flavour", "access", "systems", "allow_messages", "block_messages", "bytes_per_second", "signing"),
+    *("operator_control", "secondaries"),
+)
 """Options of every endpoint."""
 
 OF_DATAGRAMS = ("frames", "datagram_bytes")
@@ -162,7 +165,11 @@ def _checked(url: EndpointUrl, flavours: Sequence[str]) -> EndpointUrl:
         for message in getattr(options, name):
             if message not in MESSAGE_IDS:
                 raise ConfigError(name, f"expected the name of a message like ATTITUDE, got {message!r}")
-    options.system_ids, options.networks  # noqa: B018  # raise for what their patterns let through
+    options.system_ids, options.secondary_ids, options.networks  # noqa: B018  # raise for what patterns let through
+    if options.secondaries and not options.operator_control:
+        raise ConfigError("secondaries", "expected it together with operator_control true")
+    if options.operator_control and options.access == "observe":
+        raise ConfigError("operator_control", "expected false with access observe, whose clients control nothing")
     if options.datagram_bytes != DEFAULTS.datagram_bytes and options.frames == "one":
         raise ConfigError("datagram_bytes", "expected it together with frames many")
     return url

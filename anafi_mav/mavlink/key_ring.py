@@ -16,14 +16,14 @@ import stat
 import threading
 from collections import Counter
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from anafi_mav.clock import Alarm, Clock
+from anafi_mav.disk_writer import HANGS
 from anafi_mav.endpoint_options import KEY_NAME
 from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink.signing import CONTENT_BYTES, KEY_BYTES, Signing
-from anafi_mav.state_lock import replace_file
+from anafi_mav.state_lock import STATE_WRITER, replace_file
 
 logger = logging.getLogger(__name__)
 
@@ -42,8 +42,8 @@ LOOK_EVERY = 1.0
 REPORT_EVERY = 10.0
 """s between two lines in the log about refused frames of one key."""
 
-_WRITER = ThreadPoolExecutor(max_workers=1, thread_name_prefix="anafi-mav-keys")
-"""Timestamps are not written by the event loop: a memory card may take a second."""
+CLOSE_LIMIT = 1.0
+"""s that closing waits for the disk."""
 
 
 class KeyRing:
@@ -106,15 +106,28 @@ class KeyRing:
         self._look()
 
     async def close(self) -> None:
-        """Save the reached timestamps, where the next start continues. Safe to call twice."""
+        """Save the reached timestamps, where the next start continues. Safe to call twice.
+
+        Behind a disk that hangs the next start continues at those that were saved ahead, as after a crash.
+        """
         self._alarm.cancel()
-        if self._saving is not None:
-            await asyncio.wait([self._saving])
-            self._saving = None
-        for signing in self._keys.values():
-            if signing.is_on and self._saves:
-                await self._write(signing, signing.timestamp, is_last=True)
+        keys = [signing for signing in self._keys.values() if signing.is_on and self._saves]
         self._keys.clear()
+        if not keys:
+            return
+        saving = asyncio.get_running_loop().create_task(self._save_last(keys, self._saving))
+        self._saving = None
+        done, _ = await asyncio.wait([saving], timeout=CLOSE_LIMIT)
+        if not done:
+            saving.cancel()
+            await asyncio.wait([saving])  # what has not begun is not written later
+            self._warn(", ".join(signing.name for signing in keys), HANGS)
+
+    async def _save_last(self, keys: list[Signing], saving: asyncio.Task[None] | None) -> None:
+        if saving is not None:
+            await asyncio.wait([saving])
+        for signing in keys:
+            await self._write(signing, signing.timestamp, is_last=True)
 
     def replace(self, signing: Signing, secret: bytes, timestamp: int, *, before_use: Callable[[], None]) -> None:
         """Store another key, keep the old one's file, and use the new one from now on.
@@ -157,14 +170,18 @@ class KeyRing:
 
     async def _write(self, signing: Signing, timestamp: int, *, is_last: bool = False) -> None:
         try:
-            await asyncio.get_running_loop().run_in_executor(_WRITER, self._write_now, signing, timestamp, is_last)
+            await asyncio.get_running_loop().run_in_executor(STATE_WRITER, self._write_now, signing, timestamp, is_last)
         except OSError as error:
-            problem = f"key {signing.name}: {error.strerror or error}; old frames may be accepted after a restart"
-            if problem != self.problem:
-                logger.warning("%s", problem)
-            self.problem = problem
+            self._warn(signing.name, error.strerror or str(error))
         else:
             self.problem = ""
+
+    def _warn(self, names: str, reason: str) -> None:
+        """Note and log that timestamps could not be saved."""
+        problem = f"key {names}: {reason}; old frames may be accepted after a restart"
+        if problem != self.problem:
+            logger.warning("%s", problem)
+        self.problem = problem
 
     def _write_now(self, signing: Signing, timestamp: int, is_last: bool) -> None:
         """In the thread of files; the lock keeps a replaced key from coming back."""

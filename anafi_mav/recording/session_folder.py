@@ -15,9 +15,10 @@ import re
 import time
 from collections import Counter
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import BinaryIO
+
+from anafi_mav.disk_writer import HANGS, DiskWriter
 
 logger = logging.getLogger(__name__)
 
@@ -29,6 +30,9 @@ MAX_WAITING = 8_000_000
 
 WRITE_EVERY = 0.5
 """s between two writes; a power cut costs so much of the recording."""
+
+CLOSE_LIMIT = 1.0
+"""s that closing waits for the disk."""
 
 SESSION = re.compile(r"\d{8}T\d{6}Z(-\d{1,3})?")
 PART = re.compile(r"(gateway\.\d{4,}\.tlog|arsdk\.\d{4,}\.jsonl)")
@@ -55,7 +59,7 @@ class SessionFolder:
         self._parts: dict[str, tuple[BinaryIO, int]] = {}
         """Open part of each file, and its bytes."""
         self._numbers: Counter[str] = Counter()
-        self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="anafi-mav-recording")
+        self.writer = DiskWriter("anafi-mav-recording")
         self._task: asyncio.Task[None] | None = None
 
     def start(self) -> None:
@@ -80,18 +84,23 @@ class SessionFolder:
         self._waiting_bytes += len(data)
 
     async def close(self) -> None:
-        """Write what waits, and close the files. Idempotent."""
+        """Write what waits, and close the files, as far as the disk answers in time. Idempotent."""
         task, self._task = self._task, None
         if task is None:
             return
         task.cancel()
         await asyncio.wait([task])
+        ending = asyncio.get_running_loop().create_task(self._end())
+        done, _ = await asyncio.wait([ending], timeout=CLOSE_LIMIT)
+        if not done:
+            ending.cancel()
+            await asyncio.wait([ending])
+            self._drop(0, HANGS)
+        self.writer.shutdown()
+
+    async def _end(self) -> None:
         await self.flush()
-        self._writer.shutdown(wait=False)
-        for file, _ in self._parts.values():
-            with contextlib.suppress(OSError):
-                file.close()
-        self._parts.clear()
+        await asyncio.get_running_loop().run_in_executor(self.writer, self._close_parts)
 
     async def _run(self) -> None:
         while True:
@@ -107,7 +116,7 @@ class SessionFolder:
             waiting.clear()
         self._waiting_bytes = 0
         try:
-            await asyncio.get_running_loop().run_in_executor(self._writer, self._write, batch)
+            await asyncio.get_running_loop().run_in_executor(self.writer, self._write, batch)
         except Exception as error:  # the recording goes on as soon as it can
             reason = error.strerror if isinstance(error, OSError) else None
             self._drop(sum(map(len, batch.values())), reason or str(error))
@@ -119,6 +128,12 @@ class SessionFolder:
         self.problem = reason
 
     # In the thread.
+
+    def _close_parts(self) -> None:
+        for file, _ in self._parts.values():
+            with contextlib.suppress(OSError):
+                file.close()
+        self._parts.clear()
 
     def _write(self, batch: dict[str, bytes]) -> None:
         for name, data in batch.items():

@@ -138,6 +138,14 @@ def effect_of_mode(command: Command) -> Effect:
     return Effect.CHANGE if mode is None else EFFECT_OF_MODE[mode]
 
 
+def is_stop_of_flight(effect: Effect, mode: FlightMode | None) -> bool:
+    """Return True for Hold, Land, Return, pause and disarm.
+
+    A person may mean them against whatever flies. Guided stops too, but programs choose it as a matter of routine.
+    """
+    return effect in (Effect.HOLD, Effect.LAND, Effect.RETURN) or (effect is Effect.STOP and mode is None)
+
+
 class Altitude(enum.Enum):
     """How z (param7) of a command is to be read."""
 
@@ -251,6 +259,11 @@ class Command:
     def mode(self) -> FlightMode | None:
         """The mode that it names; None: it names none, or one that we do not have."""
         return None if self.definition.mode is None else self.definition.mode(self)
+
+    @property
+    def is_stop_of_flight(self) -> bool:
+        """True for a command that stops the aircraft, lands it or leads it home."""
+        return self.group is ActionGroup.FLIGHT and is_stop_of_flight(self.effect, self.mode)
 
     @property
     def progress(self) -> ProgressPolicy | None:

@@ -25,6 +25,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.router import EVERY_COMPONENT
 from anafi_mav.services.command.command_service import CommandService
+from anafi_mav.services.command.operator_need import need_of
 from anafi_mav.services.command.running_actions import RunningActions
 from anafi_mav.services.commands import Action
 from anafi_mav.services.definition_link import DefinitionLink
@@ -35,13 +36,14 @@ from anafi_mav.services.gateway_uris import GatewayUris
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.payload_history import PayloadHistory
 from anafi_mav.services.pose import UNKNOWN_POSE, VehiclePose
-from anafi_mav.services.service import MessageHandler, Service
+from anafi_mav.services.service import MessageHandler, Service, client_of
 from anafi_mav.services.stream import Times
 from anafi_mav.services.system_position import PositionOf
 from anafi_mav.services.telemetry.message_service import MessageService
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.failsafe_settings import FailsafeLimits
+from anafi_mav.vehicle.operator_control import Need
 from anafi_mav.vehicle.vehicle import Vehicle
 
 logger = logging.getLogger(__name__)
@@ -75,8 +77,8 @@ class ComponentSystem(Protocol):
     uris: GatewayUris
     position_of: PositionOf
     has_picture_pose: bool
-    failsafe_limits: FailsafeLimits
     """True when the configuration allows pose from the live video."""
+    failsafe_limits: FailsafeLimits
     payload_history: PayloadHistory
 
     @property
@@ -255,10 +257,12 @@ class Component:
                 to_all = message.target_component == EVERY_COMPONENT
                 if to_all and self._system.owner(message) is not self:
                     return
-            if inbound.is_permitted:
-                handler(inbound)
-            else:
+            if not inbound.is_permitted:
                 self._deny(inbound)
+            elif (reason := self._objection(inbound)) is not None:
+                self._refuse(inbound, reason)
+            else:
+                handler(inbound)
         except AnafiMavError as error:  # the drone's link may just have died
             logger.debug("%s: %s not handled: %s", self.drone.name, message.get_type(), error)
         except Exception:
@@ -270,14 +274,50 @@ class Component:
             if not observes or service.hears_observers:
                 service.heartbeat(inbound)
 
+    def _objection(self, inbound: Inbound) -> OperatorText | None:
+        """Return the reason for which a message has no effect while another station is the operator."""
+        operators = self.vehicle.operators
+        if operators.is_free or inbound.sysid == operators.operator:
+            return None
+        return operators.objection(inbound.sysid, need_of(inbound, self.commands.action_of))
+
+    def input_objection(self, inbound: Inbound) -> OperatorText | None:
+        """Return the reason for which a stick, setpoint or target is refused, and count it.
+
+        None: it may be flown.
+        """
+        reason = self.vehicle.operators.objection(inbound.sysid, Need.FLY)
+        if reason is not None:
+            _count_refusal(inbound)
+        return reason
+
+    def _refuse(self, inbound: Inbound, reason: OperatorText) -> None:
+        """Answer and count a message of a station without the role that it needs; it has no effect."""
+        _count_refusal(inbound)
+        self._answer_refused(inbound, dialect.MAV_RESULT_NOT_IN_CONTROL, reason)
+        self.drop_input(client_of(inbound), InputStream.CHANGE, reason)
+
+    def _answer_refused(self, inbound: Inbound, result: int, reason: str = "") -> None:
+        """Answer a message without effect, as its sender expects it; `result`: of a command."""
+        id = inbound.message.get_msgId()
+        if id in COMMANDS:
+            self.commands.refuse(inbound, result, reason)
+        elif (answer := self._denials.get(id)) is not None:
+            answer(inbound)
+
     def _deny(self, inbound: Inbound) -> None:
         """Answer a message that the access of its endpoint does not cover; it has no effect."""
-        if (answer := self._denials.get(inbound.message.get_msgId())) is not None:
-            answer(inbound)
+        self._answer_refused(inbound, dialect.MAV_RESULT_DENIED)
         channel = inbound.channel
         if inbound.now - self._denied_at.get(channel, -math.inf) >= DENIED_EVERY:
             self._denied_at[channel] = inbound.now
             self.text(Severity.WARNING, texts.ACCESS_DENIED.fill(access=channel.options.access), channel)
+
+
+def _count_refusal(inbound: Inbound) -> None:
+    """Count a message that is refused because another station is the operator."""
+    inbound.channel.counters["refused_operator"] += 1
+    inbound.channel.counters[f"refused_operator.{inbound.message.get_type()}"] += 1
 
 
 def joined(tables: Any) -> dict[Any, Any]:

@@ -2,7 +2,8 @@
 
 No I/O.
 
-A command is acknowledged. Setpoints, sticks, targets and gimbal rates are not: so their sender gets a STATUSTEXT when
+A command is acknowledged. A message that is refused because another station is the operator is answered besides, where
+its protocol has an answer. Setpoints, sticks, targets and gimbal rates are not: so their sender gets a STATUSTEXT when
 they are not flown, one per cause and episode. An episode of a cause begins with an input that is dropped for it. It
 ends when an input of the same stream is flown, or when none has been dropped for this cause for `EPISODE_GAP`.
 
@@ -49,6 +50,9 @@ class InputStream(enum.Enum):
         "MOUNT_CONFIGURE, MOUNT_CONTROL"
     )
     REGION = "MOUNT_CONTROL with a place"
+    CHANGE = (
+        "Commands, parameters, plans and other messages that change something, while another station is the operator"
+    )
 
 
 def _refused(what: OperatorText) -> Callable[[OperatorText], OperatorText]:
@@ -110,7 +114,7 @@ CAUSES: tuple[DropCause, ...] = (
         *(texts.TAKEOFF_POINT_UNKNOWN, texts.HEADING_UNKNOWN, texts.HEIGHT_UNKNOWN, texts.NO_FIX),
         # Other clients and the pilot.
         *(texts.OTHER_PROGRAM, texts.TOO_MANY_PROGRAMS, texts.NOT_ARMED_BY_CLIENT, texts.PAUSED_BY_CLIENT, texts.PILOT),
-        texts.PILOT_SWITCH,
+        *(texts.PILOT_SWITCH, texts.OTHER_OPERATOR),
         *(texts.NOT_CHOSEN, texts.WAITED_TOO_LONG, texts.MISSION_DISPLACED),
         # The drone.
         *(texts.IN_MODE, texts.TAKE_OFF_FIRST, texts.TAKE_OFF_OR_GUIDED, texts.WILL_TAKE_OFF, texts.TILT_UNKNOWN),
@@ -125,12 +129,13 @@ CAUSES: tuple[DropCause, ...] = (
         InputStream.STICKS,
         _with(texts.STICKS_IGNORED),
         *(texts.STICKS_IGNORED_MODE, texts.STICKS_DO_NOT_ARM, texts.TAKE_OFF_FIRST, texts.OTHER_STICKS, texts.PILOT),
-        *(texts.TILT_UNKNOWN, texts.PILOT_SWITCH, None),
+        *(texts.TILT_UNKNOWN, texts.PILOT_SWITCH, texts.OTHER_OPERATOR, None),
     ),
     *_rows(
         InputStream.TARGET,
         _with(texts.TARGET_IGNORED),
         *(texts.TARGET_NO_POSITION, texts.TARGET_NO_VELOCITY, texts.TARGET_FAST, texts.TARGET_FAR, texts.OTHER_TARGET),
+        texts.OTHER_OPERATOR,
         *(texts.NO_FIX, texts.POSITION_UNKNOWN, texts.TARGET_NO_ALTITUDE, texts.HEIGHT_UNKNOWN),
         *(texts.GROUND_HEIGHT_UNKNOWN, *_BOUNDS, None),
     ),
@@ -147,8 +152,9 @@ CAUSES: tuple[DropCause, ...] = (
         _refused(texts.ROI),
         *(texts.GIMBAL_OF_CLIENT, texts.GIMBAL_OF_MISSION, texts.GIMBAL_NO_CLIENT, texts.GIMBAL_CALIBRATES),
         *(texts.NO_GIMBAL, texts.NOT_ON_EARTH, texts.AT_NULL, texts.DRONE_FLIES, texts.NOT_IN_AIR),
-        *(texts.MISSION_DISPLACED, texts.PILOT_SWITCH, *_ACTIVITIES, None),
+        *(texts.MISSION_DISPLACED, texts.PILOT_SWITCH, texts.OTHER_OPERATOR, *_ACTIVITIES, None),
     ),
+    *_rows(InputStream.CHANGE, _refused(texts.MESSAGE), texts.OTHER_OPERATOR),
 )
 """All causes. The docs list them, and a test compares them with the reasons in the code."""
 

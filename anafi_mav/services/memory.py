@@ -12,7 +12,7 @@ import logging
 import math
 import re
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -20,7 +20,8 @@ import msgspec
 from msgspec import Meta
 
 from anafi_mav import texts
-from anafi_mav.state_lock import replace_file
+from anafi_mav.disk_writer import HANGS
+from anafi_mav.state_lock import STATE_WRITER, replace_file
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, PlanItem
 
@@ -40,9 +41,8 @@ MAX_ASIDE = 100
 _SERIAL = re.compile(r"[A-Za-z0-9_-]{1,64}")
 """Parrot's are 18 letters and digits. It comes from the drone and becomes the name of a file."""
 
-_WRITER = ThreadPoolExecutor(max_workers=1, thread_name_prefix="anafi-mav-memory")
-"""One thread, so that files are written in the order of their changes, and never by the event loop: a memory card may
-take a second."""
+SAVE_LIMIT = 3.0
+"""s that a client waits for the disk. A memory card may take one; behind a disk that hangs it gets its answer."""
 
 Number = Annotated[float, Meta(ge=-3.5e38, le=3.5e38)] | Literal["inf", "-inf"] | None
 """A single-precision number as JSON can have it; None is NaN."""
@@ -160,7 +160,10 @@ class Memory:
         self.plans[mission_type] = tuple(items)
 
     async def save(self) -> OperatorText | None:
-        """Write the file as things are now. Returns a line for people when that failed."""
+        """Write the file as things are now. Returns a line for people when that failed.
+
+        It failed, too, when the disk does not answer in time; what it writes later counts all the same.
+        """
         path = self.path
         if path is None:
             return None
@@ -168,13 +171,19 @@ class Memory:
             return self.problem
         plans = {kind: list(map(_stored, items)) for kind, items in self.plans.items() if items}
         content = _File(VERSION, self._serial, plans, dict(self.settings))
-        try:
-            await asyncio.get_running_loop().run_in_executor(_WRITER, replace_file, path, msgspec.json.encode(content))
-        except OSError as error:
-            self.problem = texts.MEMORY_UNWRITABLE.fill(path=path, error=error.strerror)
-            return self.problem
-        self.problem = None
-        return None
+        data = msgspec.json.encode(content)
+        writing = asyncio.get_running_loop().run_in_executor(STATE_WRITER, replace_file, path, data)
+        writing.add_done_callback(partial(self._note, path))
+        await asyncio.wait([writing], timeout=SAVE_LIMIT)
+        if not writing.done():
+            self.problem = texts.MEMORY_UNWRITABLE.fill(path=path, error=HANGS)
+        return self.problem
+
+    def _note(self, path: Path, writing: asyncio.Future[None]) -> None:
+        """Note how the writing ended, which may be after its client has got its answer."""
+        error = None if writing.cancelled() else writing.exception()
+        reason = getattr(error, "strerror", None) or error
+        self.problem = None if error is None else texts.MEMORY_UNWRITABLE.fill(path=path, error=reason)
 
     @staticmethod
     def _put_aside(path: Path) -> str:

@@ -108,6 +108,12 @@ class Host(Protocol):
     def drop_input(self, client: Hashable, stream: InputStream, reason: OperatorText) -> None:
         """Note that an input of a stream is not flown; its sender alone gets a text, if due."""
 
+    def input_objection(self, inbound: Inbound) -> OperatorText | None:
+        """Return the reason for which a stick, setpoint or target is refused, and count it.
+
+        None: it may be flown. It is refused while another station is the operator of the aircraft.
+        """
+
     def use_input(self, client: Hashable, stream: InputStream) -> None:
         """Note that an input of a stream is flown: what was reported of earlier ones is over."""
 
@@ -199,9 +205,10 @@ class Service:
         return {}
 
     def denials(self) -> Mapping[int, MessageHandler]:
-        """Return the answers to messages that their endpoint does not permit, by message id.
+        """Return the answers to messages that have no effect because of their sender, by message id.
 
-        For messages whose sender waits for an answer. The component sends a text besides.
+        Their endpoint does not permit them, or another station is the operator. For messages whose sender waits for an
+        answer; commands are not among them. The component sends a text besides.
         """
         return {}
 

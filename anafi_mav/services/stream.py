@@ -12,6 +12,7 @@ import msgspec
 from msgspec.structs import replace
 
 from anafi_mav.drone.events import Message
+from anafi_mav.endpoint_options import EndpointOptions
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import PX4, Flavour
 from anafi_mav.services.pose import UNKNOWN_POSE, VehiclePose
@@ -76,6 +77,8 @@ class MessageStream:
     """True when other streams have its values as well: on a small line it is streamed to a client that requests it."""
     flavoured: bool = False
     """True when its content depends on the flavour of the receiver."""
+    is_offered: Callable[[EndpointOptions], bool] = lambda options: True
+    """Returns True for endpoints whose clients get it; for the others it does not exist."""
 
     @property
     def is_repeated(self) -> bool:

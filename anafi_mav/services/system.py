@@ -42,6 +42,7 @@ from anafi_mav.services.gimbal.gimbal_service import GimbalService
 from anafi_mav.services.ground_station.banner_service import BannerService
 from anafi_mav.services.ground_station.identity_service import IdentityService
 from anafi_mav.services.ground_station.node_status_service import NodeStatusService
+from anafi_mav.services.ground_station.operator_control_service import OperatorControlService
 from anafi_mav.services.ground_station.shell_service import ShellService
 from anafi_mav.services.ground_station.time_service import TimeService
 from anafi_mav.services.ground_station.tune_service import TuneService
@@ -121,6 +122,7 @@ AUTOPILOT_SERVICES: tuple[type[Service], ...] = (
     VideoTelemetryService,
     PilotService,
     ControllerInputService,
+    OperatorControlService,
 )
 """Services of component 1, beside commands, messages and files themselves."""
 

@@ -1,9 +1,12 @@
-"""Policy in front of flight tasks: the Skycontroller's pilot or programs. No I/O.
+"""Policies in front of flight tasks: pilot or programs, and the operator. No I/O.
 
 The anafi_ros paper has an explicit switch, `skycontroller/offboard`, between manual and offboard control. `PilotSwitch`
 is its state; it decides in front of `Control.acquire`. Tasks that stop the drone, land it or lead it home are never
 refused (`TaskRules.is_flight`). Automatic is the state that nothing requests: the pilot's stick and a program's command
 take the aircraft from each other, as `drone.controller` arbitrates.
+
+The second policy is that of `operator_control`: with an operator, the flight tasks of stations without its role are
+refused. It comes after the pilot's, and it never concerns what the gateway does by itself.
 
 A policy is a function of a request that returns a refusal or None; `first_refusal` joins several.
 """
@@ -14,8 +17,10 @@ import enum
 
 from anafi_mav import texts
 from anafi_mav.vehicle.base.control import Policy, Request
-from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.refusal import NotInControl, Refused
 from anafi_mav.vehicle.base.requester import Source
+from anafi_mav.vehicle.base.right import Right
+from anafi_mav.vehicle.operator_control import Need, OperatorControl
 
 
 class State(enum.Enum):
@@ -68,13 +73,24 @@ BY_NUMBER: dict[int, State] = {number: state for state, number in NUMBERS.items(
 def refusal_of(state: State, request: Request) -> Refused | None:
     """Return the refusal of a request behind a Skycontroller; None: it is permitted.
 
-    The fence and the loss of stations only stop, land and return; whether they act is decided elsewhere. A changed
-    setting never moves an aircraft that the pilot has.
+    A changed setting never moves an aircraft that the pilot has.
     """
-    is_of_program = request.by not in (Source.FENCE, Source.LOST_LINK, Source.SWITCH)
+    is_of_program = not isinstance(request.by, Source) or request.by.is_program
     if state is State.PILOT and is_of_program and request.rules.is_flight:
         return Refused(request.rules.what, texts.PILOT_SWITCH)
     return None
+
+
+def operator_refusal_of(control: OperatorControl, request: Request) -> Refused | None:
+    """Return the refusal of a request while another station than its client's is the operator.
+
+    None: it is permitted.
+    """
+    if not isinstance(request.by, Right) or not request.rules.is_flight:
+        return None
+    need = Need.FLY if request.rules.is_stream else Need.COMMAND
+    reason = control.objection(request.by.system, need)
+    return None if reason is None else NotInControl(request.rules.what, reason)
 
 
 def first_refusal(*policies: Policy) -> Policy:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Callable, Hashable
+from dataclasses import dataclass, replace
 
 from anafi_mav import geo, texts
 from anafi_mav.clock import Alarm, Clock
@@ -39,6 +40,22 @@ from anafi_mav.vehicle.follow import (
 )
 
 
+@dataclass(frozen=True)
+class Following:
+    """One use of mode Follow, from its request on."""
+
+    follower: TargetFollower
+    controller: VelocityController
+    state: State = State.OFF
+    leader: Hashable = None
+    """Sender of the target that is followed."""
+    kept_height: float | None = None
+    """m above take-off, kept while the target asks for a height that is too low."""
+
+    def after(self, event: Event) -> Following:
+        return replace(self, state=TRANSITIONS[self.state][event])
+
+
 class FollowFlight(PlainTask):
     """Mode Follow of one vehicle."""
 
@@ -51,7 +68,6 @@ class FollowFlight(PlainTask):
 
     def __init__(self, vehicle: Aircraft, motion: Callable[[], MotionEstimate], clock: Clock) -> None:
         self.settings = FollowSettings()
-        self.state = State.OFF
         self.warn_throttled: Callable[[OperatorText], None] = lambda text: vehicle.text(Severity.WARNING, text)
         self.drop: Callable[[Hashable, OperatorText], None] = lambda client, reason: vehicle.text(
             Severity.WARNING, texts.TARGET_IGNORED.fill(reason=reason)
@@ -60,18 +76,16 @@ class FollowFlight(PlainTask):
         self._vehicle = vehicle
         self._motion = motion
         self._clock = clock
-        self._leader: Hashable = None
-        self._heard_at = 0.0
         self._silence = Alarm(self._expired)
-        self._follower = TargetFollower(self.settings)
-        self._controller = VelocityController(self._motion())
-        self._kept_height: float | None = None
-        """m above take-off, kept while the target asks for a height that is too low."""
+        self._following = self._new()
+
+    def _new(self) -> Following:
+        return Following(TargetFollower(self.settings), VelocityController(self._motion()))
 
     @property
     def engaged(self) -> bool:
         """True when the drone follows, or waits for its target."""
-        return self.state is not State.OFF
+        return self._following.state is not State.OFF
 
     async def engage(self, by: By) -> None:
         """Begin mode Follow; return when the drone hovers and waits for its target.
@@ -81,13 +95,8 @@ class FollowFlight(PlainTask):
         if not self._vehicle.in_air:
             raise Refused(texts.FOLLOW, texts.TAKE_OFF_FIRST)
         async with self._vehicle.control.acquire(self, by=by):
-            self.state = TRANSITIONS[self.state][Event.ENGAGE]
-            self._leader = None
-            self._follower = TargetFollower(self.settings)
-            self._kept_height = None
-            self._controller = VelocityController(self._motion())
-            self._heard_at = self._clock.monotonic()
-            self._watch(PATIENCE)
+            self._following = self._new().after(Event.ENGAGE)
+            self._silence.set(self._clock.monotonic() + PATIENCE)
 
     def receive(self, sender: Hashable, seen: Sighting) -> OperatorText | None:
         """Take a target's position; return the reason for which it is not followed, or None.
@@ -95,9 +104,10 @@ class FollowFlight(PlainTask):
         The first sender in mode Follow is followed until the mode ends. In another mode a target asks for nothing: its
         message names no drone.
         """
-        if self.state is State.OFF:
+        before = self._following
+        if before.state is State.OFF:
             return None
-        if self.state is State.FOLLOWING and sender != self._leader:
+        if before.state is State.FOLLOWING and sender != before.leader:
             return texts.OTHER_TARGET
         if reason := self._objection(seen):
             return reason
@@ -106,9 +116,9 @@ class FollowFlight(PlainTask):
             return texts.POSITION_UNKNOWN
         now = self._clock.monotonic()
         north, east = geo.offset(*reference, seen.latitude, seen.longitude)
-        self._follower.see(north, east, seen.altitude, seen.velocity, now)
-        self.state, self._leader, self._heard_at = TRANSITIONS[self.state][Event.TARGET], sender, now
-        self._watch(SILENCE)
+        before.follower.see(north, east, seen.altitude, seen.velocity, now)
+        self._following = replace(before.after(Event.TARGET), leader=sender)
+        self._silence.set(now + SILENCE)
         return self._fly(now)
 
     def _objection(self, seen: Sighting) -> OperatorText | None:
@@ -124,25 +134,20 @@ class FollowFlight(PlainTask):
 
     def end(self) -> list[asyncio.Task[None]]:
         """End this flight task: something else flies the drone now."""
-        if self.state is not State.OFF:
-            self.state = TRANSITIONS[self.state][Event.END]
+        if self.engaged:
+            self._following = self._following.after(Event.END)
             self._silence.cancel()
             with contextlib.suppress(LinkLost):
                 self._vehicle.drone.piloting.pilot(None)
         return []
-
-    def link_down(self) -> None:
-        """End mode Follow: the drone is disconnected."""
-        self._silence.cancel()
-        self.state = State.OFF
 
     def subscriptions(self) -> Subscriptions:
         """Return the handlers of messages that report the drone's motion: the loop closes on it."""
         return {events.SpeedChanged: self._on_speed}
 
     def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
-        if self.state is State.FOLLOWING and (reason := self._fly(now)) is not None:
-            self.drop(self._leader, reason)
+        if self._following.state is State.FOLLOWING and (reason := self._fly(now)) is not None:
+            self.drop(self._following.leader, reason)
 
     def _fly(self, now: float) -> OperatorText | None:
         """Fly to where the target wants the drone; return why it hovers instead, or None."""
@@ -154,13 +159,13 @@ class FollowFlight(PlainTask):
         sticks = PilotingCommand()
         try:
             motion = self._motion()
-            wanted = self._follower.aim(motion.north, motion.east, self._height(), now)
+            wanted = self._following.follower.aim(motion.north, motion.east, self._height(), now)
             if wanted is not None and vehicle.place is not None and motion.reference is not None:
                 place = GeoPoint(
                     *geo.destination(*motion.reference, wanted.x.position or 0.0, wanted.y.position or 0.0)
                 )
                 check_place(vehicle, place)
-                sticks = self._controller.sticks(wanted, limits, now) or sticks
+                sticks = self._following.controller.sticks(wanted, limits, now) or sticks
         except Refused as refusal:
             reason = refusal.reason
         vehicle.drone.piloting.pilot(sticks)
@@ -181,31 +186,28 @@ class FollowFlight(PlainTask):
                 raise Refused(texts.FOLLOW, texts.GROUND_HEIGHT_UNKNOWN)
             height += state.altitude - state.height
         elif settings.altitude_mode is AltitudeMode.TARGET:
-            if self._follower.altitude is None:
+            altitude = self._following.follower.altitude
+            if altitude is None:
                 raise Refused(texts.FOLLOW, texts.TARGET_NO_ALTITUDE)
-            height += amsl_to_ato(self._vehicle, self._follower.altitude)
-        if height < LOWEST:
-            if self._kept_height is None:
-                self._kept_height = state.altitude
-            if self._kept_height is None:
+            height += amsl_to_ato(self._vehicle, altitude)
+        is_low, kept = height < LOWEST, self._following.kept_height
+        kept = state.altitude if kept is None else kept
+        self._following = replace(self._following, kept_height=kept if is_low else None)
+        if is_low:
+            if kept is None:
                 raise Refused(texts.FOLLOW, texts.HEIGHT_UNKNOWN)
             self.warn_throttled(texts.FOLLOW_HEIGHT_KEPT.fill(height=height))
-            return self._kept_height
-        self._kept_height = None
+            return kept
         if settings.altitude_mode is AltitudeMode.TARGET:
             check_estimate(self._vehicle, height)
         check_height(self._vehicle, height)
         return height
 
     def _expired(self) -> None:
-        if self.state is State.OFF:
+        if not self.engaged:
             return
-        was, self.state = self.state, TRANSITIONS[self.state][Event.SILENCE]
+        was, self._following = self._following.state, self._following.after(Event.SILENCE)
         self._vehicle.drone.piloting.hover()
         self._vehicle.control.release(self)
         why = texts.TARGET_LOST if was is State.FOLLOWING else texts.NO_TARGET
         self._vehicle.text(Severity.WARNING, texts.TASK_ENDED.fill(what=texts.FOLLOW, reason=why))
-
-    def _watch(self, patience: float) -> None:
-        """Schedule the end of the mode after `patience` s without a report of the target."""
-        self._silence.set(self._heard_at + patience)

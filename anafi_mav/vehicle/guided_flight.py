@@ -27,7 +27,7 @@ Some millimetres distinguish two of them.
 """
 
 
-_GOTO = TaskRules(texts.GOTO, needs=Needs.NO_DESCENT | Needs.IN_AIR)
+GOTO = TaskRules(texts.GOTO, needs=Needs.NO_DESCENT | Needs.IN_AIR, follows=True)
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Goto(PlainTask):
 
     @property
     def rules(self) -> TaskRules:
-        return _GOTO
+        return GOTO
 
     def is_to(self, target: Position) -> bool:
         """True when a moveTo with this target (height above take-off) flies there."""

@@ -13,7 +13,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import enum
-import math
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 
@@ -40,6 +39,7 @@ class State(enum.Enum):
 
     IDLE = "sticks centred or not received"
     HELD = "a client holds deflected sticks"
+    OVERRIDING = "a joystick takes the drone over: no sticks count until that has ended"
 
 
 class Event(enum.Enum):
@@ -49,18 +49,34 @@ class Event(enum.Enum):
     DEFLECTED = "a client deflects its sticks"
     SILENCE = "no stick input of the holding client for too long"
     END = "another flight task is active"
+    OVERRIDE = "a client's joystick begins to take the drone over"
+    OVERRIDDEN = "it has taken the drone over, or another action has replaced it"
+    LINK_DOWN = "the link is lost"
 
 
 TRANSITIONS: dict[State, dict[Event, State]] = {
-    State.IDLE: {Event.CENTRED: State.IDLE, Event.DEFLECTED: State.HELD, Event.END: State.IDLE},
+    State.IDLE: {
+        Event.CENTRED: State.IDLE,
+        Event.DEFLECTED: State.HELD,
+        Event.END: State.IDLE,
+        Event.OVERRIDE: State.OVERRIDING,
+        Event.LINK_DOWN: State.IDLE,
+    },
     State.HELD: {
         Event.CENTRED: State.IDLE,
         Event.DEFLECTED: State.HELD,
         Event.SILENCE: State.IDLE,
         Event.END: State.IDLE,
+        Event.OVERRIDE: State.OVERRIDING,
+        Event.LINK_DOWN: State.IDLE,
+    },
+    State.OVERRIDING: {
+        Event.END: State.OVERRIDING,
+        Event.OVERRIDDEN: State.IDLE,
+        Event.LINK_DOWN: State.IDLE,
     },
 }
-"""The pair that is missing cannot happen: the silence of centred sticks is not noticed."""
+"""The pairs that are missing cannot happen: the silence of centred sticks is not noticed."""
 
 
 @dataclass(frozen=True)
@@ -78,10 +94,28 @@ class Sticks:
         return not any((self.forward, self.right, self.turn, self.climb))
 
 
+@dataclass(frozen=True)
+class StickInput:
+    """The sticks that count."""
+
+    state: State = State.IDLE
+    client: Hashable = None
+    """Client that holds them."""
+    action: asyncio.Task[None] | None = None
+    """The action by which a joystick takes the drone over."""
+
+
 class ManualFlight(PlainTask):
     """Flies one vehicle by the sticks of ground stations: the hovering mode Position."""
 
-    rules = TaskRules(texts.Subject(FlightMode.POSITION.value), wait=STOP_WAIT, is_hover=True, is_flight=False)
+    rules = TaskRules(
+        texts.Subject(FlightMode.POSITION.value),
+        wait=STOP_WAIT,
+        is_hover=True,
+        ends_landing=Extent.ALL,
+        ends_return=Extent.ALL,
+        is_flight=False,
+    )
     mode = FlightMode.POSITION
 
     def __init__(
@@ -99,13 +133,20 @@ class ManualFlight(PlainTask):
         self._refused = refused
         self.override = JoystickOverride()
         self._overridable = overridable
-        self._overriding = False
-        self.state = State.IDLE
         self._vehicle = vehicle
         self._clock = clock
-        self._pilot: Hashable = None
-        self._said = -math.inf
+        self._input = StickInput()
         self._silence = Alarm(self._expired)
+
+    @property
+    def state(self) -> State:
+        """The state of the sticks."""
+        return self._input.state
+
+    @property
+    def holder(self) -> Hashable:
+        """The client that holds deflected sticks; None: no client does."""
+        return self._input.client
 
     def receive(self, sender: Hashable, sticks: Sticks, *, overrides: bool = False) -> OperatorText | None:
         """Take a client's stick positions; return why they do not fly the drone, or None.
@@ -114,13 +155,13 @@ class ManualFlight(PlainTask):
         """
         vehicle = self._vehicle
         if overrides and self._takes_over(sender, sticks):
-            self._overriding = True
-            override = vehicle.control.run(sender, self._override(sender, sticks))
-            override.add_done_callback(self._overridden)
-        if self._overriding:
+            action = vehicle.control.run(sender, self._override(sender, sticks))
+            self._let_go(Event.OVERRIDE, action)
+            action.add_done_callback(self._overridden)
+        if self.state is State.OVERRIDING:
             return None
         sticks = replace(sticks, climb=self.override.climb(sender, sticks.climb))
-        if self.state is State.HELD and sender != self._pilot:
+        if self.state is State.HELD and sender != self._input.client:
             return None if sticks.centred else texts.OTHER_STICKS
         if sticks.centred:
             self._let_go(Event.CENTRED)
@@ -131,10 +172,8 @@ class ManualFlight(PlainTask):
         limits = vehicle.drone.piloting.limits
         if limits is None:
             return texts.TILT_UNKNOWN
-        self.state, self._pilot = TRANSITIONS[self.state][Event.DEFLECTED], sender
-        self._said = self._clock.monotonic()
-        if self._silence.at is None:
-            self._watch()
+        self._input = StickInput(TRANSITIONS[self.state][Event.DEFLECTED], sender)
+        self._silence.set(self._clock.monotonic() + SILENCE)
         vehicle.drone.piloting.pilot(
             PilotingCommand(
                 roll_deg=sticks.right * limits.tilt_deg,
@@ -148,7 +187,7 @@ class ManualFlight(PlainTask):
     def _takes_over(self, sender: Hashable, sticks: Sticks) -> bool:
         """True at the moment at which this client's joystick takes the drone over."""
         largest = max(abs(sticks.forward), abs(sticks.right), abs(sticks.turn))
-        if not self.override.moved(sender, largest, self._clock.monotonic()) or self._overriding:
+        if not self.override.moved(sender, largest, self._clock.monotonic()) or self.state is State.OVERRIDING:
             return False
         if self._vehicle.drone.controller.pilot_acquired_control or self._refused() is not None:
             return False
@@ -162,11 +201,12 @@ class ManualFlight(PlainTask):
 
     def _overridden(self, task: asyncio.Task[None]) -> None:
         """Sticks count again: the drone was taken over, or another action came in between."""
-        self._overriding = False
+        if task is self._input.action:
+            self._let_go(Event.OVERRIDDEN)
 
     def silent(self, sender: Hashable) -> None:
         """Centre the sticks when this client holds them: it has released all its channels."""
-        if sender == self._pilot:
+        if sender == self._input.client:
             self._let_go(Event.CENTRED)
 
     def _objection(self, sticks: Sticks) -> OperatorText | None:
@@ -183,32 +223,23 @@ class ManualFlight(PlainTask):
 
     def end(self) -> list[asyncio.Task[None]]:
         """End this flight task: something else flies the drone now."""
-        self._let_go(Event.END)
+        self._let_go(Event.END, self._input.action)
         return []
 
     def link_down(self) -> None:
         """Release the sticks when the drone is disconnected."""
-        self._silence.cancel()
         self.override.forget()
-        self._overriding = False
-        self.state, self._pilot, self._said = State.IDLE, None, -math.inf
+        self._let_go(Event.LINK_DOWN)
 
-    def _let_go(self, event: Event) -> None:
+    def _let_go(self, event: Event, action: asyncio.Task[None] | None = None) -> None:
         """Centre the sticks if a client held them."""
         held = self.state is State.HELD
-        self.state, self._pilot = TRANSITIONS[self.state][event], None
+        self._input = StickInput(TRANSITIONS[self.state][event], action=action)
         if held:
             self._silence.cancel()
             with contextlib.suppress(LinkLost):
                 self._vehicle.drone.piloting.pilot(None)
 
     def _expired(self) -> None:
-        if self._clock.monotonic() - self._said < SILENCE:
-            self._watch()
-        elif self.state is State.HELD:
-            self._let_go(Event.SILENCE)
-            self._vehicle.text(Severity.WARNING, texts.STICKS_SILENT)
-
-    def _watch(self) -> None:
-        """Come back when they have been silent for too long."""
-        self._silence.set(self._said + SILENCE)
+        self._let_go(Event.SILENCE)
+        self._vehicle.text(Severity.WARNING, texts.STICKS_SILENT)

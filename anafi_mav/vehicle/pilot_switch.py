@@ -11,12 +11,10 @@ from collections.abc import Awaitable, Callable
 
 from anafi_mav import texts
 from anafi_mav.drone.controller.controller import Controller
-from anafi_mav.errors import AnafiMavError
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.control import Request
-from anafi_mav.vehicle.base.refusal import Refused, text_of
-from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.flight_policy import TRANSITIONS, Event, State, refusal_of
 
 
@@ -24,7 +22,10 @@ class PilotSwitch:
     """The explicit choice between the pilot at the Skycontroller and programs."""
 
     def __init__(self, aircraft: Aircraft, controller: Controller, stop: Callable[[], Awaitable[None]]) -> None:
-        """`stop` ends all flight tasks and the motion; returns once the drone hovers or stands."""
+        """`stop` ends all flight tasks and the motion, and never raises.
+
+        It returns once the drone hovers or stands, or does not confirm it.
+        """
         self._aircraft = aircraft
         self._controller = controller
         self._stop = stop
@@ -76,24 +77,14 @@ class PilotSwitch:
             self._giving += 1
             self._given.clear()
             try:
-                await self._give()
+                await self._stop()
+                await self._controller.hand_back()  # also of a drone that has not confirmed its stop
             finally:
                 self._controller.give_back()  # cancelled before, the sticks would stay those of programs
                 self._giving -= 1
                 if not self._giving:
                     self._given.set()
                 self._enter(Event.GIVE)
-
-    async def _give(self) -> None:
-        """End what flies, and give sticks and source to the pilot.
-
-        The pilot gets both also when the drone does not confirm its stop.
-        """
-        try:
-            await self._stop()
-        except AnafiMavError as error:
-            self._aircraft.text(Severity.WARNING, text_of(error))
-        await self._controller.hand_back()
 
     def link_down(self) -> None:
         """The connection ended: the Skycontroller has sticks and source again."""

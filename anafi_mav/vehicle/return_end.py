@@ -37,6 +37,7 @@ from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.flight_task import PlainTask, TaskRules
 from anafi_mav.vehicle.base.flying import LANDING
 from anafi_mav.vehicle.base.geo_point import GeoPoint
+from anafi_mav.vehicle.base.right import Extent
 from anafi_mav.vehicle.base.severity import Severity
 
 logger = logging.getLogger(__name__)
@@ -116,7 +117,13 @@ class _GivenHome:
 class ReturnEnd(PlainTask):
     """The flight task Return: a commanded return, until the drone has landed or hovers."""
 
-    rules = TaskRules(texts.RETURN, is_flight=False)
+    rules = TaskRules(
+        texts.RETURN,
+        ends_landing=Extent.COMMANDED,
+        ends_return=Extent.COMMANDED,
+        follows=True,
+        is_flight=False,
+    )
     mode = None
     """The drone reports that it returns; see `shown`."""
 

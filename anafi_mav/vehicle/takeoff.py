@@ -9,13 +9,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Callable, Coroutine, Hashable
+from dataclasses import replace
 from typing import Any
 
 from anafi_mav import texts
 from anafi_mav.clock import Alarm
 from anafi_mav.drone.events import AltitudeChanged, FlyingState, FlyingStateChanged
 from anafi_mav.errors import AnafiMavError
-from anafi_mav.texts import Subject
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import check_height
 from anafi_mav.vehicle.base.control import Control
@@ -24,8 +24,9 @@ from anafi_mav.vehicle.base.flying import AIRBORNE
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, Rejected, Unfinished, not_ready, reason_of
 from anafi_mav.vehicle.base.requester import By
-from anafi_mav.vehicle.base.right import Right
+from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.takeoff_machine import Event, RunningTakeoff, State, TakeoffSituation, WaitingTakeoff, step
 
 AUTO_DISARM = 10.0
 """s that an armed vehicle waits for a take-off (as PX4's COM_DISARM_PRFLT)."""
@@ -62,8 +63,8 @@ class _Waiting(PlainTask):
 
     mode = None
 
-    def __init__(self, what: Subject, control: Control) -> None:
-        self.rules = TaskRules(what, keeps_below=True)
+    def __init__(self, rules: TaskRules, control: Control) -> None:
+        self.rules = replace(rules, keeps_below=True)
         self._control = control
         self._task = asyncio.current_task()
 
@@ -80,32 +81,18 @@ class _Waiting(PlainTask):
 class Takeoff(PlainTask):
     """The way of one vehicle from standing disarmed to hovering at a height."""
 
-    rules = TaskRules(texts.TAKEOFF, keeps_below=True)
+    rules = TaskRules(texts.TAKEOFF, keeps_below=True, ends_landing=Extent.ALL)
     mode = None
     """The drone reports that it takes off."""
 
     def __init__(self, vehicle: Aircraft, armed: Callable[[Hashable], None]) -> None:
-        self.height = 2.5
-        """m above take-off for a take-off that names no height (PX4's default of MIS_TAKEOFF_ALT)."""
-        self.hand_launch = False
-        """Arming starts the motors and waits for the drone to be thrown (a parameter; Parrot's UserTakeOff)."""
         self._vehicle = vehicle
         self._tell_armed = armed
         """Called with a client that has armed: a mission that waits for its arming begins."""
-        self._armed = False
-        self._armed_by: set[Hashable] = set()
-        """Clients that have armed since the vehicle was disarmed last."""
-        self._reached = False
-        """The last take-off has reached its height."""
-        self._climbing = False
-        self._pending: tuple[float, Hashable] | None = None
-        """Height of a take-off that waits for its client to arm, and the client."""
-        self._disarming = Alarm(self._auto_disarm)
-        """Runs while an armed vehicle waits for a take-off."""
-        self._lapsing = Alarm(self._lapsed)
-        """Runs while a take-off waits for its client to arm."""
-        self._background: asyncio.Task[None] | None = None
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._situation: TakeoffSituation[asyncio.Task[Any]] = TakeoffSituation()
+        """Arming, and the take-off that waits for it or is under way; its task returns True at the asked height."""
+        self._alarm = Alarm(self._on_alarm)
+        """Set to the situation's deadline."""
 
     @property
     def armed(self) -> bool:
@@ -113,17 +100,17 @@ class Takeoff(PlainTask):
 
         What flies is armed in any case (`Aircraft.armed`).
         """
-        return self._armed
+        return self._situation.arming is not None
 
     @property
     def climbing(self) -> bool:
         """The climb that follows the drone's own take-off is under way."""
-        return self._climbing
+        return self._situation.state is State.CLIMBING
 
     @property
     def under_way(self) -> bool:
         """An accepted take-off has not reached its height yet."""
-        return self._background is not None and not self._background.done()
+        return self._situation.task is not None
 
     @property
     def rises(self) -> bool:
@@ -132,7 +119,7 @@ class Takeoff(PlainTask):
 
     def is_armed_by(self, client: Hashable) -> bool:
         """Has this client armed the vehicle for the flight that begins now?"""
-        return self._armed and client in self._armed_by
+        return self._situation.arming is not None and client in self._situation.arming.clients
 
     # What clients ask for. Each returns when the drone confirmed, or raises.
 
@@ -151,20 +138,15 @@ class Takeoff(PlainTask):
             return
         if problems := vehicle.prearm_problems():
             raise not_ready(problems)
-        if self.hand_launch:
+        if vehicle.settings.hand_launch:
             async with vehicle.control.acquire(HAND_LAUNCH, by=by):
                 await vehicle.drone.piloting.hand_launch()
             return
-        if not self._armed:
-            self._armed_by.clear()
-        self._armed = True
-        self._armed_by.add(client)
-        self._disarming.set_in(AUTO_DISARM)
+        waiting = self._situation.attempt
+        self._enter(step(self._situation, Event.ARM, client=client, until=_after(AUTO_DISARM)))
         vehicle.changed()
-        if self._pending is not None and self._pending[1] == client:
-            height, _ = self._pending
-            self._forget()
-            self._start_background(self._take_off_and_report(height, by))
+        if isinstance(waiting, WaitingTakeoff) and waiting.client == client:
+            self._start(self._take_off_and_report(waiting.height, by))
         else:
             self._tell_armed(client)
 
@@ -194,7 +176,7 @@ class Takeoff(PlainTask):
             await self._vehicle.drone.piloting.land()
 
     def _set_disarmed(self) -> None:
-        self._armed = False
+        self._enter(step(self._situation, Event.DISARM))
         self._vehicle.changed()
 
     @property
@@ -207,25 +189,25 @@ class Takeoff(PlainTask):
         return vehicle.flying_state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF)
 
     async def take_off(self, ato: float | None, by: Right) -> None:
-        """Take off to `ato` m (None: `height`). Returns when the drone confirmed that it takes off.
+        """Take off to `ato` m (None: as set). Returns when the drone confirmed that it takes off.
 
         Disarmed, it returns at once and the take-off waits `ARM_WAIT` for this client to arm.
         """
         vehicle = self._vehicle
-        height = self.height if ato is None else ato
+        height = vehicle.settings.takeoff_height if ato is None else ato
         check_height(vehicle, height)
         if not vehicle.on_ground:
             raise Refused(texts.TAKEOFF, texts.IN_AIR)
         if problems := vehicle.prearm_problems():
             raise not_ready(problems)
-        if not self._armed:
+        if not self.armed:
             async with vehicle.control.acquire(self, by=by):  # what lifts off while it waits is replaced now
-                self._pending = (height, by.client)
-                self._lapsing.set_in(ARM_WAIT)
+                waiting = WaitingTakeoff(height, by.client, _after(ARM_WAIT))
+                self._enter(step(self._situation, Event.REQUEST, attempt=waiting))
             return
         async with vehicle.control.acquire(self, by=by, below=self._below, rules=_RISES):
             await self._lift_off()
-        self._start_background(self._climb(height, by))
+        self._start(self._climb(height, by))
 
     async def launch(self) -> None:
         """Take off to the drone's own height, for setpoints; returns when the drone confirmed it."""
@@ -241,18 +223,18 @@ class Takeoff(PlainTask):
         await self._land(by)
         self._set_disarmed()
 
-    async def over(self, what: Subject) -> None:
+    async def over(self, rules: TaskRules) -> None:
         """Wait until an accepted take-off has reached its height.
 
         Returns at once when the drone does not rise. When a Hold has ended the climb, the drone still rises to its
         own height: the wait is then for its first hover. (MAVSDK's goto_location sends Hold first.) Of several
-        commands that wait the newest stays, the others are cancelled. Raises `Unfinished` when the take-off fails, or
-        lasts for longer than `TAKEOFF_WAIT`.
+        commands that wait the newest stays, the others are cancelled. `rules` are those of the flight task that waits.
+        Raises `Unfinished` when the take-off fails, or lasts for longer than `TAKEOFF_WAIT`.
         """
         if not self.rises:
             return
-        control = self._vehicle.control
-        waiting = _Waiting(what, control)
+        control, what = self._vehicle.control, rules.what
+        waiting = _Waiting(rules, control)
         control.succeed(waiting)
         end = asyncio.get_running_loop().create_task(self._until_risen())
         try:
@@ -266,14 +248,10 @@ class Takeoff(PlainTask):
             control.release(waiting)
 
     async def _until_risen(self) -> bool:
-        """Wait for the end of a take-off, or of a rise.
-
-        True: it has reached its height. Never raises.
-        """
-        if self.under_way:
-            assert self._background is not None
-            await asyncio.wait({self._background})
-            return self._reached
+        """Wait for the end of a take-off, or of a rise; True: it has reached its height."""
+        if (task := self._situation.task) is not None:
+            await asyncio.wait({task})
+            return not task.cancelled() and task.result() is True
         with contextlib.suppress(AnafiMavError):
             await self._vehicle.drone.expect(FlyingStateChanged, lambda m: m.state not in _RISING, TAKEOFF_WAIT)
         return self._vehicle.in_air
@@ -285,12 +263,7 @@ class Takeoff(PlainTask):
 
         Returns tasks that are about to end.
         """
-        self._forget()
-        task, self._background, self._climbing = self._background, None, False
-        if task is None or task is asyncio.current_task():
-            return []
-        task.cancel()
-        return [task]
+        return self._enter(step(self._situation, Event.END))
 
     @property
     def _below(self) -> FlightTask | None:
@@ -304,28 +277,19 @@ class Takeoff(PlainTask):
 
         A take-off that has yet to begin is not disturbed, and reports its own failure.
         """
-        return self.under_way and not self._climbing
-
-    def _forget(self) -> None:
-        """Cancel the take-off that waits for arming, if there is one."""
-        if self._pending is not None:
-            self._pending = None
-            self._lapsing.cancel()
+        return self._situation.state is State.LIFTING
 
     def came_down(self) -> None:
         """The drone has come down: it is disarmed, and nothing of before lifts it off again."""
-        self._armed = False
-        self._forget()
+        self._enter(step(self._situation, Event.GROUND))
 
     def left_ground(self) -> None:
         """The drone has left the ground: arming does not lapse any more."""
-        self._disarming.cancel()
+        self._enter(step(self._situation, Event.LIFT))
 
     def link_down(self) -> None:
         """Disarm and cancel everything that was commanded before."""
-        self._armed = False
-        for task in tuple(self._tasks):
-            task.cancel()
+        self._enter(step(self._situation, Event.LINK_DOWN))
 
     # Taking off.
 
@@ -334,15 +298,15 @@ class Takeoff(PlainTask):
 
         Until it has succeeded or failed, the armed state does not lapse.
         """
-        self._disarming.cancel()
+        self._enter(step(self._situation, Event.LIFT))
         self._vehicle.control.resume()  # a pause that comes from here on ends this take-off
         try:
             await self._vehicle.drone.piloting.take_off()
         finally:
-            if self._armed and self._vehicle.on_ground:
-                self._disarming.set_in(AUTO_DISARM)
+            if self._vehicle.on_ground:
+                self._enter(step(self._situation, Event.STAND, until=_after(AUTO_DISARM)))
 
-    async def _take_off_and_report(self, height: float, by: By) -> None:
+    async def _take_off_and_report(self, height: float, by: By) -> bool:
         """Take off after the wait for arming; failures are sent as texts.
 
         The command was answered long ago, and its permission may have ended since.
@@ -353,14 +317,14 @@ class Takeoff(PlainTask):
         except AnafiMavError as error:
             self._vehicle.text(Severity.ERROR, texts.TAKEOFF_FAILED.fill(error=reason_of(error)))
             self._over()
-            return
+            return False
         self._vehicle.control.adopt(self, below=self._below)
-        await self._climb(height, by)
+        return await self._climb(height, by)
 
-    async def _climb(self, height: float, by: By) -> None:
-        """From the drone's own hover height to the asked one."""
+    async def _climb(self, height: float, by: By) -> bool:
+        """From the drone's own hover height to the asked one; True when it is reached."""
         vehicle = self._vehicle
-        self._climbing = True
+        self._enter(step(self._situation, Event.CLIMB))
         vehicle.changed()
         try:
             if not vehicle.in_air:
@@ -372,37 +336,55 @@ class Takeoff(PlainTask):
             vehicle.control.check(self, by)
             if abs(height - present) > CLOSE_ENOUGH:
                 await vehicle.drone.piloting.move_by(0.0, 0.0, present - height, 0.0)
-            self._reached = True
+            return True
         except AnafiMavError as error:
             vehicle.text(Severity.ERROR, texts.CLIMB_ABORTED.fill(height=height, error=reason_of(error)))
+            return False
         finally:
             self._over()
 
     def _over(self) -> None:
         """The background part has ended: its successor flies, or the drone hovers."""
-        if self._background is asyncio.current_task():
-            self._climbing, self._background = False, None
+        if self._situation.task is asyncio.current_task():
+            self._enter(step(self._situation, Event.END))
             self._vehicle.control.release(self)
             self._vehicle.changed()
 
-    def _start_background(self, work: Coroutine[Any, Any, None]) -> None:
-        self._reached = False
+    # Machinery.
+
+    def _start(self, work: Coroutine[Any, Any, bool]) -> None:
+        """Begin the part of a take-off that no command waits for."""
         task = asyncio.get_running_loop().create_task(work)
-        self._background = task
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        self._enter(step(self._situation, Event.START, attempt=RunningTakeoff(task)))
 
-    # What lapses.
+    def _enter(self, now: TakeoffSituation[asyncio.Task[Any]]) -> list[asyncio.Task[None]]:
+        """Enter a situation; return the task of the take-off that ends thereby, if there is one."""
+        task, self._situation = self._situation.task, now
+        if now.deadline is None:
+            self._alarm.cancel()
+        elif now.deadline != self._alarm.at:
+            self._alarm.set(now.deadline)
+        if task is None or task is now.task or task is asyncio.current_task():
+            return []
+        task.cancel()
+        return [task]
 
-    def _lapsed(self) -> None:
-        self._vehicle.control.release(self)
-        self._vehicle.text(Severity.WARNING, texts.TAKEOFF_CANCELLED.fill(seconds=ARM_WAIT))
-
-    def _auto_disarm(self) -> None:
-        if self._vehicle.drone.piloting.about_to_fly:
-            self._disarming.set_in(
-                AUTO_DISARM
-            )  # a mission's start is with the drone: who says disarmed now may see it rise
-        elif self._armed and self._vehicle.on_ground:
-            self._vehicle.text(Severity.INFO, texts.DISARMED)
+    def _on_alarm(self) -> None:
+        """A take-off has waited too long for its client to arm, or the armed state for a take-off."""
+        vehicle, now = self._vehicle, self._situation
+        if isinstance(now.attempt, WaitingTakeoff) and now.attempt.until == now.deadline:
+            self._enter(step(now, Event.END))
+            vehicle.control.release(self)
+            vehicle.text(Severity.WARNING, texts.TAKEOFF_CANCELLED.fill(seconds=ARM_WAIT))
+        elif vehicle.drone.piloting.about_to_fly:
+            # a mission's start is with the drone: who says disarmed now may see it rise
+            self._enter(step(now, Event.STAND, until=_after(AUTO_DISARM)))
+        elif vehicle.on_ground:
+            vehicle.text(Severity.INFO, texts.DISARMED)
             self._set_disarmed()
+        else:
+            self._enter(step(now, Event.LIFT))
+
+
+def _after(seconds: float) -> float:
+    return asyncio.get_running_loop().time() + seconds

@@ -12,7 +12,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from anafi_mav import texts
 from anafi_mav.clock import Clock
@@ -53,7 +53,7 @@ from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.controller_inputs import ControllerInputs
 from anafi_mav.vehicle.fence.rally import RallyPoints
-from anafi_mav.vehicle.flight_policy import first_refusal
+from anafi_mav.vehicle.flight_policy import first_refusal, operator_refusal_of
 from anafi_mav.vehicle.follow_flight import FollowFlight
 from anafi_mav.vehicle.guided_flight import GuidedFlight
 from anafi_mav.vehicle.hold_rule import APART, HoldRule
@@ -63,6 +63,7 @@ from anafi_mav.vehicle.link_loss import LossPolicy
 from anafi_mav.vehicle.manual_flight import ManualFlight
 from anafi_mav.vehicle.mission.flight import MissionFlight
 from anafi_mav.vehicle.offboard.flight import OffboardFlight
+from anafi_mav.vehicle.operator_control import Need, OperatorControl
 from anafi_mav.vehicle.pilot_switch import PilotSwitch
 from anafi_mav.vehicle.return_end import ReturnEnd
 from anafi_mav.vehicle.takeoff import Takeoff
@@ -79,6 +80,12 @@ UNENDABLE = (
     NOT_COUNTED,
 )
 """Why a landing or a return is not ended."""
+
+POSITION_OLD = 3.0
+"""s without a GPS location, which an ANAFI reports once a second, after which the last one is no position in flight."""
+
+LOCATIONS_MISSED = 3
+"""A drone that reports its location more rarely (a slowed simulator) may miss as many."""
 
 LANDS_AFTER_RETURN = 2.0
 """s after a return that the drone ends by landing within which the landing begins."""
@@ -112,6 +119,35 @@ class Health(enum.Enum):
     EMERGENCY = 6
 
 
+@dataclass(frozen=True)
+class LinkFacts:
+    """Facts that end with the link to the drone."""
+
+    flying: FlyingState | None = None
+    """Newest flying state that was handled."""
+    located_at: float = -math.inf
+    """When the newest GPS location arrived (s)."""
+    location_every: float = 0.0
+    """s between it and the one before."""
+    intended: FlightMode | None = None
+    """The mode that a client last asked for by name or number."""
+    lands_next: tuple[int, float] | None = None
+    """A return has finished that the drone ends by landing: the epoch then, and until when it is due."""
+
+
+@dataclass(frozen=True)
+class FlightFacts:
+    """Facts of the present flight; on the ground those of the last one."""
+
+    origin: GeoPoint | None = None
+    earlier_takeoff: Position | None = None
+    """The take-off place that the drone reported when it landed: of the flight before."""
+    landing_ended_at: float = -math.inf
+    """When a client last ended a landing (s)."""
+    aborted_return: AbortedReturn | None = None
+    """The return of the drone's own that a client has ended, while that has to be repeated to everybody."""
+
+
 class Vehicle(Aircraft):
     """One drone, flown. All methods run on the event loop's thread."""
 
@@ -128,39 +164,44 @@ class Vehicle(Aircraft):
         self.gcs_loss = LossPolicy()
         """Reaction to the loss of all ground stations (a parameter)."""
         self.rally = RallyPoints()
-        self.intended: FlightMode | None = None
-        """The mode that a client last asked for by name or number."""
+        self.link_facts = LinkFacts()
+        self.flight_facts = FlightFacts()
         self.allow_kill = allow_kill
-        self._lands_next: tuple[int, float] | None = None
-        """A return has finished that the drone ends by landing: the epoch then, and until when it is due."""
         self._initiators = Initiators()
-        self.landing_ended_at = -math.inf
-        """When a client last ended a landing."""
         self.holds = HoldRule()
         """Which Holds of clients count against a return of the drone's own."""
-        self.aborted_return: AbortedReturn | None = None
-        """The return of the drone's own that a client has ended, while that has to be repeated to everybody."""
-        self._last_flying: FlyingState | None = None
         self.return_end = ReturnEnd(self, self._land_after_return)
-        self._takeoff_before: Position | None = None
-        """The take-off place that the drone reported when it landed: of the flight that has ended."""
         self.mission = MissionFlight(self, clock)
         self.takeoff = Takeoff(self, self.mission.armed)
         self.guided = GuidedFlight(self)
         self.offboard = OffboardFlight(self, clock, self.takeoff)
         self.manual = ManualFlight(self, clock, lambda: self.overridable, lambda: self.pilot_switch.objection)
         self.pilot_switch = PilotSwitch(self, drone.controller, lambda: self.control.perform(self.stop_for_pilot()))
-        self.control.policy = first_refusal(self.pilot_switch.refusal)
+        self.operators = OperatorControl()
+        """The operator among the stations, if one has requested control."""
+        self.control.policy = first_refusal(
+            self.pilot_switch.refusal, lambda request: operator_refusal_of(self.operators, request)
+        )
         self.controller_inputs = ControllerInputs(drone.controller)
         self.follow = FollowFlight(self, lambda: self.offboard.motion, clock)
-        self.plan_ids: dict[int, int] = {}
-        """Opaque ids of the plans that are in force, by MAV_MISSION_TYPE."""
 
     # What the vehicle is.
 
     @property
     def armed(self) -> bool:
         return self.takeoff.armed or (self.flying_state is not None and not self.on_ground)
+
+    @property
+    def origin(self) -> GeoPoint | None:
+        return self.flight_facts.origin
+
+    @property
+    def position_is_old(self) -> bool:
+        gps, facts = self.drone.gps.state, self.link_facts
+        if not gps.fixed or gps.location is None or self.flying_state is None or self.on_ground:
+            return False
+        patience = max(POSITION_OLD, LOCATIONS_MISSED * facts.location_every)
+        return self._clock.monotonic() - facts.located_at > patience
 
     @property
     def landed(self) -> Landed:
@@ -194,9 +235,9 @@ class Vehicle(Aircraft):
     @property
     def _is_about_to_land(self) -> bool:
         """Between a return and its landing the drone reports neither; no mode is shown in between."""
-        if self._lands_next is None or not self.in_air:
+        if self.link_facts.lands_next is None or not self.in_air:
             return False
-        epoch, until = self._lands_next
+        epoch, until = self.link_facts.lands_next
         return epoch == self.control.epoch and self._clock.monotonic() < until
 
     @property
@@ -284,15 +325,14 @@ class Vehicle(Aircraft):
             raise Refused(texts.RETURN, texts.ON_GROUND)
         if self.return_end.shown:
             return  # it waits above home or lands there, and would climb and fly home once more
-        commanded = replace(by, extent=Extent.COMMANDED) if isinstance(by, Right) else None
         if lands := self.landing:
-            self._require_endable(texts.RETURN, commanded)
+            self._require_endable(self.return_end, by)
             if self.drone.home.state.rth == RthState.UNAVAILABLE:  # the landing would be ended for nothing
                 raise Refused(texts.RETURN, texts.RETURN_UNAVAILABLE)
         async with self.control.acquire(self.return_end, by=by):
             if (lands or self.landing) and await self.drone.piloting.settle_landing():
-                self._require_endable(texts.RETURN, commanded)
-                await self._end_landing(texts.RETURN, commanded)
+                self._require_endable(self.return_end, by)
+                await self._end_landing(by)
             self._initiators.return_commanded(self._clock.monotonic())
             attempt = self.return_end.command()
             try:
@@ -308,21 +348,29 @@ class Vehicle(Aircraft):
         `chosen`: a client has chosen the mode by name or number. `pause`: setpoints of every client are ignored from
         now on; what flew is what DO_PAUSE_CONTINUE goes on with.
         """
-        what, right = texts.Subject(mode.value), right_of(by)
-        self._require_endable(what, right)
+        hover = Hover(mode, client_of(by) if chosen else None, self._paused_task if pause else None)
+        task = self.manual if mode is FlightMode.POSITION else hover
+        self._require_endable(task, by)
         own = self.returning_by_itself
         rising = self.drone.piloting.about_to_fly
         pauses = pause or (self.control.paused and mode is self.mode)
-        resumes = self._paused_task if pause else None
-        hover = Hover(mode, client_of(by) if chosen else None, resumes)
-        async with self.control.acquire(
-            self.manual if mode is FlightMode.POSITION else hover, by=by, pauses=pauses
-        ) as grant:
+        async with self.control.acquire(task, by=by, pauses=pauses) as grant:
             if not self.on_ground or rising:
-                await self._stop(what, right, own=own)
+                await self._stop(task, by, own=own)
             grant.begin(pauses=pauses and (rising or not self.on_ground))
         if rising:
             self.text(Severity.WARNING, texts.MODE_MAY_RISE.fill(mode=mode.value))
+
+    def end_inputs_of_others(self) -> None:
+        """End flight by setpoints or sticks of a station that is not the operator.
+
+        The drone hovers. A goto, a mission and what else flies by itself continue: the new operator decides about them.
+        """
+        pilot = self.offboard.streaming_pilot
+        if pilot is not None and (reason := self.operators.objection(system_of(pilot) or 0, Need.FLY)) is not None:
+            self.control.lose(reason)
+        if (holder := self.manual.holder) is not None and self.operators.objection(system_of(holder) or 0, Need.FLY):
+            self.manual.silent(holder)
 
     async def stop_for_pilot(self) -> None:
         """End what flies or is about to fly, for the pilot; return when the drone hovers or stands.
@@ -344,9 +392,9 @@ class Vehicle(Aircraft):
         if may_rise or self.flying_state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF):
             await self.takeoff.abort(by)
             return
-        async with control.acquire(Hover(), by=by):
+        async with control.acquire(hold := Hover(), by=by):
             if not self.on_ground and not self.descends:
-                await self._stop(texts.Subject(FlightMode.HOLD.value), None)
+                await self._stop(hold, by)
 
     @property
     def _paused_task(self) -> FlightTask | None:
@@ -368,22 +416,21 @@ class Vehicle(Aircraft):
         if not self.landing or self.on_ground:
             await self.takeoff.take_off(ato, by)
             return
-        self._require_endable(texts.TAKEOFF, by)
+        self._require_endable(self.takeoff, by)
         async with self.control.acquire(Hover(), by=by):
             if await self.drone.piloting.settle_landing():
-                await self._end_landing(texts.TAKEOFF, by, take_off=True)
+                await self._end_landing(by, take_off=True)
             if self.on_ground:
                 raise Refused(texts.LANDING, texts.ALREADY_LANDED, form=texts.NOT_ABORTED)
 
     async def set_mode(self, mode: FlightMode, by: Right) -> None:
         """Do what this mode means, for the client that chose it: Offboard flies its setpoints."""
-        self.intended = mode
-        commanded = replace(by, extent=Extent.COMMANDED)
+        self.link_facts = replace(self.link_facts, intended=mode)
         match mode:
             case FlightMode.HOLD | FlightMode.POSITION:
                 await self.hold(mode, by)
             case FlightMode.GUIDED:
-                await self.hold(mode, commanded, chosen=True)
+                await self.hold(mode, by, chosen=True)
             case FlightMode.LAND:
                 await self.land(by)
             case FlightMode.RETURN:
@@ -394,12 +441,12 @@ class Vehicle(Aircraft):
                 if self.descends and not self.offboard.streamed_for(by.client):
                     raise Refused(texts.OFFBOARD, texts.NO_SETPOINTS)
                 self.control.require_allowed(self.offboard, by)
-                await self._free(texts.OFFBOARD, commanded)
+                await self._free(self.offboard, by)
                 await self.offboard.engage(by)
             case FlightMode.MISSION:
                 if self.mission.there and not self.mission.flying:
                     self.control.require_allowed(self.mission, by)
-                    await self._free(texts.MISSION, commanded)
+                    await self._free(self.mission, by)
                 await self.mission.engage(by)
             case FlightMode.TERMINATED:
                 await self.terminate(by)
@@ -436,26 +483,29 @@ class Vehicle(Aircraft):
         forced = alerts.forced_landing not in (None, ForcedLandingReason.NONE) and not alerts.forced_landing_delay_s
         return self.flying_state == FlyingState.EMERGENCY_LANDING or (forced and self.flying_state in LANDING)
 
-    def _require_endable(self, what: OperatorText, by: Right | None) -> None:
-        """Raise `Refused` when the drone lands or returns, and `by` may not end that."""
-        all_of_them = by is not None and by.extent is Extent.ALL
-        if self.landing:
+    def _require_endable(self, task: FlightTask, by: By) -> None:
+        """Raise `Refused` when the drone lands or returns, and the task or `by` may not end that."""
+        what, right = task.rules.what, right_of(by)
+        lands = self.landing
+        ends = task.rules.ends_landing if lands else task.rules.ends_return
+        extent = None if right is None else right.covered(ends)
+        if lands:
             initiator = self._initiators.landing or Initiator.CLIENT
             if self._forced_landing:
                 raise Refused(what, texts.FORCED)
             if initiator is Initiator.PILOT:
                 raise Refused(what, texts.PILOT_LANDS)
-            if by is None or (initiator is Initiator.DRONE and not all_of_them):
+            if extent is None or (initiator is Initiator.DRONE and extent is not Extent.ALL):
                 raise Refused(what, texts.LANDS)
         elif self.returning:
             initiator = self._initiators.returning or Initiator.CLIENT
             if self.returning_by_itself:
-                self._require_own_endable(what, by if all_of_them else None)
+                self._require_own_endable(what, right if extent is Extent.ALL else None)
             elif initiator is Initiator.PILOT:
                 raise Refused(what, texts.PILOT_RETURNS)
-            elif by is None:
+            elif extent is None:
                 raise Refused(what, texts.RETURNS)
-        elif by is None and self.control.next is self.return_end:
+        elif extent is None and self.control.next is self.return_end:
             raise Refused(what, texts.RETURNS)
 
     def _require_own_endable(self, what: OperatorText, by: Right | None) -> None:
@@ -466,41 +516,41 @@ class Vehicle(Aircraft):
         if not by.counted:
             raise Refused(what, NOT_COUNTED)
 
-    async def _free(self, what: OperatorText, by: Right) -> None:
-        """End a landing or return that `by` may end; returns when the drone hovers.
+    async def _free(self, task: FlightTask, by: Right) -> None:
+        """End a landing or return that the task and `by` may end; returns when the drone hovers.
 
         Returns at once when the drone neither lands nor returns.
         """
         if self.descends:
-            self._require_endable(what, by)
+            self._require_endable(task, by)
             async with self.control.acquire(Hover(), by=by):
-                await self._stop(what, by)
+                await self._stop(task, by)
 
-    async def _stop(self, what: OperatorText, by: Right | None, *, own: bool = False) -> None:
-        """Hover, and end the landing or return that `by` may end.
+    async def _stop(self, task: FlightTask, by: By, *, own: bool = False) -> None:
+        """Hover, and end the landing or return that the task and `by` may end.
 
         `own`: the drone returned by itself when the command arrived. A return that it begins afterwards goes on.
         """
-        piloting, home = self.drone.piloting, self.drone.home
+        piloting, home, right = self.drone.piloting, self.drone.home, right_of(by)
         if self.landing:  # it may have begun during the wait for what flew
-            self._require_endable(what, by)
-        await self._end_landing(what, by)
-        announced = None if by is None else self._announced_for(by)
-        if own and by is not None and self.returning_by_itself:
+            self._require_endable(task, by)
+        await self._end_landing(by)
+        announced = None if right is None else self._announced_for(task, right)
+        if own and right is not None and self.returning_by_itself:
             reason = home.state.reason
             await piloting.cancel_return_home(even_its_own=True)
-            self._return_aborted(by, reason)
+            self._return_aborted(right, reason)
         await piloting.stop()
         # One asked for through another controller, or before the link was lost. Raises when it is the drone's own.
         await piloting.cancel_return_home()
         if await piloting.settle_landing() or self.landing:  # one that began meanwhile
-            self._require_endable(what, by)
-            await self._end_landing(what, by)
+            self._require_endable(task, by)
+            await self._end_landing(by)
             await piloting.stop()
-        if announced is not None and by is not None:
-            await self._answer_announced(announced, by)
+        if announced is not None and right is not None:
+            await self._answer_announced(announced, right)
 
-    def _announced_for(self, by: Right) -> bool | None:
+    def _announced_for(self, task: FlightTask, by: Right) -> bool | None:
         """A return is announced and this Hold counts.
 
         True: it cancels it, False: it is the first; None otherwise.
@@ -510,7 +560,7 @@ class Vehicle(Aircraft):
         if not cancellable:
             self.holds.withdraw()
             return None
-        if self.returning or by.extent is not Extent.ALL or not by.counted:
+        if self.returning or by.covered(task.rules.ends_return) is not Extent.ALL or not by.counted:
             return None
         return self.holds.answers(by.client, by.at)
 
@@ -535,10 +585,19 @@ class Vehicle(Aircraft):
 
         They are notified at once, and repeatedly.
         """
-        self.aborted_return = AbortedReturn(by.system, reason)
-        self.aborted_return.report(self, self._clock.monotonic())
+        aborted = AbortedReturn(by.system, reason)
+        self.flight_facts = replace(self.flight_facts, aborted_return=aborted)
+        aborted.report(self, self._clock.monotonic())
 
-    async def _end_landing(self, what: OperatorText, by: Right | None, *, take_off: bool = False) -> None:
+    def remind_of_aborted_return(self, now: float) -> None:
+        """Remind every client of a return that one of them has ended, while its reason lasts."""
+        aborted = self.flight_facts.aborted_return
+        if aborted is not None and not aborted.lasts(self):
+            self.flight_facts = replace(self.flight_facts, aborted_return=None)
+        elif aborted is not None and aborted.due(self, now):
+            aborted.report(self, now)
+
+    async def _end_landing(self, by: By, *, take_off: bool = False) -> None:
         """End the landing that the drone flies; at once when it flies none."""
         if self.flying_state not in LANDING:
             return
@@ -546,9 +605,9 @@ class Vehicle(Aircraft):
             await self.drone.piloting.end_landing(take_off=take_off)
         except CommandRejected as error:
             raise Refused(texts.LANDING, texts.from_below(error.reason), form=texts.NOT_ABORTED) from None
-        self.landing_ended_at = self._clock.monotonic()
-        if by is not None:
-            self.text(Severity.NOTICE, texts.LANDING_ABORTED.fill(system=by.system))
+        self.flight_facts = replace(self.flight_facts, landing_ended_at=self._clock.monotonic())
+        if (right := right_of(by)) is not None:
+            self.text(Severity.NOTICE, texts.LANDING_ABORTED.fill(system=right.system))
 
     # What the drone reports.
 
@@ -567,10 +626,11 @@ class Vehicle(Aircraft):
 
     def on_flying_state(self) -> None:
         """The drone's flying state changed."""
-        state, before = self.flying_state, self._last_flying
-        self._last_flying = state
+        state, before = self.flying_state, self.link_facts.flying
+        self.link_facts = replace(self.link_facts, flying=state)
         if state == before:
             return
+        takeoff = self.drone.home.state.takeoff_location
         self._note_landing(before)
         if state in ON_GROUND and before is not None:
             self.return_end.on_ground()
@@ -583,12 +643,11 @@ class Vehicle(Aircraft):
         elif state in TAKING_OFF and before in ON_GROUND:
             self.height.take_off()
             self._report_accuracy()
-            if (place := self.place) is not None:
-                self.origin = place
-            if self.drone.home.state.takeoff_location != self._takeoff_before:
+            self._set_origin(self.place)
+            if takeoff != self.flight_facts.earlier_takeoff:
                 self.on_takeoff_location()  # it was reported before the state
         if state in ON_GROUND:
-            self._takeoff_before = self.drone.home.state.takeoff_location
+            self.flight_facts = replace(self.flight_facts, earlier_takeoff=takeoff, aborted_return=None)
         if not self.on_ground:
             self.takeoff.left_ground()
             if before in ON_GROUND:
@@ -605,10 +664,9 @@ class Vehicle(Aircraft):
 
     def on_location(self) -> None:
         """A new GPS location."""
-        now = self._clock.monotonic()
-        if self._located_at > -math.inf:
-            self._location_every = now - self._located_at
-        self._located_at = now
+        now, facts = self._clock.monotonic(), self.link_facts
+        every = now - facts.located_at if facts.located_at > -math.inf else facts.location_every
+        self.link_facts = replace(facts, located_at=now, location_every=every)
         self.on_position()
 
     def on_position(self) -> None:
@@ -618,7 +676,7 @@ class Vehicle(Aircraft):
         if self.flying_state == FlyingState.LANDED:
             self.height.on_ground(amsl, ato)
             if self.origin is None:
-                self.origin = self.place
+                self._set_origin(self.place)
         elif self.flying_state is not None and self.height.in_flight(self.drone.product.state.flight_id, amsl, ato):
             self.text(Severity.WARNING, ESTIMATED)
 
@@ -635,7 +693,12 @@ class Vehicle(Aircraft):
         """
         location = self.drone.home.state.takeoff_location
         if location is not None and self.flying_state is not None and not self.on_ground:
-            self.origin = GeoPoint(location.latitude, location.longitude)
+            self._set_origin(GeoPoint(location.latitude, location.longitude))
+
+    def _set_origin(self, origin: GeoPoint | None) -> None:
+        """Adopt the origin of the local frame; None keeps the one of before."""
+        if origin is not None:
+            self.flight_facts = replace(self.flight_facts, origin=origin)
 
     def link_up(self, kept: TakeoffRecord | None) -> None:
         """Begin with a drone that has reported all its states.
@@ -646,7 +709,7 @@ class Vehicle(Aircraft):
         self.on_flying_state()
         self.on_location()  # the one that it has reported counts for as long as a new one
         if self.flying_state is not None and not self.on_ground:
-            self.origin = self._origin_in_flight(kept)
+            self.flight_facts = replace(self.flight_facts, origin=self._origin_in_flight(kept))
 
     def _origin_in_flight(self, kept: TakeoffRecord | None) -> GeoPoint | None:
         """Return where a drone took off that was found in the air; None when nothing reports it."""
@@ -688,7 +751,8 @@ class Vehicle(Aircraft):
         home = self.drone.home.state
         finished = home.rth == RthState.AVAILABLE and home.reason == ReturnReason.FINISHED
         lands = finished and home.ending == RthEndingBehavior.LANDING
-        self._lands_next = (self.control.epoch, self._clock.monotonic() + LANDS_AFTER_RETURN) if lands else None
+        due = self.control.epoch, self._clock.monotonic() + LANDS_AFTER_RETURN
+        self.link_facts = replace(self.link_facts, lands_next=due if lands else None)
         if self.returning:
             if self.mission.returns and not (self.returning_by_itself or self.return_end.active):
                 self.return_end.announce(self.return_end.command(), None)  # the mission's last item
@@ -709,10 +773,8 @@ class Vehicle(Aircraft):
         self.control.link_down()
         self.pilot_switch.link_down()
         self.takeoff.link_down()
-        self.intended = None
-        self._last_flying = None
-        self._located_at, self._location_every = -math.inf, 0.0
-        for task in (self.offboard, self.manual, self.follow):
+        self.link_facts = LinkFacts()
+        for task in (self.offboard, self.manual):
             task.link_down()
 
     @property
@@ -735,7 +797,7 @@ class Vehicle(Aircraft):
             if not self.landing:
                 self.control.release(self.return_end)
             return
-        if self.drone.controller.pilot_has_source:
+        if self.control.leaves_to_pilot(Source.GATEWAY):
             if self.drone.piloting.about_to_fly:
                 await self.drone.piloting.land()
             return
@@ -758,8 +820,6 @@ class Vehicle(Aircraft):
                 plan_lands=self.mission.ending,
                 skycontroller=self.drone.controller.present,
             )
-        if self.on_ground:
-            self.aborted_return = None
 
     def _note_return(self) -> None:
         """Record the initiator of the return that begins or ends."""

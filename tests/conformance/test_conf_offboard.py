@@ -35,6 +35,7 @@ from support.world import HOLD, HOME, World, world
 
 from anafi_mav import geo, mav_enums
 from anafi_mav.arsdk.messages import ardrone3, piloting_style
+from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.vehicle.offboard.stream import GUIDED_TIMEOUT, LATE_AFTER_STREAM
 
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
@@ -465,6 +466,28 @@ async def test_from_a_position_to_a_velocity_and_back() -> None:
             began = now()
             await arrived(w, began)
         assert (w.drone.pose.north, w.drone.pose.east) == pytest.approx((5.0, 5.0), abs=1.0)
+
+
+async def test_late_end_of_a_move_is_not_that_of_its_successor() -> None:
+    """The drone reports the cancelled move when the same place has been commanded again."""
+    async with world(speed=1.0) as w:
+        await w.take_off(8.0)
+        allow_speed(w)
+        place = local(POSITION_ONLY, at=(40.0, 0.0, -8.0))
+        setpoint = [place]
+        async with streaming(w.client, lambda: setpoint[0]):
+            await engage(w.client, "px4")
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 1.0, 10.0)
+            w.drone.faults.down = Impairment(delay=0.4)
+            began, mark = now(), w.client.mark()
+            setpoint[0] = local(VELOCITY_ONLY, v=(1.0, 0.0, 0.0))
+            await w.drone.wait_log(lambda e: e.name.endswith("CancelMoveTo"), 5.0, since=began)
+            setpoint[0] = place
+            again = await w.drone.wait_log(
+                lambda e: e.name.endswith("moveToChanged") and e.args["status"] == 0, 5.0, since=now()
+            )
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > again.t + 1.0, 5.0)
+            assert [text for text in texts(w.client, mark) if text.startswith("Setpoint")] == []
 
 
 # Refusals: with a text, never clamped.

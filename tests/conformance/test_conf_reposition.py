@@ -12,7 +12,7 @@ from support.world import HOME, World, world
 
 from anafi_mav import geo
 from anafi_mav.sim.world.quirks import Quirk
-from anafi_mav.vehicle.base.aircraft import POSITION_OLD
+from anafi_mav.vehicle.vehicle import POSITION_OLD
 
 ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
 REJECTED, UNSUPPORTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED, dialect.MAV_RESULT_UNSUPPORTED

@@ -30,7 +30,7 @@ from anafi_mav.services.dropped_inputs import EPISODE_GAP, MODE_GRACE, REPORT_EV
 
 SET_MODE, ARM = dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_CMD_COMPONENT_ARM_DISARM
 ACCEPTED = dialect.MAV_RESULT_ACCEPTED
-SETPOINT, STICKS, TARGET, GIMBAL, REGION = InputStream
+SETPOINT, STICKS, TARGET, GIMBAL, REGION, _ = InputStream
 
 
 def now() -> float:

@@ -15,6 +15,7 @@ from support.params import fetch, read, send_set, value_of, write
 from support.setpoints import VELOCITY_ONLY, heard, local, motion, said, streaming
 from support.world import HOLD, World, world
 
+from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.skyctrl import Source
 from anafi_mav.drone.controller.controller import PILOT_KEEPS, QUIET
 
@@ -22,6 +23,9 @@ SWITCH = "ANF_SC_OFFBOARD"
 PILOT, PROGRAM, AUTOMATIC = range(3)
 PITCH_STICK = 3
 """Its axis at the Skycontroller (mapper.xml)."""
+
+TAKEOFF_LAND = 1
+"""Its button."""
 
 REFUSED = "pilot flies, ANF_SC_OFFBOARD 0"
 SET_MODE, ARM, TAKEOFF = dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_CMD_COMPONENT_ARM_DISARM, dialect.MAV_CMD_NAV_TAKEOFF
@@ -183,6 +187,95 @@ async def test_drone_that_rises_does_not_climb_for_program() -> None:
         assert motion(w, began) == []
         assert w.drone.pose.up == pytest.approx(1.0, abs=0.2)
         assert skycontroller(w).source is Source.SKY_CONTROLLER
+
+
+async def test_pilots_stick_during_a_takeoff_leaves_the_drone_at_its_first_hover() -> None:
+    """The stick sets the switch to Pilot without ending the take-off: the climb is refused when it is due."""
+    async with world(speed=1.0, skycontroller=3) as w:
+        await switch(w, PROGRAM)
+        w.simulator.speed = 0.5  # the climb is due when the pilot's two seconds are over
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        w.client.send_command(TAKEOFF, x=0.0, y=0.0, z=15.0)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "motor_ramping", 10.0)
+        mark, began = w.client.mark(), now()
+        skycontroller(w).stick(PITCH_STICK, 40)
+        await shown(w.client, PILOT, mark)
+        skycontroller(w).stick(PITCH_STICK, 0)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 20.0)
+        await asyncio.sleep(8.0)
+        assert now() - began > PILOT_KEEPS + 1.0
+        assert heard(w, "moveBy") == []
+        assert w.drone.pose.up == pytest.approx(1.0, abs=0.2)
+        assert skycontroller(w).source is Source.SKY_CONTROLLER
+
+
+async def test_takeoff_that_waits_for_arming_ends_with_the_pilots_stick() -> None:
+    """The client arms afterwards: the policy is asked again before the drone lifts off."""
+    async with world(speed=1.0, skycontroller=3) as w:
+        await switch(w, PROGRAM)
+        assert (await w.client.command(TAKEOFF, x=0.0, y=0.0, z=5.0)).result == ACCEPTED
+        mark = w.client.mark()
+        skycontroller(w).stick(PITCH_STICK, 40)
+        await shown(w.client, PILOT, mark)
+        skycontroller(w).stick(PITCH_STICK, 0)
+        await asyncio.sleep(PILOT_KEEPS + 0.5)
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        await said(w.client, REFUSED, mark)
+        await asyncio.sleep(3.0)
+        assert heard(w, "TakeOff") == []
+
+
+async def test_pilot_gets_sticks_of_a_drone_that_does_not_confirm_its_stop() -> None:
+    async with world(speed=1.0, skycontroller=3) as w:
+        await w.take_off(8.0)
+        assert await goto(w, 80.0, 8.0) == ACCEPTED
+        w.drone.faults.untold = frozenset({ardrone3.MoveToChanged.NAME})
+        mark = w.client.mark()
+        send_set(w.client, SWITCH, PILOT, INT32)
+        await w.client.wait(
+            "PARAM_VALUE", lambda m: m.param_id == SWITCH and value_of(m) == PILOT, since=mark, timeout=20.0
+        )
+        assert skycontroller(w).source is Source.SKY_CONTROLLER
+        assert [m.text for _, m in w.client.since(mark, "STATUSTEXT") if "not set" in m.text] == []
+
+
+async def test_drone_that_the_pilot_flies_receives_nothing_of_the_switch() -> None:
+    """Its take-off is the pilot's own, and goes on."""
+    async with world(speed=1.0, skycontroller=3) as w:
+        began = now()
+        skycontroller(w).press(TAKEOFF_LAND)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "takingoff", 10.0)
+        await switch(w, PILOT)
+        await asyncio.sleep(4.0)
+        assert [e.name for e in heard(w, "Landing", "moveBy", "CancelMoveTo", "PCMD", since=began)] == []
+        assert w.drone.flying_state.name in ("HOVERING", "FLYING")
+        await switch(w, AUTOMATIC)
+        await switch(w, PILOT)
+        assert [e.name for e in heard(w, "Landing", "moveBy", "CancelMoveTo", "PCMD", since=began)] == []
+
+
+async def test_end_of_the_connection_gives_the_aircraft_to_the_pilot() -> None:
+    """The Skycontroller takes everything back by itself; a program has to take the aircraft again."""
+    async with world(speed=1.0, skycontroller=3) as w:
+        await w.take_off(8.0)
+        await switch(w, PROGRAM)
+        w.drone.faults.mute = True
+        await asyncio.sleep(6.0)
+        mark = w.client.mark()
+        w.drone.faults.mute = False
+        await w.client.wait("ATTITUDE", since=mark, timeout=20.0)
+        assert value_of(await read(w.client, SWITCH)) == PILOT
+        await refused(w, dialect.MAV_CMD_CONDITION_YAW, 90.0, 0.0, 0.0, 0.0)
+
+
+async def test_switch_at_automatic_gives_kept_sticks_back() -> None:
+    async with world(speed=1.0, skycontroller=3) as w:
+        await w.take_off(8.0)
+        await switch(w, PROGRAM)
+        assert skycontroller(w).source is Source.CONTROLLER
+        await switch(w, AUTOMATIC)
+        await source_is(w, Source.SKY_CONTROLLER)
+        assert await goto(w, 5.0, 8.0) == ACCEPTED
 
 
 async def test_goto_that_has_arrived_is_not_ended_again() -> None:

@@ -192,6 +192,19 @@ async def test_second_before_a_setpoint_takeoff_can_be_ended(flavour: str, how: 
         assert heard(w, "TakeOff") == []
 
 
+@both
+async def test_silence_before_a_setpoint_takeoff_counts_per_client(flavour: str) -> None:
+    """Another program streams on: the drone is disarmed all the same."""
+    async with world(flavour=flavour, clients=2) as w, streaming(w.clients[1], IDLE):
+        mark = w.client.mark()
+        async with streaming(w.client, attitude(thrust=0.7)):
+            await ready(w.client, flavour)
+            await said(w.client, "Takeoff by setpoints of system 255", mark)
+        await said(w.client, "Setpoints stopped on the ground: disarming", mark)
+        await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark)
+        assert heard(w, "TakeOff") == []
+
+
 @pytest.mark.parametrize("moment", ["motor ramping", "motor ramping, landing ignored", "taking off"])
 async def test_silence_in_setpoint_takeoff_disarms_on_ground_hovers_airborne(moment: str) -> None:
     async with world(speed=1.0) as w:

@@ -75,16 +75,6 @@ async def test_station_loss_while_pilot_has_source_only_warns(generation: int) -
         assert heard(w, *ACTS) == before
 
 
-async def test_station_loss_while_goto_flies_behind_skycontroller_acts() -> None:
-    async with world(skycontroller=3) as w:
-        await write(w.client, "ANF_GCS_LOSS", RETURN_ACTION, dialect.MAV_PARAM_TYPE_INT32)
-        await write(w.client, "ANF_GCS_LOSS_T", 2.0)
-        await to_the_pilot(w)
-        assert await goto(w, 200.0, 10.0) == ACCEPTED
-        w.client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
-        await w.drone.wait_log(lambda e: e.name == "rth.return_to_home", 20.0)
-
-
 async def test_fence_while_pilot_has_source_only_warns() -> None:
     async with world(skycontroller=3) as w:
         pilot = w.drone.skycontroller

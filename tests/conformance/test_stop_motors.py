@@ -3,35 +3,29 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import itertools
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.fault_scenarios import (
     ACCEPTED,
     ARM,
-    CANCELLED,
     DENIED,
     LAND_CMD,
     REJECTED,
     SET_MODE,
     TAKEOFF_CMD,
-    goto,
     heard,
     watched,
 )
 from support.mav import NAN, Client
 from support.world import ARMED, World, world
 
-from anafi_mav.arsdk.messages import ardrone3, rth
+from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.sim.world.quirks import Quirk
-from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.requester import Source
 
 FORCE = 21196
 PAUSE = dialect.MAV_CMD_DO_PAUSE_CONTINUE
@@ -186,55 +180,3 @@ async def test_pause_holds_against_setpoints_of_every_client(pause: str, positio
             await standing(w)
             assert (await who.command(PAUSE, 1)).result == ACCEPTED
             await w.drone.wait_log(lambda entry: w.drone.pose.vn > 1.0, 15.0)
-
-
-@pytest.mark.parametrize("end", ["another mode", "goto"])
-async def test_pause_is_ended_by_another_mode_and_command(end: str) -> None:
-    async with world(speed=1.0, flavour="ardupilot") as w:
-        program = await w.connect(sysid=240)
-        await w.take_off(10.0)
-        async with companion(program):
-            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 3.0, 15.0)
-            assert (await w.client.command(PAUSE, 0)).result == ACCEPTED
-            await standing(w)
-            moves = len(heard(w, "moveTo", "extended_move_to"))
-            if end == "another mode":
-                assert (await w.client.command(SET_MODE, 1, 5)).result == ACCEPTED
-                assert (await w.client.command(SET_MODE, 1, 4)).result == ACCEPTED
-            else:
-                assert await goto(w, 0.0, 10.0) in (ACCEPTED, CANCELLED)
-                assert len(heard(w, "moveTo", "extended_move_to")) > moves
-            await program.wait("HEARTBEAT", lambda m: m.custom_mode == 4)
-            await w.drone.wait_log(lambda entry: w.drone.pose.vn > 1.0, 15.0)
-
-
-# Nothing of what was replaced follows.
-
-
-async def test_emergency_leaves_before_the_replaced_command_has_ended() -> None:
-    """A home that is being undone waits for an answer: the motors are cut before."""
-    async with world(speed=1.0, allow_kill=True) as w:
-        await w.take_off(5.0)
-        w.drone.faults.untold = frozenset({rth.CustomLocation.NAME, rth.PreferredHomeType.NAME})
-        w.client.send_command(dialect.MAV_CMD_DO_SET_HOME, 0, frame=0, x=48.88, y=2.37, z=0.0)
-        await w.drone.wait_log(lambda e: e.kind == "command" and e.name.startswith("rth.set"), 5.0)
-        loop = asyncio.get_running_loop()
-        began = loop.time()
-        w.client.send_command(*DISARM, FORCE)
-        await w.drone.wait_log(lambda e: e.name == "ardrone3.Piloting.Emergency", 5.0)
-        assert loop.time() - began < 0.5
-
-
-@pytest.mark.parametrize("stop", ["land", "hold"])
-async def test_land_and_hold_await_the_replaced_command_briefly(stop: str) -> None:
-    async with world(speed=1.0) as w:
-        await w.take_off(5.0)
-        w.drone.faults.untold = frozenset({rth.CustomLocation.NAME, rth.PreferredHomeType.NAME})
-        w.client.send_command(dialect.MAV_CMD_DO_SET_HOME, 0, frame=0, x=48.88, y=2.37, z=0.0)
-        await w.drone.wait_log(lambda e: e.kind == "command" and e.name.startswith("rth.set"), 5.0)
-        vehicle: Any = w.gateway.systems[0].vehicle
-        loop = asyncio.get_running_loop()
-        began = loop.time()
-        with contextlib.suppress(Exception):
-            await (vehicle.land(Source.FENCE) if stop == "land" else vehicle.hold(FlightMode.HOLD, Source.FENCE))
-        assert loop.time() - began < 3.0  # the undoing alone takes five

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
-from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.callers import CALLERS, system_of
 from support.fault_scenarios import ACCEPTED, LAND_CMD, PX4_HOLD, REJECTED, RTL, SET_MODE, goto, heard, watched
-from support.mav import NAN, Client
+from support.mav import Client
 from support.world import HOLD, RETURN, World, world
 
 from anafi_mav.arsdk.messages import ardrone3, rth
@@ -98,48 +96,6 @@ async def test_second_clients_hold_ends_a_return_in_each_phase(phase: ReturnPhas
         assert w.drone.firmware.homing.phase is ReturnPhase.IDLE
         if own:
             await text(w.client, "Return aborted by system 250: ")
-
-
-STOPS: dict[str, Callable[[Client], Awaitable[Any]]] = {
-    "Position": lambda client: client.command(SET_MODE, *PX4_POSITION),
-    "Pause": lambda client: client.command(dialect.MAV_CMD_DO_PAUSE_CONTINUE, 0),
-    "Pause by reposition": lambda client: client.command(dialect.MAV_CMD_DO_REPOSITION, -1, 0, 0, NAN),
-}
-
-
-@pytest.mark.parametrize("stop", STOPS)
-async def test_own_return_is_ended_by_each_stop_command(stop: str) -> None:
-    async with world(speed=1.0) as w:
-        await away(w)
-        by_itself(w)
-        await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
-        assert (await STOPS[stop](w.client)).result == ACCEPTED
-        assert heard(w, "abort") == ["abort"]
-
-
-@pytest.mark.parametrize(("mode", "result"), [(4, REJECTED), (3, REJECTED), (17, ACCEPTED), (5, ACCEPTED)])
-async def test_own_return_is_ended_by_brake_and_loiter_only(mode: int, result: int) -> None:
-    async with world(speed=1.0, flavour="ardupilot") as w:
-        await away(w)
-        by_itself(w)
-        await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.returning)
-        assert (await w.client.command(SET_MODE, 1, mode)).result == result
-        assert heard(w, "abort") == (["abort"] if result == ACCEPTED else [])
-
-
-@pytest.mark.parametrize("own", [False, True])
-async def test_return_is_not_ended_by_a_goto(own: bool) -> None:
-    async with world(speed=1.0) as w:
-        await away(w)
-        if own:
-            by_itself(w)
-        else:
-            assert (await w.client.command(RTL)).result == ACCEPTED
-        await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
-        mark = w.client.mark()
-        assert await goto(w, 60.0, 8.0) == REJECTED
-        await text(w.client, "Goto refused: drone is returning", mark)
-        assert heard(w, "abort") == []
 
 
 async def test_hold_within_five_seconds_of_another_keeps_drones_return() -> None:

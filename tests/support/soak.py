@@ -889,7 +889,7 @@ def _judge_motors(flight: Flight) -> None:
                 if s.at >= stops[-1][0]
                 and s.at <= entry.t
                 and s.command in (ARM, TAKEOFF, START, SET_MODE, SET_CURRENT)
-                and s.values[:1] != (0.0,)
+                and not (s.command == ARM and s.values[:1] == (0.0,))
             ] + [s.begun for s in flight.streams if s.ended + s.lasts >= stops[-1][0]]
             if not newer:
                 flight.wrong.append(f"{name} is received after an accepted landing, without a newer command")

@@ -7,7 +7,7 @@ drone says which by what it reports (feature flight_plan).
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 import msgspec
@@ -128,13 +128,10 @@ class FlightPlan(Commanding[FlightPlanState]):
         self._rest = rest
         self.model: Callable[[], Model] = lambda: NO_MODEL
         """Which drone it is; the drone sets it."""
-        self.reported_attempt: Hashable | None = None
-        """The `attempt` of the start that the newest playing state is about; None: of no start of this program."""
 
     def on_playing(self, message: common.MavlinkFilePlayingStateChanged, now: float) -> None:
         """A flight plan plays, is paused or stopped."""
         sent = self._commander.sent.attribute(message, now)
-        self.reported_attempt = None if sent is None else sent.attempt
         playing = message.state == PlayingState.PLAYING
         if playing and sent is not None and self._commander.sent.is_unwanted(sent, now):
             self._commander.send_stop_if_connected(common.Stop())
@@ -207,18 +204,16 @@ class FlightPlan(Commanding[FlightPlanState]):
         *,
         continue_on_disconnect: bool | None = None,
         timeout: float = START_TIMEOUT,
-        attempt: Hashable | None = None,
     ) -> None:
         """Fly an uploaded plan, or resume the paused one; returns when it plays.
 
         `item` (from 0) is where it begins, `continue_on_disconnect` flies on without a link: Ai only. Raises
         `CommandRejected` with what the drone lacks, `CommandTimeout`. A start that times out or is cancelled is
-        withdrawn, also when the drone begins the plan only then. `attempt` names this start in `reported_attempt`.
+        withdrawn, also when the drone begins the plan only then.
         """
         self._available()
         command = self._start(uid, item, type, continue_on_disconnect)
-        attempt = object() if attempt is None else attempt
-        sent = SentCommand(Slot.PLAN, uid, common.Stop(), attempt=attempt, plan_before=self.state.uid)
+        sent = SentCommand(Slot.PLAN, uid, common.Stop(), plan_before=self.state.uid)
 
         def judge(message: Any) -> bool | AnafiMavError | None:
             if sent.phase is Phase.REFUSED:

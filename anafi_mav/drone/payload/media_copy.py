@@ -11,7 +11,6 @@ import hashlib
 import json
 import re
 from collections.abc import AsyncGenerator, Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime
 from itertools import count
 from pathlib import Path
@@ -19,6 +18,7 @@ from typing import Any, Protocol, TypeVar
 
 from msgspec.structs import replace
 
+from anafi_mav.disk_writer import DiskWriter
 from anafi_mav.drone.payload.media_file import UNKNOWN, Place, Resource, fetch, file_name
 from anafi_mav.drone.payload.media_part import WRITTEN
 from anafi_mav.errors import AnafiMavError, CommandTimeout, LinkLost
@@ -32,7 +32,7 @@ PAUSE = 2.0
 XMP_LIMIT = 1 << 18
 """Bytes at the beginning of a photo that are searched for XMP; each segment before it has at most 64 KiB."""
 
-_DISK = ThreadPoolExecutor(4, thread_name_prefix="media-disk")
+_DISK = DiskWriter("media-disk", threads=4)
 """The threads for the folder of copies: a disk that sleeps must not block the pool that flying uses."""
 
 T = TypeVar("T")

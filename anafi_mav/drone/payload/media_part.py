@@ -11,11 +11,11 @@ import hashlib
 import logging
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
+from anafi_mav.disk_writer import DiskWriter
 from anafi_mav.errors import CommandRejected, RemoteProtocolError
 from anafi_mav.state_lock import try_lock
 
@@ -32,7 +32,7 @@ class PartFile:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix="media")
+        self._thread = DiskWriter("media")
         self._digest = hashlib.md5(usedforsecurity=False)
         self._fd: int | None = None
         self._size = 0
@@ -59,12 +59,12 @@ class PartFile:
     async def close(self, rest: bytes) -> None:
         """Append the rest as far as possible and close it. One without a byte is deleted."""
         await self._run(self._close, rest)
-        self._thread.shutdown(wait=False)
+        self._thread.shutdown()
 
     def abandon(self, rest: bytes) -> None:
         """Do the same later, in the thread."""
         self._thread.submit(self._close, rest)
-        self._thread.shutdown(wait=False)
+        self._thread.shutdown()
 
     async def _run(self, job: Callable[..., T], *arguments: Any) -> T:
         # Shielded: a job that is cancelled before it begins would leave a hole in the file.

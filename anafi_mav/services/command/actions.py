@@ -17,6 +17,7 @@ from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
 from anafi_mav.vehicle.base.right import Right
+from anafi_mav.vehicle.guided_flight import GOTO
 from anafi_mav.vehicle.vehicle import Vehicle
 
 FORCE = 21196
@@ -95,7 +96,7 @@ async def reposition(vehicle: Vehicle, command: Command) -> None:
         heading += attitude.yaw
     if vehicle.takeoff.rises:
         vehicle.guided.check(where, ato)  # one that is refused replaces none that waits
-        await vehicle.takeoff.over(texts.GOTO)
+        await vehicle.takeoff.over(GOTO)
     await vehicle.guided.reposition(where, ato, heading, speed if speed > 0.0 else None, mode, by=command.right)
 
 

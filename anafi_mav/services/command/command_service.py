@@ -37,7 +37,7 @@ from anafi_mav.services.commands import (
 )
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Query, Service, client_of
-from anafi_mav.vehicle.base.refusal import Refused, Unsupported, text_of
+from anafi_mav.vehicle.base.refusal import NotInControl, Refused, Unsupported, text_of
 from anafi_mav.vehicle.base.severity import Severity
 
 logger = logging.getLogger(__name__)
@@ -54,6 +54,7 @@ _RESULT_BY_ERROR: tuple[tuple[type[AnafiMavError], int], ...] = (
     (UnsupportedFrame, dialect.MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME),
     (Unsupported, dialect.MAV_RESULT_UNSUPPORTED),
     (NotSupported, dialect.MAV_RESULT_UNSUPPORTED),
+    (NotInControl, dialect.MAV_RESULT_NOT_IN_CONTROL),
     (CommandRejected, dialect.MAV_RESULT_TEMPORARILY_REJECTED),
     (CommandTimeout, dialect.MAV_RESULT_FAILED),
 )
@@ -106,11 +107,23 @@ class CommandService(Service):
             dialect.MAVLINK_MSG_ID_COMMAND_CANCEL: self._cancel,
         }
 
-    def denials(self) -> Mapping[int, MessageHandler]:
-        def deny(inbound: Inbound) -> None:
-            self._acknowledge(inbound, inbound.message.command, dialect.MAV_RESULT_DENIED)
+    def refuse(self, inbound: Inbound, result: int, reason: str = "") -> None:
+        """Answer a command that has no effect because of its sender."""
+        self._acknowledge(inbound, inbound.message.command, result)
+        if reason:
+            self._note(inbound, inbound.message.command, result, reason)
 
-        return dict.fromkeys((dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT), deny)
+    def action_of(self, inbound: Inbound) -> Command | None:
+        """Decode a command that changes something.
+
+        Returns None for a query, and for a command that this component does not have.
+        """
+        action = self._actions.get(inbound.message.command)
+        if action is None:
+            return None
+        is_long = inbound.message.get_msgId() == dialect.MAVLINK_MSG_ID_COMMAND_LONG
+        decode: _Decode = from_long if is_long else from_int
+        return decode(inbound.message, action, client_of(inbound), flavour_of(inbound.channel))
 
     async def settle(self, limit: float = SETTLE) -> None:
         """Wait until running commands have ended after the link is lost, `limit` s at most.
@@ -188,7 +201,7 @@ class CommandService(Service):
         command = replace(command, at=now, counted=counted, component=self.host.compid)
         flies = command.group is ActionGroup.FLIGHT
         if flies:
-            ended_at = self.host.vehicle.landing_ended_at
+            ended_at = self.host.vehicle.flight_facts.landing_ended_at
             repeated = self._history.retransmission(command.client, command, now, mode, ended_at)
         else:
             repeated = self.host.payload_history.retransmission(command, now)

@@ -66,7 +66,7 @@ def current_mode(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
 
     The intended mode is the one last asked for by a message that names modes; 0 before that.
     """
-    mode, intended, flavour = vehicle.mode, vehicle.intended, times.flavour
+    mode, intended, flavour = vehicle.mode, vehicle.link_facts.intended, times.flavour
     return dialect.MAVLink_current_mode_message(
         STANDARD_MODES.get(mode, dialect.MAV_STANDARD_MODE_NON_STANDARD),
         flavour.custom_mode(mode),
@@ -115,7 +115,7 @@ class ModesService(Service):
     def _announce(self) -> None:
         """CURRENT_MODE once per change; the stream repeats it, rarely."""
         vehicle, times = self.host.vehicle, self.host.times()
-        state = vehicle.mode, vehicle.intended
+        state = vehicle.mode, vehicle.link_facts.intended
         if state != self._sent:
             self._sent = state
             self.host.send_by_flavour(lambda flavour: current_mode(vehicle, times.for_flavour(flavour)))

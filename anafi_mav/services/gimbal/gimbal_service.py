@@ -506,7 +506,7 @@ class GimbalService(Service):
                 if not self._control.allows(client):
                     raise Refused(texts.ROI, self._objection(client))
                 if not self._roi.is_locked_on(where, ato):
-                    region = self._roi.prepare(Right(client, Extent.COMMANDED))
+                    region = self._roi.prepare(Right(client_of(inbound), Extent.COMMANDED))
                     vehicle = self.host.vehicle
                     if not self._roi.is_active and (vehicle.mode not in HOVERING or vehicle.overridable):
                         raise Refused(texts.ROI, texts.DRONE_FLIES)

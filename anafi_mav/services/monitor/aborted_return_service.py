@@ -9,11 +9,4 @@ class AbortedReturnService(Service):
     """Reminds every client of a return that one of them has ended."""
 
     def tick(self, now: float) -> None:
-        vehicle = self.host.vehicle
-        aborted = vehicle.aborted_return
-        if aborted is None:
-            return
-        if not aborted.lasts(vehicle):
-            vehicle.aborted_return = None
-        elif aborted.due(vehicle, now):
-            aborted.report(vehicle, now)
+        self.host.vehicle.remind_of_aborted_return(now)

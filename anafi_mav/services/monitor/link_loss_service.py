@@ -44,13 +44,13 @@ class LinkLossService(Service):
             self.host.text(Severity.NOTICE, texts.STATION_BACK)
 
     def _lost(self) -> None:
-        vehicle, policy, controller = self.host.vehicle, self.host.vehicle.gcs_loss, self.host.drone.controller
+        vehicle, policy = self.host.vehicle, self.host.vehicle.gcs_loss
         seconds = policy.after
         if vehicle.landed not in (Landed.IN_AIR, Landed.TAKEOFF):
             self.host.text(Severity.WARNING, texts.STATION_LOST.fill(seconds=seconds))
         elif vehicle.mode is FlightMode.RETURN:
             self.host.text(Severity.WARNING, texts.STATION_LOST_STATE.fill(seconds=seconds, state=texts.RETURNS))
-        elif controller.pilot_has_source or controller.pilot_acquired_control:
+        elif vehicle.control.leaves_to_pilot(Source.LOST_LINK):
             self.host.text(Severity.WARNING, texts.STATION_LOST_STATE.fill(seconds=seconds, state=texts.MISSION_PILOT))
         else:
             self.host.text(

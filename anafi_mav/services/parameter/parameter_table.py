@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from typing import Any
 
 from anafi_mav.drone import MODELS, Drone, Range, events
@@ -409,7 +410,7 @@ MODEL = Parameter(
 
 
 def _put_takeoff_height(host: Host, value: float) -> None:
-    host.vehicle.takeoff.height = value
+    host.vehicle.settings = replace(host.vehicle.settings, takeoff_height=value)
 
 
 def _takeoff_limits(host: Host) -> Limits:
@@ -421,7 +422,7 @@ TAKEOFF_HEIGHT = Parameter(
     "ANF_TKOFF_ALT",
     ParamType.REAL32,
     "Height of a take-off without a height",
-    read=lambda host: host.vehicle.takeoff.height,
+    read=lambda host: host.vehicle.settings.takeoff_height,
     write=own(_put_takeoff_height),
     put=_put_takeoff_height,
     limits=_takeoff_limits,
@@ -436,14 +437,14 @@ TAKEOFF_HEIGHT = Parameter(
 
 
 async def _set_hand_launch(host: Host, value: float) -> None:
-    host.vehicle.takeoff.hand_launch = value == 1
+    host.vehicle.settings = replace(host.vehicle.settings, hand_launch=value == 1)
 
 
 HAND_LAUNCH = Parameter(
     "ANF_HAND_LAUNCH",
     ParamType.INT32,
     "Arming starts the motors",
-    read=lambda host: number(host.vehicle.takeoff.hand_launch),
+    read=lambda host: number(host.vehicle.settings.hand_launch),
     write=_set_hand_launch,
     values=OFF_ON,
     polled=True,

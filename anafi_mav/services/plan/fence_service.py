@@ -143,11 +143,9 @@ class FenceService(Service):
     def _begin(self, action: Reaction) -> None:
         verdict = self._watch.verdict
         assert verdict is not None
-        controller = self.host.drone.controller
         if action is Reaction.WARN:
             self.host.text(Severity.WARNING, texts.FENCE_WARNING.fill(reason=verdict.text))
-        elif controller.pilot_has_source or controller.pilot_acquired_control:
-            # A person flies, or can at once: nothing of ours acts against him.
+        elif self.host.vehicle.control.leaves_to_pilot(Source.FENCE):
             self.host.text(Severity.CRITICAL, texts.FENCE_PILOT.fill(reason=verdict.text))
             self._watch.done(self.host.vehicle.control.epoch)
         else:

@@ -195,7 +195,7 @@ class MissionService(Service):
 
 def _fields(vehicle: Vehicle) -> Mapping[bool, tuple[int, ...]]:
     """Return the fields of MISSION_CURRENT by `Flavour.zero_home` of its receivers."""
-    machine, ids = vehicle.mission.machine, vehicle.plan_ids
+    machine = vehicle.mission.machine
     there, current = machine.rest is not State.NO_MISSION, machine.progress.current
     in_mission = vehicle.mode is FlightMode.MISSION and not machine.is_paused
     mode = IN_MISSION_MODE if in_mission else NOT_IN_MISSION_MODE
@@ -203,9 +203,9 @@ def _fields(vehicle: Vehicle) -> Mapping[bool, tuple[int, ...]]:
         len(machine.mission.items) if there else NO_TOTAL,
         MAVLINK_STATES[machine.rest],
         mode if there else 0,
-        ids.get(dialect.MAV_MISSION_TYPE_MISSION, 0),
-        ids.get(dialect.MAV_MISSION_TYPE_FENCE, 0),
-        ids.get(dialect.MAV_MISSION_TYPE_RALLY, 0),
+        machine.mission.identity,
+        vehicle.fence.items.identity,
+        vehicle.rally.items.identity,
     )
     # ArduPilot is at home, its item 0, until the mission begins or a client sets another one.
     behind_home = current + 1 if there and not machine.is_untouched else 0

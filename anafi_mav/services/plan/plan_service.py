@@ -258,7 +258,6 @@ class PlanService(Service):
     def _take(self, kind: int) -> None:
         vehicle, transfer = self.host.vehicle, self._protocol.transfers[kind]
         items, identity = transfer.items, transfer.opaque_id
-        vehicle.plan_ids[kind] = identity
         if kind == MissionKind.mission_type:
             if identity != vehicle.mission.machine.mission.identity:
                 examined = self._mission.examined(items)

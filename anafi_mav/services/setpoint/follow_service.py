@@ -34,8 +34,10 @@ class FollowService(Service):
     def _target(self, inbound: Inbound) -> None:
         if not self._flight.engaged:
             return  # the message names no drone: others may follow its sender
-        client, seen = client_of(inbound), sighting(inbound.message)
-        reason = seen if isinstance(seen, OperatorText) else self._flight.receive(client, seen)
+        client, reason = client_of(inbound), self.host.input_objection(inbound)
+        if reason is None:
+            seen = sighting(inbound.message)
+            reason = seen if isinstance(seen, OperatorText) else self._flight.receive(client, seen)
         if reason is None:
             self.host.use_input(client, InputStream.TARGET)
         else:

@@ -67,7 +67,9 @@ class ManualControlService(Service):
         """Pass sticks on; those that a person means and that are not flown are reported."""
         client = client_of(inbound)
         is_meant = self._intent.is_meant(client, sticks, inbound.now)
-        reason = self._flight.receive(client, sticks, overrides=flavour_of(inbound.channel).joystick_overrides)
+        reason = self.host.input_objection(inbound)
+        if reason is None:
+            reason = self._flight.receive(client, sticks, overrides=flavour_of(inbound.channel).joystick_overrides)
         if reason is None:
             self.host.use_input(client, InputStream.STICKS)
         elif is_meant:

@@ -55,12 +55,14 @@ class OffboardService(Service):
 
     def _takes(self, read: Callable[[Any], Setpoint | OperatorText]) -> MessageHandler:
         def take(inbound: Inbound) -> None:
-            client, setpoint = client_of(inbound), read(inbound.message)
-            if isinstance(setpoint, OperatorText):
-                reason: OperatorText | None = setpoint
-            else:
-                guided = flavour_of(inbound.channel).guided_setpoints
-                reason = self._flight.receive(client, setpoint, guided=guided)
+            client, reason = client_of(inbound), self.host.input_objection(inbound)
+            if reason is None:
+                setpoint = read(inbound.message)
+                if isinstance(setpoint, OperatorText):
+                    reason = setpoint
+                else:
+                    guided = flavour_of(inbound.channel).guided_setpoints
+                    reason = self._flight.receive(client, setpoint, guided=guided)
             if reason is None:
                 self.host.use_input(client, InputStream.SETPOINT)
             else:

@@ -285,7 +285,7 @@ class MessageService(Service):
 
     def _unstreamed(self, channel: Channel) -> Collection[int]:
         """Return the messages that a channel does not get by default."""
-        filtered = {id for id in self._table if not channel.can_stream(id)}
+        filtered = {id for id, stream in self._table.items() if not (channel.can_stream(id) and _has(channel, stream))}
         if channel.bytes_per_second is not None and channel.bytes_per_second < SMALL_LINE:
             filtered |= {id for id, stream in self._table.items() if stream.spared}
         return flavour_of(channel).unstreamed | filtered
@@ -325,7 +325,7 @@ class MessageService(Service):
         if (request := self._requests.get(int(id))) is not None and id == int(id):
             return request(inbound, command)
         stream = self._table.get(int(id)) if id == int(id) else None
-        if stream is None:
+        if stream is None or not _has(inbound.channel, stream):
             return dialect.MAV_RESULT_UNSUPPORTED
         if not inbound.channel.can_stream(int(id)):
             return dialect.MAV_RESULT_DENIED
@@ -344,7 +344,8 @@ class MessageService(Service):
 
     def _set_interval(self, inbound: Inbound, command: Command) -> int:
         id, interval = command.params[0], command.params[1]
-        if id not in self._table:
+        stream = self._table.get(int(id)) if math.isfinite(id) and id == int(id) else None
+        if stream is None or not _has(inbound.channel, stream):
             return dialect.MAV_RESULT_UNSUPPORTED
         if not inbound.channel.can_stream(int(id)):  # what is accepted would have no effect
             return dialect.MAV_RESULT_DENIED
@@ -377,7 +378,7 @@ class MessageService(Service):
         if not 0 <= id <= 0xFFFF or id != int(id):
             return dialect.MAV_RESULT_DENIED
         microseconds = 0
-        if int(id) in self._table:
+        if int(id) in self._table and _has(inbound.channel, self._table[int(id)]):
             asked = self._intervals.interval(inbound.channel, int(id))
             source = self._source(inbound.channel, int(id))
             if asked is not None and inbound.channel.pace is not None:
@@ -395,3 +396,8 @@ class MessageService(Service):
         if self._table[id].is_repeated:
             return REPEATED if interval is None else 1.0 / (1.0 / REPEATED + 1.0 / interval)
         return interval or 0.0
+
+
+def _has(channel: Channel, stream: MessageStream) -> bool:
+    """Return True for a message that exists for clients of this channel."""
+    return stream.is_offered(channel.options)

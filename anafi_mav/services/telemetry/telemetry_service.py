@@ -16,8 +16,8 @@ from anafi_mav.drone.events import Message
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.stream import MessageStream
 from anafi_mav.services.telemetry import telemetry_anafi, telemetry_flight, telemetry_link, telemetry_status
-from anafi_mav.vehicle.base.aircraft import POSITION_OLD
 from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.vehicle import POSITION_OLD
 
 CHANGES: frozenset[type[Message]] = frozenset(
     {

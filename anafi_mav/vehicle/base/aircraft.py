@@ -9,9 +9,9 @@ of them needs to know the others.
 from __future__ import annotations
 
 import asyncio
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 from anafi_mav import texts
 from anafi_mav.clock import Clock
@@ -30,12 +30,6 @@ from anafi_mav.vehicle.base.roll_sign import RollCheck, RollSign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.fence_watch import FenceWatch, OutsideFence
 
-POSITION_OLD = 3.0
-"""s without a GPS location, which an ANAFI reports once a second, after which the last one is no position in flight."""
-
-LOCATIONS_MISSED = 3
-"""A drone that reports its location more rarely (a slowed simulator) may miss as many."""
-
 _ACTIVITIES: Mapping[FlyingState | None, OperatorText] = {
     FlyingState.LANDED: texts.ON_GROUND,
     FlyingState.MOTOR_RAMPING: texts.STARTS_MOTORS,
@@ -47,6 +41,16 @@ _ACTIVITIES: Mapping[FlyingState | None, OperatorText] = {
     FlyingState.EMERGENCY: texts.EMERGENCY_STOP,
     FlyingState.EMERGENCY_LANDING: texts.FORCED,
 }
+
+
+@dataclass(frozen=True)
+class FlightSettings:
+    """Values that clients set for all take-offs, as parameters."""
+
+    takeoff_height: float = 2.5
+    """m above take-off for a take-off that names no height (PX4's default of MIS_TAKEOFF_ALT)."""
+    hand_launch: bool = False
+    """Arming starts the motors and waits for the drone to be thrown (Parrot's UserTakeOff)."""
 
 
 class Aircraft(ABC):
@@ -64,14 +68,13 @@ class Aircraft(ABC):
         self.height = HeightReference()
         self.roll = RollCheck()
         """Verifies the sign of the roll that the drone reports, for the loops over velocity."""
+        self.settings = FlightSettings()
         self.cruise_speed: float | None = None
         """m/s over ground that moves keep to; None: the drone's own (MAV_CMD_DO_CHANGE_SPEED)."""
         self.climb_speed: float | None = None
         """m/s up and down that moves keep to; None: the drone's own."""
         self.move_heading = MoveHeading.KEEP
         """Heading of moves whose command names none."""
-        self.origin: GeoPoint | None = None
-        """Origin of the local frame: where the drone last took off, or first stood with a fix."""
         self.fence = FenceWatch()
         self.home_choice = asyncio.Lock()
         """Lock held while the drone's home is chosen.
@@ -83,10 +86,6 @@ class Aircraft(ABC):
         """Notifies that mode, armed state or health may have changed."""
         self.control = Control(self)
         self._clock = clock
-        self._located_at = -math.inf
-        """When the newest GPS location arrived."""
-        self._location_every = 0.0
-        """s between it and the one before."""
 
     # What it is.
 
@@ -139,13 +138,14 @@ class Aircraft(ABC):
         """The present flight mode of the drone."""
 
     @property
+    @abstractmethod
+    def origin(self) -> GeoPoint | None:
+        """Origin of the local frame: where the drone last took off, or first stood with a fix."""
+
+    @property
+    @abstractmethod
     def position_is_old(self) -> bool:
         """True in flight when GPS locations have stopped although the drone reports a fix."""
-        gps = self.drone.gps.state
-        if not gps.fixed or gps.location is None or self.flying_state is None or self.on_ground:
-            return False
-        patience = max(POSITION_OLD, LOCATIONS_MISSED * self._location_every)
-        return self._clock.monotonic() - self._located_at > patience
 
     @property
     def place(self) -> GeoPoint | None:

@@ -244,9 +244,14 @@ class Control:
         rules = rules or task.rules
         if (refusal := self.policy(Request(task, by, rules))) is not None:
             raise refusal
-        is_own = isinstance(by, Source) and by not in (Source.MISSION, Source.SWITCH)
-        if is_own and self._aircraft.drone.controller.pilot_has_source:
+        if self.leaves_to_pilot(by):
             raise Refused(rules.what, texts.PILOT)
+
+    def leaves_to_pilot(self, by: By) -> bool:
+        """True when a part of the gateway does not act: the Skycontroller's pilot flies, or can at once."""
+        controller = self._aircraft.drone.controller
+        yields = isinstance(by, Source) and by.yields_to_pilot
+        return yields and (controller.pilot_has_source or controller.pilot_acquired_control)
 
     def _require_pending(self, attempt: Attempt[FlightTask], what: Subject) -> None:
         """Raise `Refused` when something newer has replaced an attempt."""
@@ -289,8 +294,10 @@ class Control:
     def succeed(self, task: FlightTask) -> None:
         """Let a task follow the active one, instead of another successor.
 
-        Any request withdraws it.
+        Any request withdraws it. Raises `ValueError` for a task that ends what flies, by its rules.
         """
+        if not task.rules.follows:
+            raise ValueError(f"{task.rules.what} follows no task")
         self.handle(Event.SUCCEED, Input(task=task))
 
     def adopt(self, task: FlightTask, *, below: FlightTask | None = None, keeps_below: bool = False) -> None:

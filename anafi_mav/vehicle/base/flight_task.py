@@ -15,6 +15,7 @@ from typing import Protocol
 from anafi_mav import texts
 from anafi_mav.texts import Subject
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.right import Extent
 
 
 class Needs(enum.Flag):
@@ -70,6 +71,12 @@ class TaskRules:
     """Setpoints of a client: they never leave a pause."""
     keeps_below: bool = False
     """The hovering mode of before stays chosen, and so does a pause."""
+    ends_landing: Extent | None = None
+    """Landings that it ends, as far as its client's right covers them; None: it ends none."""
+    ends_return: Extent | None = None
+    """Returns that it ends, likewise."""
+    follows: bool = False
+    """During a take-off, or at the end of a mission, it follows the active task instead of ending it."""
     is_flight: bool = True
     """A policy may refuse it; False: it stops the drone, lands it, leads it home, or nothing flies meanwhile."""
 
@@ -135,7 +142,9 @@ class Hover(PlainTask):
 
     @property
     def rules(self) -> TaskRules:
-        return TaskRules(texts.Subject(self.mode.value), wait=STOP_WAIT, is_hover=True, is_flight=False)
+        """A mode that is chosen is Guided: programs set it routinely, so it ends what clients commanded alone."""
+        ends, what = Extent.ALL if self.client is None else Extent.COMMANDED, texts.Subject(self.mode.value)
+        return TaskRules(what, wait=STOP_WAIT, is_hover=True, ends_landing=ends, ends_return=ends, is_flight=False)
 
 
 @dataclass(frozen=True)

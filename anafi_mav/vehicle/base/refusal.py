@@ -48,6 +48,10 @@ class Unsupported(Refused):
         super().__init__(what, reason, lasting=True)
 
 
+class NotInControl(Refused):
+    """Another station is the operator of the aircraft: MAV_RESULT_NOT_IN_CONTROL."""
+
+
 class Rejected(CommandRejected):
     """A flight task of the gateway cannot continue; the reason is one of the table."""
 

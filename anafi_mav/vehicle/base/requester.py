@@ -10,13 +10,22 @@ from anafi_mav.vehicle.base.right import Right
 
 
 class Source(enum.Enum):
-    """Requester that is no client."""
+    """Requester that is no client: a part of the gateway."""
 
-    MISSION = "the mission that is flown"
     FENCE = "the fence"
     LOST_LINK = "the loss of all ground stations"
-    GATEWAY = "the gateway: a changed setting of the flight under way, its own end"
+    GATEWAY = "a changed setting of the flight under way, the gateway's own end"
     SWITCH = "the switch by which a client gives the aircraft to the pilot"
+
+    @property
+    def yields_to_pilot(self) -> bool:
+        """True when its tasks are refused while the Skycontroller's pilot has the source."""
+        return self is not Source.SWITCH
+
+    @property
+    def is_program(self) -> bool:
+        """True when it flies as programs do; False: it only stops, lands or returns."""
+        return self is Source.GATEWAY
 
 
 By: TypeAlias = "Right | Source"

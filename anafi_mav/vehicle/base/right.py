@@ -1,7 +1,8 @@
 """The right of a client to end a landing or a return.
 
 Handlers of client messages pass it to `Vehicle.hold`, `set_mode` and the like. What the gateway does by itself
-(station loss, fence, silence of setpoints, end of a mission, its own end) has none, and so never ends either.
+(station loss, fence, silence of setpoints, end of a mission, its own end) has none, and so never ends either. A flight
+task ends what both its rules (`TaskRules.ends_landing`, `ends_return`) and this right cover.
 """
 
 from __future__ import annotations
@@ -12,12 +13,12 @@ from dataclasses import dataclass
 
 
 class Extent(enum.Enum):
-    """Which landings and returns a right covers. A forced landing is covered by none."""
+    """Landings or returns that a right covers. A forced landing is covered by none."""
 
-    COMMANDED = "a landing or return that a client commanded"
-    """Modes Guided, Return, Offboard and Mission; the joystick override."""
-    ALL = "these, and a landing or return that the drone began"
-    """Hold, Pause, Brake, Loiter, Position."""
+    COMMANDED = "those that a client commanded"
+    """The right of setpoints, mission messages and the joystick override."""
+    ALL = "these, and those that the drone began"
+    """The right of a command or a mode message."""
 
 
 @dataclass(frozen=True)
@@ -39,3 +40,7 @@ class Right:
             case (_, int(system), _):
                 return system
         return 0
+
+    def covered(self, extent: Extent | None) -> Extent | None:
+        """Return how far this right covers what a task may end; None: not at all."""
+        return self.extent if extent is Extent.ALL else extent

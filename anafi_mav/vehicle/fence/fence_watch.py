@@ -23,7 +23,7 @@ from anafi_mav.errors import AnafiMavError
 from anafi_mav.plans.zones import CircleZone, Fence, LatLon, Margin
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.fence.fence import fence_of
-from anafi_mav.vehicle.fence.plan_items import PlanItem
+from anafi_mav.vehicle.fence.plan_items import PlanItem, PlanItems
 
 REACTION = 0.6
 """s from a motion to the drone's response to our action.
@@ -246,7 +246,7 @@ class FenceWatch:
         """Act when the vehicle is too fast to stop before the boundary, not only when it is beyond."""
         self.floor = 0.0
         """m above the take-off point; counts once the vehicle has been above it. 0: no floor."""
-        self.items: tuple[PlanItem, ...] = ()
+        self.items = PlanItems()
         self.fence = Fence()
         self.verdict: FenceFinding | None = None
         """Reason of the action that `look` returned; without an action, of the present state."""
@@ -267,7 +267,7 @@ class FenceWatch:
 
     def take(self, items: Sequence[PlanItem]) -> None:
         """Set the fence in force."""
-        self.items, self.fence = tuple(items), fence_of(items)
+        self.items, self.fence = PlanItems(items), fence_of(items)
         self._sides, self.verdict = _sides(), None
 
     def enable(self, types: int = EVERYTHING) -> None:

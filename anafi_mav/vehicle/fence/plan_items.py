@@ -6,6 +6,7 @@ import struct
 import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 import msgspec
 
@@ -90,6 +91,15 @@ def opaque_id(items: Iterable[PlanItem]) -> int:
             _CONTENT.pack(item.command, item.frame, item.autocontinue, *item.params, item.x, item.y, item.z), checksum
         )
     return 0 if empty else checksum or 1
+
+
+class PlanItems(tuple[PlanItem, ...]):
+    """A list of items that is in force."""
+
+    @cached_property
+    def identity(self) -> int:
+        """`opaque_id` of the list."""
+        return opaque_id(self)
 
 
 def place_fault(item: PlanItem) -> PlanFault | None:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from anafi_mav import geo
-from anafi_mav.vehicle.fence.plan_items import PlanItem, height_ato
+from anafi_mav.vehicle.fence.plan_items import PlanItem, PlanItems, height_ato
 
 CLOSER = 10.0
 """m that another place must be closer by before it replaces the chosen one: half way between two the choice would
@@ -56,7 +56,7 @@ class RallyPoints:
     def __init__(self) -> None:
         self.rtl_type = DEFAULT_TYPE
         """RTL_TYPE, a key of `RTL_TYPES`."""
-        self.items: tuple[PlanItem, ...] = ()
+        self.items = PlanItems()
 
     @property
     def purpose(self) -> Return:
@@ -65,7 +65,7 @@ class RallyPoints:
 
     def take(self, items: Sequence[PlanItem]) -> None:
         """Other rally points hold."""
-        self.items = tuple(items)
+        self.items = PlanItems(items)
 
     def points(self, takeoff_amsl: float | None) -> list[RallyPoint]:
         """Those whose height above the take-off point is known."""

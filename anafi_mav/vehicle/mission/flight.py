@@ -23,7 +23,7 @@ from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.flight_task import Needs, PlainTask, TaskRules
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import DroneRefused, Refused, not_ready, reason_of, text_of
-from anafi_mav.vehicle.base.right import Right
+from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.mission.course import Course
@@ -76,7 +76,7 @@ class MissionOutlet(Protocol):
 class MissionFlight(PlainTask):
     """Flies the mission of one vehicle; its flight task in mode Mission."""
 
-    rules = TaskRules(texts.MISSION, needs=Needs.NO_PILOT)
+    rules = TaskRules(texts.MISSION, needs=Needs.NO_PILOT, ends_landing=Extent.COMMANDED, ends_return=Extent.COMMANDED)
     mode = FlightMode.MISSION
 
     def __init__(self, vehicle: Aircraft, clock: Clock) -> None:

@@ -1,4 +1,4 @@
-"""Flies the drone by setpoints: the shell around `stream` and `base.velocity_loop`.
+"""Flies the drone by setpoints: the shell around `stream` and `steering`.
 
 An attitude or a velocity reaches the sticks the moment it arrives, and again whenever the drone reports its motion. A
 position is a move that the drone makes by itself (`moves`). A timer turns the pilot's silence into a hover,
@@ -12,7 +12,7 @@ import asyncio
 import contextlib
 import math
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import NamedTuple
 
 from anafi_mav import texts, units
@@ -34,20 +34,18 @@ from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.base.velocity_loop import (
     CAUTIOUS_TILT,
-    STILL,
     WIND,
     MotionEstimate,
     VelocityController,
     tilt_for,
     tilt_limit,
-    turn_towards,
 )
-from anafi_mav.vehicle.offboard.goals import Goal, demand, resolve
+from anafi_mav.vehicle.offboard.goals import Goal, resolve
 from anafi_mav.vehicle.offboard.moves import OffboardMoves
 from anafi_mav.vehicle.offboard.setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint, Setpoint
-from anafi_mav.vehicle.offboard.silence import SILENCE
-from anafi_mav.vehicle.offboard.stream import GUIDED_TIMEOUT, OffboardStream, State, is_position, lasts
-from anafi_mav.vehicle.offboard.takeoff import Launcher, SetpointTakeoff, TakeoffPhase, TakeoffStep, climbs
+from anafi_mav.vehicle.offboard.steering import Steering
+from anafi_mav.vehicle.offboard.stream import COUNTS, GUIDED_TIMEOUT, STREAMS, Event, OffboardStream, State, lasts
+from anafi_mav.vehicle.offboard.takeoff import Launcher, climbs
 
 WARN_AGAIN = 1.0
 """m/s by which a velocity has to be higher than the last one whose tilt was worth a word."""
@@ -68,30 +66,15 @@ _BEFORE_TAKEOFF = (FlyingState.LANDED, FlyingState.MOTOR_RAMPING)
 """States in which silence disarms a drone that setpoints take off."""
 
 
-class _Course(NamedTuple):
-    """A heading as it was asked for, and what it meant when it first arrived (rad from north)."""
-
-    body: bool
-    asked: float | None
-    yaw: float | None
-
-
 _GROUND = Needs.NO_PILOT | Needs.LIMITS | Needs.PLAIN_STICKS
 _AIR = _GROUND | Needs.NO_DESCENT | Needs.IN_AIR
 
 
-@dataclass
-class _Engagement:
-    """One attempt of a client to fly by setpoints in Guided, while what flew before is ending."""
+class _Attempt(NamedTuple):
+    """One attempt of a client to acquire control by setpoints, while what flew before is ending."""
 
     client: Hashable
-    is_single: bool
-    """Its setpoint is a single position so far, to be flown to its end."""
-    task: asyncio.Task[None] | None = None
-
-    @property
-    def is_pending(self) -> bool:
-        return self.task is not None and not self.task.done()
+    task: asyncio.Task[None]
 
 
 class OffboardFlight(PlainTask):
@@ -108,29 +91,24 @@ class OffboardFlight(PlainTask):
             Severity.WARNING, texts.REFUSED.fill(what=texts.SETPOINT, reason=reason)
         )
         """Notifies a client that its setpoint, accepted earlier, is not flown."""
-        self.flown: PilotingCommand | None = None
-        """The sticks that setpoints hold at present; None while they hold none."""
         self._vehicle = vehicle
         self._clock = clock
         self._takeoff = takeoff
-        self._lift = SetpointTakeoff()
         self._stream = OffboardStream()
         self._silence = Alarm(self._expired)
-        self._engagement: _Engagement | None = None
-        """The newest in Guided."""
-        self._chosen_by: Hashable = None
-        """Client that chose mode Offboard for the present session."""
-        self._controller = VelocityController(self.motion)
-        self._warned_of = STILL
-        """m/s of velocity up to which it has been said whether MaxTilt is enough."""
-        self._goal: Goal | None = None
-        self._course = _Course(False, None, None)
+        self._attempt: _Attempt | None = None
+        """The newest."""
         self._moves = OffboardMoves(vehicle, lambda reason: self.drop(self._stream.pilot, reason))
 
     @property
     def engaged(self) -> bool:
         """Setpoints fly the drone."""
         return self._stream.flying
+
+    @property
+    def streaming_pilot(self) -> Hashable:
+        """The client whose stream of setpoints flies the drone; None for a single position."""
+        return self._stream.pilot if self._stream.state is State.ENGAGED else None
 
     # Flight task.
 
@@ -139,7 +117,13 @@ class OffboardFlight(PlainTask):
         setpoint = self._stream.setpoint
         needs_roll = isinstance(setpoint, MotionSetpoint) and setpoint.needs_loop
         needs = (_GROUND if self._stands else _AIR) | (Needs.ROLL_SIGN if needs_roll else Needs.NONE)
-        return TaskRules(texts.OFFBOARD, needs=needs)
+        return TaskRules(
+            texts.OFFBOARD,
+            needs=needs,
+            ends_landing=Extent.COMMANDED,
+            ends_return=Extent.COMMANDED,
+            follows=True,
+        )
 
     @property
     def mode(self) -> FlightMode | None:
@@ -154,14 +138,19 @@ class OffboardFlight(PlainTask):
         return self._stream.setpoint
 
     @property
+    def flown(self) -> PilotingCommand | None:
+        """The sticks that setpoints hold at present; None while they hold none."""
+        return None if self._stream.steering is None else self._stream.steering.sticks
+
+    @property
     def goal(self) -> Goal | None:
         """The position of what is being flown, resolved; None when it has none."""
-        return self._goal if self.engaged else None
+        return None if self._stream.steering is None else self._stream.steering.goal
 
     @property
     def yaw(self) -> float | None:
         """The heading (rad from north) that is turned to or held; None when none is."""
-        return self._course.yaw if self.engaged else None
+        return None if self._stream.steering is None else self._stream.steering.heading.yaw
 
     # What programs ask for.
 
@@ -172,28 +161,23 @@ class OffboardFlight(PlainTask):
         Returns None, or the reason for which the setpoint is not flown. One that waits for the end of a take-off, or
         for mode Offboard and asks for no motion, has none.
         """
-        now = self._clock.monotonic()
-        stands = self._stands
-        moves = isinstance(setpoint, MotionSetpoint) and (not stands or climbs(setpoint, self._vehicle.height.ato))
-        if moves and isinstance(setpoint, MotionSetpoint) and (reason := self._objection(sender, setpoint)):
+        now, timeout = self._clock.monotonic(), lasts(setpoint, self.guided_timeout if guided else None)
+        if (reason := self._objection(sender, setpoint)) is not None:
             return reason
-        follows = self._stream.continues_stream(sender, now)
-        if not self._stream.receive(sender, setpoint, now, lasts(setpoint, self.guided_timeout if guided else None)):
-            return texts.OTHER_PROGRAM if self._stream.state is State.ENGAGED else texts.TOO_MANY_PROGRAMS
-        deadline = self._stream.deadline()
-        if self._silence.at is None or (deadline is not None and deadline < self._silence.at):
-            self._watch()  # the pilot's newest setpoint may last for less time than the one before
-        if stands:
+        self._stream = stream = self._stream.receive(sender, setpoint, now, timeout)
+        if (reason := stream.objection(sender)) is not None:
+            return reason
+        self._watch()  # the pilot's newest setpoint may last for less time than the one before
+        if self._stands:
             return self._on_ground(sender, setpoint, now, guided=guided)
-        pilot = self.engaged and sender == self._stream.pilot
-        if pilot and self._stream.state is State.SINGLE and (follows or not is_position(setpoint)):
-            self._stream.engage(sender)
-            self._watch()
-            self._vehicle.changed()
-        if pilot:
+        if self.engaged and sender == stream.pilot:
+            if stream.state is State.SINGLE and not stream.received[sender].is_single:
+                self._stream = stream.after(Event.ENGAGE)
+                self._watch()
+                self._vehicle.changed()
             return self._fly(now)
         if guided:
-            return self._begin_guided(sender, setpoint, now, follows=follows)
+            return self._begin_guided(sender)
         return None if setpoint.is_still else texts.NOT_OFFBOARD.fill(mode=self._vehicle.mode.value)
 
     # On the ground.
@@ -208,8 +192,8 @@ class OffboardFlight(PlainTask):
 
         Returns why a setpoint takes nothing off, or None. ArduCopter flies attitudes alone from the ground.
         """
-        vehicle, lift = self._vehicle, self._lift
-        pilot = self._stream.state is State.ENGAGED and sender == self._stream.pilot
+        vehicle, control, stream = self._vehicle, self._vehicle.control, self._stream
+        pilot = stream.state in STREAMS and sender == stream.pilot
         if guided and isinstance(setpoint, MotionSetpoint):
             self._end_count(sender)
             return texts.TAKE_OFF_FIRST
@@ -218,31 +202,36 @@ class OffboardFlight(PlainTask):
             if guided or setpoint.is_still or isinstance(setpoint, AttitudeSetpoint):
                 return None
             return texts.NO_CLIMB if pilot else texts.NOT_OFFBOARD.fill(mode=vehicle.mode.value)
-        if lift.phase in (TakeoffPhase.LIFTING, TakeoffPhase.JOINED):
+        if stream.state in (State.LIFTING, State.JOINED) or self._is_acquiring:
             return None
         if guided:
-            below = vehicle.control.below
-            engaged = isinstance(below, Hover) and below == _GUIDED and below.client == sender
-        else:
-            engaged = pilot and self._chosen_by == sender
-        if not engaged:
-            if guided:
+            below = control.below
+            if not (isinstance(below, Hover) and below == _GUIDED and below.client == sender):
                 return texts.TAKE_OFF_OR_GUIDED
-            return texts.NOT_CHOSEN if pilot else texts.NOT_OFFBOARD.fill(mode=vehicle.mode.value)
+        elif stream.engagement is None or not pilot:
+            return texts.NOT_OFFBOARD.fill(mode=vehicle.mode.value)
+        elif stream.engagement.chosen_by != sender:
+            return texts.NOT_CHOSEN
         if not self._takeoff.is_armed_by(sender):
             return texts.NOT_ARMED_BY_CLIENT
-        refusal = vehicle.control.policy(Request(self, Right(sender, Extent.COMMANDED), self.rules))
+        by = Right(sender, Extent.COMMANDED)
+        refusal = control.policy(Request(self, by, self.rules))
         if (reason := self._grounded if refusal is None else refusal.reason) is not None:
             return reason
-        step = lift.climb(sender, now, SILENCE)
-        if step is TakeoffStep.WARN:
+        self._stream = stream.climb(sender, now)
+        self._watch()
+        if self._stream.state is State.LIFTING:
+            self._attempt = _Attempt(sender, control.run(sender, self._take_off(by, self._stream), is_order=False))
+        elif stream.climbs_since != self._stream.climbs_since:
             if guided:
-                vehicle.control.adopt(self, keeps_below=True)
+                control.adopt(self, keeps_below=True)
             vehicle.text(Severity.WARNING, texts.SETPOINT_TAKEOFF_SOON.fill(system=system_of(sender)))
-        elif step is TakeoffStep.TAKE_OFF:
-            lift.begin(sender, TakeoffPhase.LIFTING)
-            vehicle.control.run(sender, self._take_off(Right(sender, Extent.COMMANDED)), is_order=False)
         return None
+
+    @property
+    def _is_acquiring(self) -> bool:
+        """True while the newest attempt of a client has not ended."""
+        return self._attempt is not None and not self._attempt.task.done()
 
     @property
     def _grounded(self) -> OperatorText | None:
@@ -257,29 +246,27 @@ class OffboardFlight(PlainTask):
 
     def _end_count(self, sender: Hashable) -> None:
         """One setpoint that does not climb ends the second of the client that sent it."""
-        if self._lift.phase is TakeoffPhase.COUNTING and self._lift.client == sender:
-            self._lift.stop()
+        if self._stream.state in COUNTS and self._stream.pilot == sender:
+            self._stream = self._stream.after(Event.STAY)
             if not self.engaged:
                 self._vehicle.control.release(self)
             self._vehicle.text(Severity.NOTICE, texts.SETPOINT_TAKEOFF_NO_CLIMB)
 
-    async def _take_off(self, by: Right) -> None:
+    async def _take_off(self, by: Right, counted: OffboardStream) -> None:
         """Take off after a second of climbing setpoints; the newest is flown from the first hover."""
-        vehicle, lift, client = self._vehicle, self._lift, by.client
+        vehicle, client = self._vehicle, by.client
         below = _GUIDED if vehicle.control.mode is FlightMode.GUIDED else None
         try:
             async with vehicle.control.acquire(self, by=by, below=below) as grant:
                 fresh = self._stream.candidate(client, self._clock.monotonic()) == client
                 if not (self._stands and fresh and self._takeoff.is_armed_by(client)):
                     raise Refused(texts.SETPOINT_TAKEOFF, texts.SETPOINTS_STOPPED)
-                lift.begin(client, TakeoffPhase.LIFTING)
-                self._stream.engage(client)
-                self._watch()
+                self._engage(Event.LIFT, client)
                 grant.begin()
                 await self._takeoff.launch()
         except AnafiMavError as error:
-            if lift.phase is TakeoffPhase.LIFTING:
-                lift.stop()
+            if self._stream.engagement is counted.engagement:  # refused before it has replaced anything
+                vehicle.control.release(self)
             vehicle.text(Severity.ERROR, texts.SETPOINT_TAKEOFF_FAILED.fill(error=reason_of(error)))
 
     def begin(self) -> None:
@@ -288,31 +275,31 @@ class OffboardFlight(PlainTask):
 
     def after_takeoff(self) -> None:
         """The drone hovers, or a take-off has ended: fly what is fresh at this moment."""
-        vehicle = self._vehicle
-        if self._lift.phase not in (TakeoffPhase.LIFTING, TakeoffPhase.JOINED) or self._takeoff.under_way:
+        vehicle, state = self._vehicle, self._stream.state
+        if state not in (State.LIFTING, State.JOINED) or self._takeoff.under_way:
             return
-        if vehicle.in_air:
-            self._lift.stop()
-            if self.engaged and not vehicle.returning:
+        if vehicle.in_air or state is State.JOINED:
+            self._stream = self._stream.after(Event.RISEN)
+            if vehicle.in_air and not vehicle.returning:
                 self._begin()
-        elif self._lift.phase is TakeoffPhase.JOINED:
-            self._lift.stop()
 
     def left_ground(self) -> None:
         """The drone takes off.
 
         A session that stands by on the ground flies only a take-off that is its own.
         """
-        if self.engaged and self._lift.phase not in (TakeoffPhase.LIFTING, TakeoffPhase.JOINED):
+        if self.engaged and self._stream.state not in (State.LIFTING, State.JOINED):
             self._vehicle.control.lose(texts.NOT_ITS_TAKEOFF)
 
-    def _objection(self, sender: Hashable, setpoint: MotionSetpoint) -> OperatorText | None:
-        """Why a position cannot be flown to; None when it can, or is being flown to."""
+    def _objection(self, sender: Hashable, setpoint: Setpoint) -> OperatorText | None:
+        """Return why a setpoint cannot be flown; None when it can, is, or leaves the drone standing."""
+        if isinstance(setpoint, AttitudeSetpoint) or (self._stands and not climbs(setpoint, self._vehicle.height.ato)):
+            return None
         if self._vehicle.roll.sign is RollSign.INVERTED and setpoint.needs_loop:
             return texts.ROLL_INVERTED
         if setpoint.position == NOTHING:
             return None
-        if sender == self._stream.pilot and self._goal is not None and self._goal.is_of(setpoint):
+        if sender == self._stream.pilot and self.goal is not None and self.goal.is_of(setpoint):
             return None
         try:
             resolve(setpoint, self._vehicle, self.motion)
@@ -337,28 +324,29 @@ class OffboardFlight(PlainTask):
         if candidate is None:
             reason = texts.ROLL_INVERTED if self._vehicle.roll.sign is RollSign.INVERTED else texts.NO_SETPOINTS
             raise Refused(texts.OFFBOARD, reason)
-        if self._stream.state is State.ENGAGED and candidate == self._stream.pilot:
-            self._chosen_by = client
+        if self._stream.state in STREAMS and candidate == self._stream.pilot:
+            self._stream = self._stream.note(chosen_by=client)
             return  # it flies already, and goes on without a jolt
         if self._takeoff.under_way:
-            self._stream.engage(candidate)
-            self._lift.begin(candidate, TakeoffPhase.JOINED)
-            self._chosen_by = client
+            self._engage(Event.JOIN, candidate, client)
             control.succeed(self)
-            self._watch()
             return
         async with control.acquire(self, by=by) as grant:
             pilot = self._stream.candidate(client, self._clock.monotonic())
             if pilot is None or not (self._vehicle.in_air or self._stands):
                 raise Refused(texts.OFFBOARD, texts.SETPOINTS_STOPPED if pilot is None else self._vehicle.activity)
-            self._stream.engage(pilot)
-            self._chosen_by = client
+            self._engage(Event.ENGAGE, pilot, client)
             grant.begin()
             self._begin()
 
+    def _engage(self, event: Event, pilot: Hashable, chosen_by: Hashable = None) -> None:
+        """The session has this pilot from now on, and ends with its silence."""
+        self._stream = self._stream.engage(event, pilot, chosen_by)
+        self._watch()
+
     def _require_freedom(self, what: OperatorText) -> None:
         vehicle = self._vehicle
-        lifting = self._takeoff.under_way or self._lift.phase is TakeoffPhase.LIFTING
+        lifting = self._takeoff.under_way or self._stream.state is State.LIFTING
         if not (vehicle.in_air or self._stands or lifting):
             raise Refused(what, texts.TAKE_OFF_FIRST)
         if vehicle.drone.piloting.about_to_fly and not lifting:
@@ -370,8 +358,8 @@ class OffboardFlight(PlainTask):
 
     # ArduPilot's way.
 
-    def _begin_guided(self, sender: Hashable, setpoint: Setpoint, now: float, *, follows: bool) -> OperatorText | None:
-        vehicle = self._vehicle
+    def _begin_guided(self, sender: Hashable) -> OperatorText | None:
+        vehicle, attempt = self._vehicle, self._attempt
         if self._takeoff.under_way and vehicle.control.mode is FlightMode.GUIDED:
             return None  # at its end the next setpoint is flown
         if not vehicle.in_air:
@@ -380,18 +368,13 @@ class OffboardFlight(PlainTask):
             return texts.PAUSED_BY_CLIENT
         if vehicle.mode is not FlightMode.GUIDED:
             return texts.IN_MODE.fill(mode=vehicle.mode.value)
-        is_single = is_position(setpoint) and not (follows or self._stream.is_late_after_stream(sender, now))
-        engagement = self._engagement
-        if engagement is not None and engagement.is_pending and engagement.client == sender:
-            engagement.is_single = is_single
-            return None
-        self._engagement = engagement = _Engagement(sender, is_single)
-        engagement.task = vehicle.control.run(sender, self._engage_guided(engagement, setpoint, now), is_order=False)
+        if attempt is None or not self._is_acquiring or attempt.client != sender:
+            self._attempt = _Attempt(sender, vehicle.control.run(sender, self._engage_guided(sender), is_order=False))
         return None
 
-    async def _engage_guided(self, engagement: _Engagement, setpoint: Setpoint, said: float) -> None:
-        """A setpoint in mode Guided acquires the drone from whatever it does in that mode."""
-        vehicle, control, client = self._vehicle, self._vehicle.control, engagement.client
+    async def _engage_guided(self, client: Hashable) -> None:
+        """The newest setpoint in mode Guided acquires the drone from whatever it does in that mode."""
+        vehicle, control = self._vehicle, self._vehicle.control
         try:
             self._require_freedom(texts.SETPOINT)
             if vehicle.mode is not FlightMode.GUIDED:  # ended by what arrived together with the setpoint
@@ -399,28 +382,26 @@ class OffboardFlight(PlainTask):
             async with control.acquire(
                 self, by=Right(client, Extent.COMMANDED), below=_GUIDED, rules=_IN_GUIDED
             ) as grant:
-                now = self._clock.monotonic()
-                if engagement.is_single and now - said < SINGLE_WAIT:
-                    self._stream.engage_single(client, setpoint, said)
-                elif not engagement.is_single and self._stream.candidate(client, now) == client:
-                    self._stream.engage(client)
-                else:
+                now, newest = self._clock.monotonic(), self._stream.received.get(client)
+                if newest is None or now >= (newest.at + SINGLE_WAIT if newest.is_single else newest.over):
                     raise Refused(texts.SETPOINT, texts.WAITED_TOO_LONG)
+                self._engage(Event.ENGAGE_SINGLE if newest.is_single else Event.ENGAGE, client)
                 grant.begin()
                 self._begin()
         except AnafiMavError as error:
             self.drop(client, reason_of(error))
         except asyncio.CancelledError:
-            action = control.actions.current
-            if engagement.is_single and action is not None and action.is_replaced_by_another_client:
+            action, newest = control.actions.current, self._stream.received.get(client)
+            is_single = newest is not None and newest.is_single
+            if is_single and action is not None and action.is_replaced_by_another_client:
                 self.drop(client, texts.MISSION_DISPLACED if action.replaced_by_order else texts.OTHER_PROGRAM)
             raise
 
     # Ending.
 
-    def _report_replaced(self) -> None:
+    def _report_replaced(self, pilot: Hashable) -> None:
         """Notify the sender of a single setpoint whose flight the action of another client ends."""
-        action, pilot = self._vehicle.control.actions.current, self._stream.pilot
+        action = self._vehicle.control.actions.current
         if action is not None and action.client not in (None, pilot):
             self.drop(pilot, texts.MISSION_DISPLACED if action.is_order else texts.OTHER_PROGRAM)
 
@@ -429,16 +410,15 @@ class OffboardFlight(PlainTask):
 
         Returns tasks that are about to end.
         """
-        if self._lift.stop() is TakeoffPhase.COUNTING:
+        ended, self._stream = self._stream, self._stream.after(Event.DISENGAGE)
+        self._watch()
+        if ended.state in COUNTS:
             self._forget_choice()
             self._vehicle.text(Severity.NOTICE, texts.SETPOINT_TAKEOFF_CANCELLED)
-        if not self.engaged:
+        if not ended.flying:
             return []
-        if self._stream.state is State.SINGLE and self._moves.under_way:
-            self._report_replaced()
-        self._stream.disengage()
-        self._watch()
-        self.flown = self._chosen_by = None
+        if ended.state is State.SINGLE and self._moves.under_way:
+            self._report_replaced(ended.pilot)
         ending = self._moves.stop()
         with contextlib.suppress(LinkLost):
             self._vehicle.drone.piloting.pilot(None)
@@ -446,19 +426,15 @@ class OffboardFlight(PlainTask):
 
     def _forget_choice(self) -> None:
         """The client whose climb was counted has to choose the mode once more."""
-        self._chosen_by = None
         if self._vehicle.control.below == _GUIDED:
             self._vehicle.control.adopt(_GUIDED)
 
     def link_down(self) -> None:
         """Setpoints of before count for nothing."""
-        self._silence.cancel()
-        self._lift.stop()
         self._moves.forget()
-        self._goal = self.flown = None
         self._stream = OffboardStream()
+        self._watch()
         self.motion = MotionEstimate(self._vehicle.roll)
-        self._controller = VelocityController(self.motion)
 
     # What the drone reports.
 
@@ -501,11 +477,8 @@ class OffboardFlight(PlainTask):
     # Flying.
 
     def _begin(self) -> None:
-        """The session has a pilot from now on."""
-        self._watch()  # the pilot's, which may be older than the newest of all
-        self._controller = VelocityController(self.motion)
-        self._goal, self._course = None, _Course(False, None, None)
-        self._warned_of = STILL
+        """Setpoints fly the drone from now on."""
+        self._stream = self._stream.note(steering=Steering(VelocityController(self.motion)))
         if self._vehicle.in_air:
             self._vehicle.drone.piloting.hover()  # ends a moveTo or moveBy of ours, which would ignore sticks
         self._fly_on(self._clock.monotonic())
@@ -518,110 +491,70 @@ class OffboardFlight(PlainTask):
 
     def _fly(self, now: float) -> OperatorText | None:
         """Fly the pilot's newest setpoint at this moment; return why it is not flown, or None."""
-        vehicle, setpoint = self._vehicle, self._stream.setpoint
-        limits = vehicle.drone.piloting.limits
-        if setpoint is None or limits is None or not vehicle.in_air or self._lift.phase is TakeoffPhase.JOINED:
+        vehicle, stream = self._vehicle, self._stream
+        setpoint, steering, limits = stream.setpoint, stream.steering, vehicle.drone.piloting.limits
+        if setpoint is None or steering is None or limits is None or not vehicle.in_air:
             return None
         if not vehicle.control.keeps(self):
             return None
         if isinstance(setpoint, AttitudeSetpoint):
-            self._hold(self._attitude(setpoint, limits, now), now)
+            self._hold(steering.lean(setpoint, limits, now), now)
             return None
         try:
-            self._goal, self._course = self._resolved(setpoint), self._turned_to(setpoint)
-            if setpoint.moves and self._goal is not None:
-                self.flown = None
-                return self._moves.go(self._goal, self._course.yaw, now, asked=self._stream.state is State.ENGAGED)
-            self._hold(self._motion_sticks(setpoint, limits, now), now)
+            steering = steering.resolve(setpoint, vehicle)
+            if setpoint.moves and steering.goal is not None:
+                self._stream = stream.note(steering=steering)
+                return self._moves.go(steering.goal, steering.heading.yaw, now, asked=stream.state is not State.SINGLE)
+            steering = self._judge_speed(setpoint, limits, steering)
+            steering = steering.close_loop(setpoint, limits, now, located=vehicle.place is not None)
         except Refused as refusal:  # what the drone told when the setpoint arrived is not known any more
-            self._hold(PilotingCommand(), now)
+            self._hold(replace(steering, sticks=PilotingCommand()), now)
             return refusal.reason
+        if steering.is_short_of_tilt:
+            self.warn_throttled(texts.TILT_SHORT.fill(tilt=limits.tilt_deg))
+        self._hold(steering, now)
         return None
 
-    def _attitude(self, setpoint: AttitudeSetpoint, limits: Limits, now: float) -> PilotingCommand:
-        self._goal, self._course = None, _Course(False, setpoint.yaw, setpoint.yaw)
-        turn = setpoint.yaw_rate
-        if self.motion.yaw is not None and self.motion.knows_heading(now):
-            turn = turn_towards(setpoint.yaw, self.motion.yaw, turn)
-        return PilotingCommand(
-            roll_deg=setpoint.roll * units.DEG_PER_RAD,
-            pitch_deg=setpoint.pitch * units.DEG_PER_RAD,
-            yaw_rate_dps=turn * units.DEG_PER_RAD,
-            climb_mps=setpoint.climb * limits.climb_mps,
-        )
-
-    def _motion_sticks(self, setpoint: MotionSetpoint, limits: Limits, now: float) -> PilotingCommand:
+    def _judge_speed(self, setpoint: MotionSetpoint, limits: Limits, steering: Steering) -> Steering:
+        """Warn once for each higher speed that MaxTilt does not hold."""
         speed = math.hypot(setpoint.velocity[0] or 0.0, setpoint.velocity[1] or 0.0)
-        if speed > self._warned_of:
-            self._warned_of = speed + WARN_AGAIN
-            needed = tilt_for(speed) * units.DEG_PER_RAD
-            allowed = tilt_limit(limits, self.motion) * units.DEG_PER_RAD
-            if allowed < min(needed, limits.tilt_deg):
-                self.warn_throttled(TILT_HELD)
-            elif needed > limits.tilt_deg:
-                self.warn_throttled(
-                    texts.TILT_WIND.fill(tilt=limits.tilt_deg, speed=speed, wind=WIND, needed=math.ceil(needed))
-                )
-        located = self._vehicle.place is not None
-        wanted = demand(setpoint, self._goal, self._course.yaw, located=located)
-        sticks = self._controller.sticks(wanted, limits, now)
-        if sticks is None:
-            raise Refused(texts.SETPOINT, texts.MOTION_UNKNOWN)
-        if self._controller.short_of is not None and self.motion.trusts_tilt:
-            self.warn_throttled(texts.TILT_SHORT.fill(tilt=limits.tilt_deg))
-        return sticks
+        if speed <= steering.warned_of:
+            return steering
+        needed = tilt_for(speed) * units.DEG_PER_RAD
+        allowed = tilt_limit(limits, self.motion) * units.DEG_PER_RAD
+        if allowed < min(needed, limits.tilt_deg):
+            self.warn_throttled(TILT_HELD)
+        elif needed > limits.tilt_deg:
+            self.warn_throttled(
+                texts.TILT_WIND.fill(tilt=limits.tilt_deg, speed=speed, wind=WIND, needed=math.ceil(needed))
+            )
+        return replace(steering, warned_of=speed + WARN_AGAIN)
 
-    def _resolved(self, setpoint: MotionSetpoint) -> Goal | None:
-        """Return the setpoint's position as it was resolved when the setpoint first arrived."""
-        if setpoint.position == NOTHING:
-            return None
-        if self._goal is not None and self._goal.is_of(setpoint):
-            return self._goal
-        return resolve(setpoint, self._vehicle, self.motion)
-
-    def _turned_to(self, setpoint: MotionSetpoint) -> _Course:
-        """Return the setpoint's heading as it was resolved when the setpoint first arrived."""
-        if self._course[:2] == (setpoint.body, setpoint.yaw):
-            return self._course
-        yaw = setpoint.yaw
-        if yaw is not None and setpoint.body:
-            if self.motion.yaw is None:
-                raise Refused(texts.SETPOINT, texts.HEADING_UNKNOWN)
-            yaw = units.wrap_pi(self.motion.yaw + yaw)
-        return _Course(setpoint.body, setpoint.yaw, yaw)
-
-    def _hold(self, sticks: PilotingCommand, now: float) -> None:
+    def _hold(self, steering: Steering, now: float) -> None:
         """These sticks, for as long as the setpoint is young."""
         if self._moves.active:
             self._moves.stop()
-        self.flown = sticks
-        self._vehicle.drone.piloting.pilot(sticks, age=self._stream.stick_age(now))
+        self._stream = self._stream.note(steering=steering)
+        self._vehicle.drone.piloting.pilot(steering.sticks, age=self._stream.stick_age(now))
 
     # Silence.
 
     def _expired(self) -> None:
-        lifted, phase = self._lift.client, self._lift.phase
-        expired = self._stream.expire(self._clock.monotonic())
-        counted = phase is TakeoffPhase.COUNTING and self._stream.newest(lifted) is None
-        if (expired and phase is TakeoffPhase.LIFTING and self._vehicle.flying_state in _BEFORE_TAKEOFF) or counted:
-            self._lift.stop()
-            self._vehicle.control.release(self)
-            self._forget_choice()
-            self._vehicle.text(Severity.WARNING, texts.GROUND_SETPOINTS_STOPPED)
-            by = Right(lifted, Extent.COMMANDED)
-            self._vehicle.control.run(lifted, self._takeoff.abort(by), is_order=False)
-        elif expired:
-            self._stopped(joined=phase is TakeoffPhase.JOINED)
+        """End an engagement whose pilot is silent: the drone hovers, or is disarmed."""
+        vehicle, ended = self._vehicle, self._stream
+        self._stream = ended.expire(self._clock.monotonic())
         self._watch()
-
-    def _stopped(self, *, joined: bool) -> None:
-        """The pilot's silence has lasted too long.
-
-        `joined`: a take-off that is not the pilot's setpoints' goes on.
-        """
-        vehicle = self._vehicle
-        self._lift.stop()
-        self.flown = None
+        if self._stream is ended:
+            return
+        lifting = ended.state is State.LIFTING and vehicle.flying_state in _BEFORE_TAKEOFF
+        joined = ended.state is State.JOINED  # a take-off goes on that is not the pilot's
+        if ended.state in COUNTS or lifting:
+            vehicle.control.release(self)
+            self._forget_choice()
+            vehicle.text(Severity.WARNING, texts.GROUND_SETPOINTS_STOPPED)
+            abort = self._takeoff.abort(Right(ended.pilot, Extent.COMMANDED))
+            vehicle.control.run(ended.pilot, abort, is_order=False)
+            return
         self._moves.forget()
         if not (self._stands or joined):
             vehicle.drone.piloting.hover()
@@ -634,9 +567,9 @@ class OffboardFlight(PlainTask):
             vehicle.text(Severity.WARNING, texts.OFFBOARD_STOPPED_HOVER)
 
     def _watch(self) -> None:
-        """Come back when those that matter have been silent for too long."""
-        deadline = self._stream.deadline()
+        """Wake up when the pilot has been silent for too long, or before."""
+        deadline = self._stream.deadline
         if deadline is None:
             self._silence.cancel()
-        else:
+        elif self._silence.at is None or deadline < self._silence.at:
             self._silence.set(deadline)

@@ -10,7 +10,8 @@ import asyncio
 import contextlib
 import math
 from collections.abc import Callable
-from typing import TypeAlias
+from dataclasses import dataclass, replace
+from typing import Any
 
 from anafi_mav import texts, units
 from anafi_mav.drone import MoveEnd
@@ -34,8 +35,28 @@ RETRY = 2.0
 may have flown a part of its way."""
 
 
-_Wanted: TypeAlias = "tuple[Goal, float | None]"
-"""Goal, and the heading there (rad from north); None keeps the present heading."""
+@dataclass(frozen=True, eq=False)
+class _Wanted:
+    """A requested move: the identity of one attempt, of which a retry is another."""
+
+    goal: Goal
+    yaw: float | None
+    """rad from north; None keeps the present heading."""
+
+
+@dataclass(frozen=True)
+class _Attempt:
+    """All facts of the newest attempt to fly to a goal."""
+
+    wanted: _Wanted
+    starter: asyncio.Task[None]
+    """Begins this one, and the next one `MOVE_EVERY` later."""
+    waits: tuple[asyncio.Task[None], ...] = ()
+    """Wait for the end of a moveBy each; all but the newest are about to hear of it."""
+    is_begun: bool = False
+    failure: OperatorText | None = None
+    """Reason for which the drone does not make the move, or did not at the last try; None while it does."""
+    retry_at: float = math.inf
 
 
 class OffboardMoves:
@@ -45,25 +66,19 @@ class OffboardMoves:
         """`drop` receives the reason for which a goal is not flown to."""
         self._vehicle = vehicle
         self._drop = drop
-        self._wanted: _Wanted | None = None
-        """Requested move that has not begun."""
-        self._begun: _Wanted | None = None
-        self._failure: OperatorText | None = None
-        """Reason for which the drone does not make the move that has begun; None while it does."""
-        self._retry_at = math.inf
-        self._starter: asyncio.Task[None] | None = None
-        self._relative: set[asyncio.Task[None]] = set()
-        """Wait for the end of a moveBy each; all but the newest are about to hear of it."""
+        self._attempt: _Attempt | None = None
 
     @property
     def active(self) -> bool:
         """Something has been begun and not been stopped; it may have arrived."""
-        return self._begun is not None
+        return self._attempt is not None
 
     @property
     def under_way(self) -> bool:
         """True until the goal is reached, as far as the drone has reported it."""
-        return self._wanted is not None or bool(self._relative) or self._vehicle.drone.piloting.moving
+        attempt = self._attempt
+        is_waiting = attempt is not None and (not attempt.is_begun or not all(wait.done() for wait in attempt.waits))
+        return is_waiting or self._vehicle.drone.piloting.moving
 
     def go(self, goal: Goal, yaw: float | None, now: float, *, asked: bool) -> OperatorText | None:
         """Fly to a goal and turn to a heading (rad from north) on the way; None keeps the heading.
@@ -72,23 +87,25 @@ class OffboardMoves:
 
         Returns the reason for which the drone has not flown to this goal, which may be tried again; None without one.
         """
-        wanted = (goal, yaw)
-        if wanted != self._begun:
-            self._failure = None
-        elif not asked or now < self._retry_at:
-            return self._failure
-        self._begun = self._wanted = wanted
-        self._retry_at = math.inf
-        if self._starter is None or self._starter.done():
-            self._starter = asyncio.get_running_loop().create_task(self._start())
-        return self._failure
+        before, failure = self._attempt, None
+        if before is not None and (before.wanted.goal, before.wanted.yaw) == (goal, yaw):
+            failure = before.failure
+            if not asked or now < before.retry_at:
+                return failure
+        if before is None or before.starter.done():
+            starter = asyncio.get_running_loop().create_task(self._start())
+        else:
+            starter = before.starter
+        waits = () if before is None else tuple(wait for wait in before.waits if not wait.done())
+        self._attempt = _Attempt(_Wanted(goal, yaw), starter, waits, failure=failure)
+        return failure
 
     def stop(self) -> list[asyncio.Task[None]]:
         """End what has been begun: the drone hovers, unless it lands or returns.
 
         Tasks that are about to end.
         """
-        if self._begun is not None and self._vehicle.drone.piloting.sticks_blocked is None:
+        if self._attempt is not None and self._vehicle.drone.piloting.sticks_blocked is None:
             # Before the waiting ends: a relative move whose waiting is given up would be ended a second time.
             with contextlib.suppress(LinkLost):
                 self._vehicle.drone.piloting.hover()
@@ -96,17 +113,23 @@ class OffboardMoves:
 
     def forget(self) -> list[asyncio.Task[None]]:
         """Begin nothing more, and wait for nothing. Returns tasks that are about to end."""
-        self._wanted = self._begun = self._failure = None
-        self._retry_at = math.inf
-        tasks = [task for task in (self._starter, *self._relative) if task is not None and not task.done()]
+        attempt, self._attempt = self._attempt, None
+        tasks = [] if attempt is None else [t for t in (attempt.starter, *attempt.waits) if not t.done()]
         for task in tasks:
             task.cancel()
-        self._starter = None
         return tasks
 
+    def _note(self, wanted: _Wanted, **facts: Any) -> bool:
+        """Note facts of an attempt; return False for one that was replaced or stopped."""
+        if self._attempt is None or self._attempt.wanted is not wanted:
+            return False
+        self._attempt = replace(self._attempt, **facts)
+        return True
+
     async def _start(self) -> None:
-        while (wanted := self._wanted) is not None:
-            self._wanted = None
+        while self._attempt is not None and not self._attempt.is_begun:
+            wanted = self._attempt.wanted
+            self._note(wanted, is_begun=True)
             try:
                 await self._move(wanted)
             except AnafiMavError as error:
@@ -114,17 +137,16 @@ class OffboardMoves:
             await asyncio.sleep(MOVE_EVERY)
 
     async def _move(self, wanted: _Wanted) -> None:
-        goal, yaw = wanted
+        goal, yaw = wanted.goal, wanted.yaw
         piloting, vehicle = self._vehicle.drone.piloting, self._vehicle
         present = piloting.state.altitude
         if goal.offset is not None:
-            front, right, down = goal.offset
-            self._by(wanted, front, right, down, yaw)
+            self._by(wanted, *goal.offset)
             return
         if goal.place is None:
             if present is None or goal.height is None:
                 raise Rejected(texts.HEIGHT_UNKNOWN)
-            self._by(wanted, 0.0, 0.0, present - goal.height, yaw)
+            self._by(wanted, 0.0, 0.0, present - goal.height)
             return
         height = present if goal.height is None else goal.height
         if height is None:
@@ -139,8 +161,7 @@ class OffboardMoves:
             vertical_speed=vehicle.climb_speed,
             orientation=orientation,
         )
-        if self._is_news_of(wanted):
-            self._failure = None
+        self._note(wanted, failure=None)
         move.ended.add_done_callback(lambda ended: self._ended(wanted, ended.result()))
 
     @property
@@ -155,16 +176,16 @@ class OffboardMoves:
             return MoveHeading.KEEP
         return MoveHeading.TO_TARGET
 
-    def _by(self, wanted: _Wanted, front: float, right: float, down: float, yaw: float | None) -> None:
+    def _by(self, wanted: _Wanted, front: float, right: float, down: float) -> None:
         piloting = self._vehicle.drone.piloting
         turn = 0.0
-        if yaw is not None and (attitude := piloting.state.attitude) is not None:
-            turn = units.wrap_pi(yaw - attitude.yaw)
+        if wanted.yaw is not None and (attitude := piloting.state.attitude) is not None:
+            turn = units.wrap_pi(wanted.yaw - attitude.yaw)
         if piloting.move is not None:
             piloting.hover()  # a moveBy replaces a moveBy, of a moveTo nobody says so
         task = asyncio.get_running_loop().create_task(self._relative_move(wanted, front, right, down, turn))
-        self._relative.add(task)
-        task.add_done_callback(self._relative.discard)
+        if self._attempt is not None:
+            self._attempt = replace(self._attempt, waits=(*self._attempt.waits, task))
 
     async def _relative_move(self, wanted: _Wanted, front: float, right: float, down: float, turn: float) -> None:
         try:
@@ -177,21 +198,14 @@ class OffboardMoves:
     def _ended(self, wanted: _Wanted, how: MoveEnd) -> None:
         if how is MoveEnd.ERROR:
             self._failed(wanted, texts.MOVE_FAILED, again=True)
-        elif how is MoveEnd.CANCELED and self._is_news_of(wanted):
-            self._failure = texts.MOVE_CANCELLED
+        elif how is MoveEnd.CANCELED and self._note(wanted, failure=texts.MOVE_CANCELLED):
             self._drop(texts.MOVE_CANCELLED)
-
-    def _is_news_of(self, wanted: _Wanted) -> bool:
-        """Of a move that was replaced or stopped there is nothing to say."""
-        return self._begun == wanted and self._wanted is None
 
     def _failed(self, wanted: _Wanted, why: OperatorText, *, again: bool) -> None:
         """The drone did not make a move."""
-        if not self._is_news_of(wanted):
+        retry_at = asyncio.get_running_loop().time() + RETRY if again else math.inf
+        if not self._note(wanted, failure=why, retry_at=retry_at):
             return
-        if again:
-            self._retry_at = asyncio.get_running_loop().time() + RETRY
-        self._failure = why
         self._drop(why)
         # One that was refused leaves an older one alone, which nobody asks for any more.
         if self._vehicle.drone.piloting.sticks_blocked is None:

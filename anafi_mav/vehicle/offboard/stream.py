@@ -1,23 +1,33 @@
 """Offboard: a program's setpoints fly the drone while they keep arriving. No I/O.
 
-`OffboardStream` stores the sender of the setpoints and whether they fly the drone; their content is in `setpoints`, and
-`OffboardFlight` flies it.
+`OffboardStream` is one value: the newest setpoint of each client, and the `Engagement` of the client whose setpoints
+fly the drone. What is known of an engagement is a part of it and ends with it. `OffboardFlight` stores the value and
+flies the setpoint; what setpoints mean is in `setpoints` and `steering`.
 
 A session has one pilot: the client that engages it. Setpoints of others change nothing while it lasts. PX4's way to
 engage is mode Offboard, refused without setpoints. ArduPilot's way is to send setpoints in mode Guided, and there a
 single position is a move of its own, which nothing but its end or another order ends; a second setpoint of the same
 program within `TOGETHER` makes a stream of it, whose end is silence. After that end a position of the same program is
 a part of the stream for `LATE_AFTER_STREAM` longer: what a bad link delivers late must not send the drone off for good.
+
+On the ground only a climb that one and the same client requests without a gap for `CLIMB_FOR` takes the drone off, and
+every client is warned in that time: one packet, or the setpoint of a client that did not arm, starts no motor.
 """
 
 from __future__ import annotations
 
 import enum
-from collections.abc import Hashable
-from typing import NamedTuple
+import math
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
+from anafi_mav import texts
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.offboard.setpoints import NOTHING, MotionSetpoint, Setpoint
 from anafi_mav.vehicle.offboard.silence import SILENCE
+from anafi_mav.vehicle.offboard.steering import Steering
+from anafi_mav.vehicle.offboard.takeoff import CLIMB_FOR
 
 GUIDED_TIMEOUT = 1.5
 """s that a velocity of ArduPilot's Guided lasts, unless a client sets another (dronekit's documents send one a
@@ -43,46 +53,53 @@ MAX_PILOTS = 8
 class State(enum.Enum):
     """State of an offboard session."""
 
-    IDLE = "no setpoints"
-    STREAMING = "setpoints arrive while another mode is active"
-    ENGAGED = "setpoints fly the drone"
+    IDLE = "setpoints may arrive, but fly nothing"
+    COUNTING = "a client in Guided asks to climb from the ground, every client is warned"
+    ENGAGED = "a stream of setpoints flies the drone, or stands by on the ground"
+    CLIMBING = "an engaged client asks to climb from the ground, every client is warned"
+    LIFTING = "a take-off by setpoints, which are flown from the first hover on"
+    JOINED = "another take-off is under way, the setpoints are flown at its end"
     SINGLE = "a single setpoint is flown to its end"
 
 
 class Event(enum.Enum):
     """Event that changes the state."""
 
-    SETPOINT = "a usable setpoint of the pilot arrived"
     ENGAGE = "mode Offboard is requested, or a stream arrives in mode Guided"
     ENGAGE_SINGLE = "a single position in mode Guided"
+    JOIN = "mode Offboard is requested during a take-off"
+    CLIMB = "a client that may take off asks to climb"
+    STAY = "it asks to climb no longer"
+    LIFT = "it has asked for long enough"
+    RISEN = "the drone hovers, or the take-off has ended"
     DISENGAGE = "another mode is active"
     SILENCE = "no setpoint for too long"
 
 
-TRANSITIONS: dict[State, dict[Event, State]] = {
-    State.IDLE: {Event.SETPOINT: State.STREAMING, Event.DISENGAGE: State.IDLE},
-    State.STREAMING: {
-        Event.SETPOINT: State.STREAMING,
-        Event.ENGAGE: State.ENGAGED,
-        Event.ENGAGE_SINGLE: State.SINGLE,
-        Event.DISENGAGE: State.STREAMING,
-        Event.SILENCE: State.IDLE,
-    },
-    State.ENGAGED: {
-        Event.SETPOINT: State.ENGAGED,
-        Event.ENGAGE: State.ENGAGED,
-        Event.DISENGAGE: State.STREAMING,
-        Event.SILENCE: State.IDLE,
-    },
-    State.SINGLE: {
-        Event.SETPOINT: State.SINGLE,
-        Event.ENGAGE: State.ENGAGED,
-        Event.ENGAGE_SINGLE: State.SINGLE,
-        Event.DISENGAGE: State.STREAMING,
-    },
+_ANYWHERE = {
+    Event.ENGAGE: State.ENGAGED,
+    Event.ENGAGE_SINGLE: State.SINGLE,
+    Event.JOIN: State.JOINED,
+    Event.LIFT: State.LIFTING,
+    Event.DISENGAGE: State.IDLE,
 }
-"""A pair that is missing cannot happen: without setpoints Offboard is refused, and there is no silence to notice; a
-stream does not become a single setpoint again, and a single one is followed by silence."""
+
+TRANSITIONS: dict[State, dict[Event, State]] = {
+    State.IDLE: {**_ANYWHERE, Event.CLIMB: State.COUNTING},
+    State.COUNTING: {**_ANYWHERE, Event.CLIMB: State.COUNTING, Event.STAY: State.IDLE, Event.SILENCE: State.IDLE},
+    State.ENGAGED: {**_ANYWHERE, Event.CLIMB: State.CLIMBING, Event.SILENCE: State.IDLE},
+    State.CLIMBING: {**_ANYWHERE, Event.CLIMB: State.CLIMBING, Event.STAY: State.ENGAGED, Event.SILENCE: State.IDLE},
+    State.LIFTING: {**_ANYWHERE, Event.RISEN: State.ENGAGED, Event.SILENCE: State.IDLE},
+    State.JOINED: {**_ANYWHERE, Event.RISEN: State.ENGAGED, Event.SILENCE: State.IDLE},
+    State.SINGLE: dict(_ANYWHERE),
+}
+"""A pair that is missing changes nothing. A single setpoint is followed by silence."""
+
+COUNTS = (State.COUNTING, State.CLIMBING)
+"""States in which a client asks to climb, and the second has not passed."""
+
+STREAMS = (State.ENGAGED, State.CLIMBING, State.LIFTING, State.JOINED)
+"""States in which a stream flies the drone, or is about to: setpoints of other clients are not flown."""
 
 
 def is_position(setpoint: Setpoint) -> bool:
@@ -104,13 +121,16 @@ def lasts(setpoint: Setpoint, guided_timeout: float | None) -> float:
     return guided_timeout - TOLD_EARLY if steers and alone else SILENCE
 
 
-class _Heard(NamedTuple):
-    """A program's newest setpoint."""
+@dataclass(frozen=True)
+class Received:
+    """A client's newest setpoint."""
 
     setpoint: Setpoint
     at: float
-    lasts: float = SILENCE
+    lasts: float
     """s of silence after which it is over."""
+    is_single: bool
+    """A position that is a part of no stream: Guided flies it to its end."""
 
     @property
     def over(self) -> float:
@@ -118,74 +138,91 @@ class _Heard(NamedTuple):
         return self.at + self.lasts
 
 
+@dataclass(frozen=True)
+class Engagement:
+    """Flight by the setpoints of one client, or its wish to take off; ends as a whole."""
+
+    pilot: Hashable
+    state: State = State.IDLE
+    chosen_by: Hashable = None
+    """Client that chose mode Offboard; None in Guided."""
+    climbs_since: float = -math.inf
+    climbed_at: float = -math.inf
+    """When the newest setpoint arrived that asks to climb."""
+    steering: Steering | None = None
+    """Flight by the newest setpoint; None before it begins."""
+
+
+@dataclass(frozen=True)
 class OffboardStream:
     """The newest setpoints, their age, and whose of them fly the drone."""
 
-    def __init__(self) -> None:
-        self.state = State.IDLE
-        self.pilot: Hashable = None
-        """Whose setpoints fly the drone while the session is engaged."""
-        self._heard: dict[Hashable, _Heard] = {}
-        self._fell_silent: tuple[Hashable, float] | None = None
-        """Whose stream of positions silence ended last, and when it had lasted too long."""
+    received: Mapping[Hashable, Received] = field(default_factory=dict)
+    engagement: Engagement | None = None
+    fell_silent: tuple[Hashable, float] | None = None
+    """Whose stream of positions silence ended last, and when it had lasted too long."""
+
+    @property
+    def state(self) -> State:
+        return State.IDLE if self.engagement is None else self.engagement.state
 
     @property
     def flying(self) -> bool:
         """Setpoints fly the drone, a stream of them or a single one."""
-        return self.state in (State.ENGAGED, State.SINGLE)
+        return self.state is State.SINGLE or self.state in STREAMS
+
+    @property
+    def pilot(self) -> Hashable:
+        """Client whose setpoints fly the drone, or ask to climb."""
+        return None if self.engagement is None else self.engagement.pilot
+
+    @property
+    def steering(self) -> Steering | None:
+        """Flight by the pilot's newest setpoint; None before it begins."""
+        return None if self.engagement is None else self.engagement.steering
 
     @property
     def setpoint(self) -> Setpoint | None:
         """The pilot's newest setpoint; None while none is flown."""
-        heard = self._heard.get(self.pilot) if self.flying else None
-        return None if heard is None else heard.setpoint
+        return self.received[self.pilot].setpoint if self.flying else None
 
-    def age(self, now: float) -> float:
-        """Seconds since the pilot's newest setpoint; 0 while none is flown."""
-        return now - self._heard[self.pilot].at if self.flying else 0.0
+    @property
+    def deadline(self) -> float | None:
+        """When the pilot's silence will have lasted too long; None without a stream."""
+        return self.received[self.pilot].over if self.state in STREAMS or self.state in COUNTS else None
+
+    @property
+    def climbs_since(self) -> float | None:
+        """Begin of the second in which the pilot asks to climb; None outside of it."""
+        return self.engagement.climbs_since if self.engagement is not None and self.state in COUNTS else None
 
     def stick_age(self, now: float) -> float:
-        """Return `age` for the sticks: 0 for longer when the setpoint lasts longer than `SILENCE`.
+        """Return the s since the pilot's newest setpoint; less when it lasts longer than `SILENCE`.
 
         Sticks expire `SILENCE` after an age of 0.
         """
-        return max(0.0, self.age(now) - (self._heard[self.pilot].lasts - SILENCE)) if self.flying else 0.0
+        return max(0.0, now - self.received[self.pilot].over + SILENCE) if self.flying else 0.0
 
-    def continues_stream(self, sender: Hashable, now: float) -> bool:
-        """This program's last setpoint is so young that one that arrives now is of the same stream."""
-        heard = self._heard.get(sender)
-        return heard is not None and now - heard.at < TOGETHER
+    # Setpoints.
 
-    def is_late_after_stream(self, sender: Hashable, now: float) -> bool:
-        """Return True if a position of this program may be a late one of a stream that has ended.
+    def receive(self, sender: Hashable, setpoint: Setpoint, now: float, lasts: float = SILENCE) -> OffboardStream:
+        """A usable setpoint arrived; it is over after `lasts` s of silence."""
+        before, received = self.received.get(sender), self.received
+        if before is None and len(received) >= MAX_PILOTS:
+            received = {one: kept for one, kept in received.items() if now < kept.over or one == self.pilot}
+            if len(received) >= MAX_PILOTS:
+                return self
+        follows = before is not None and now - before.at < TOGETHER
+        ended, since = self.fell_silent or (None, -math.inf)
+        is_late = ended == sender and now < since + LATE_AFTER_STREAM
+        newest = Received(setpoint, now, lasts, is_position(setpoint) and not (follows or is_late))
+        return replace(self, received={**received, sender: newest})
 
-        It is then flown as a part of that stream.
-        """
-        return (
-            self._fell_silent is not None
-            and self._fell_silent[0] == sender
-            and now < self._fell_silent[1] + LATE_AFTER_STREAM
-        )
-
-    def newest(self, sender: Hashable) -> Setpoint | None:
-        """Return the last setpoint of this program."""
-        heard = self._heard.get(sender)
-        return None if heard is None else heard.setpoint
-
-    def receive(self, sender: Hashable, setpoint: Setpoint, now: float, lasts: float = SILENCE) -> bool:
-        """A usable setpoint arrived; it is over after `lasts` s of silence.
-
-        False: another client flies, or too many want to.
-        """
-        if sender not in self._heard and len(self._heard) >= MAX_PILOTS:
-            self._prune(now)
-            if len(self._heard) >= MAX_PILOTS:
-                return False
-        self._heard[sender] = _Heard(setpoint, now, lasts)
-        if self.state is State.ENGAGED and sender != self.pilot:
-            return False
-        self.state = TRANSITIONS[self.state][Event.SETPOINT]
-        return True
+    def objection(self, sender: Hashable) -> OperatorText | None:
+        """Return why the setpoints of a client do not count at present; None: they do."""
+        if self.state in STREAMS and sender != self.pilot:
+            return texts.OTHER_PROGRAM
+        return None if sender in self.received else texts.TOO_MANY_PROGRAMS
 
     def candidate(self, client: Hashable, now: float) -> Hashable | None:
         """Return the client whose setpoints mode Offboard would fly if this client chose it.
@@ -193,57 +230,45 @@ class OffboardStream:
         Its own have priority, then the newest of all. Returns None if no client has fresh setpoints: mode Offboard is
         to be refused.
         """
-        fresh = {sender: heard for sender, heard in self._heard.items() if self._is_fresh(heard, now)}
-        if client in fresh:
-            return client
-        return max(fresh, key=lambda sender: fresh[sender].at, default=None)
+        fresh = {sender: received.at for sender, received in self.received.items() if now < received.over}
+        return client if client in fresh else max(fresh, key=fresh.__getitem__, default=None)
 
-    def engage(self, pilot: Hashable) -> None:
-        """Setpoints begin to fly the drone, those of a `candidate`."""
-        self.state, self.pilot = TRANSITIONS[self.state][Event.ENGAGE], pilot
+    # The engagement.
 
-    def engage_single(self, pilot: Hashable, setpoint: Setpoint, said: float) -> None:
-        """Start to fly this one setpoint of a program to its end, whatever its age is by now."""
-        self._heard[pilot] = _Heard(setpoint, said)
-        if self.state is State.IDLE:
-            self.state = TRANSITIONS[self.state][Event.SETPOINT]
-        self.state, self.pilot = TRANSITIONS[self.state][Event.ENGAGE_SINGLE], pilot
+    def after(self, event: Event, engagement: Engagement | None = None) -> OffboardStream:
+        """Return the stream after an event; `engagement`: instead of the present one."""
+        engagement = engagement or self.engagement
+        state = TRANSITIONS[self.state].get(event, self.state)
+        if engagement is None or state is State.IDLE:
+            return replace(self, engagement=None)
+        return replace(self, engagement=replace(engagement, state=state))
 
-    def disengage(self) -> None:
-        """Another mode takes over; setpoints may go on coming."""
-        self.state, self.pilot = TRANSITIONS[self.state][Event.DISENGAGE], None
+    def engage(self, event: Event, pilot: Hashable, chosen_by: Hashable = None) -> OffboardStream:
+        """Begin an engagement of a client with setpoints; one of before is over."""
+        return self.after(event, Engagement(pilot, chosen_by=chosen_by))
 
-    def deadline(self) -> float | None:
-        """When silence will have lasted too long; None while there is nothing to wait for."""
-        if self.state in (State.IDLE, State.SINGLE):
-            return None
-        if self.state is State.ENGAGED:
-            return self._heard[self.pilot].over
-        return max(heard.over for heard in self._heard.values())
+    def note(self, **facts: Any) -> OffboardStream:
+        """Return the stream with newer facts of its engagement, if it has one."""
+        return replace(self, engagement=self.engagement and replace(self.engagement, **facts))
 
-    def expire(self, now: float) -> bool:
-        """True when silence just ended an engaged session: the drone must hover now."""
-        deadline = self.deadline()
-        if deadline is None or now < deadline:
-            return False
-        engaged = self.state is State.ENGAGED
-        if engaged and is_position(self._heard[self.pilot].setpoint):
-            self._fell_silent = self.pilot, now
-        self._prune(now)
-        self.pilot = None
-        self.state = TRANSITIONS[self.state][Event.SILENCE]
-        if self._heard:  # others stream on; none of them flies
-            self.state = TRANSITIONS[self.state][Event.SETPOINT]
-        return engaged
+    def climb(self, client: Hashable, now: float) -> OffboardStream:
+        """A setpoint of a client arrived that may take the drone off.
 
-    def _prune(self, now: float) -> None:
-        """Forget clients that have fallen silent, but not the one whose single setpoint is flown."""
-        self._heard = {
-            sender: heard
-            for sender, heard in self._heard.items()
-            if self._is_fresh(heard, now) or (self.state is State.SINGLE and sender == self.pilot)
-        }
+        The second begins at `climbs_since`, and again after a gap of `SILENCE`. At its end the state is LIFTING.
+        """
+        engagement = self.engagement
+        is_counted = engagement is not None and self.state in COUNTS and now - engagement.climbed_at < SILENCE
+        if engagement is None or not is_counted:
+            own = engagement if engagement is not None and engagement.pilot == client else Engagement(client)
+            return self.after(Event.CLIMB, replace(own, climbs_since=now, climbed_at=now))
+        if client != engagement.pilot:
+            return self
+        event = Event.LIFT if now - engagement.climbs_since >= CLIMB_FOR else Event.CLIMB
+        return self.after(event, replace(engagement, climbed_at=now))
 
-    @staticmethod
-    def _is_fresh(heard: _Heard, now: float) -> bool:
-        return now < heard.over
+    def expire(self, now: float) -> OffboardStream:
+        """Return the stream without its engagement if that has been silent for too long."""
+        if self.deadline is None or now < self.deadline:
+            return self
+        silent = (self.pilot, now) if is_position(self.received[self.pilot].setpoint) else self.fell_silent
+        return replace(self.after(Event.SILENCE), fell_silent=silent)

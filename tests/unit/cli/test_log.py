@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 from pathlib import Path
 
 import pytest
+from support.hanging_disk import PATIENCE, hanging_file
 
 from anafi_mav.cli import log
 from anafi_mav.errors import ConfigError
@@ -42,12 +44,9 @@ def test_json_line_of_hostile_text_is_ascii_without_controls() -> None:
 def test_log_file_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(log, "FILE_BYTES", 200)
     path = tmp_path / "gateway.log"
-    handler = log.BoundedLogFile(path)
-    try:
-        for number in range(300):
-            handler.handle(logging.LogRecord("x", logging.WARNING, "f", 1, "line %d", (number,), None))
-    finally:
-        handler.close()
+    file = log.BoundedLogFile(path)
+    for number in range(300):
+        file.write(f"line {number}")
     files = sorted(one.name for one in tmp_path.iterdir())
     assert files == ["gateway.log", *(f"gateway.log.{number}" for number in range(1, log.OLD_FILES + 1))]
     assert all(one.stat().st_size <= 200 for one in tmp_path.iterdir())
@@ -55,24 +54,44 @@ def test_log_file_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_repeated_line_is_counted_once_for_all_outputs(tmp_path: Path) -> None:
-    first, second = log.BoundedLogFile(tmp_path / "a"), log.BoundedLogFile(tmp_path / "b")
+    first, second = log.LogFileHandler(tmp_path / "a"), log.LogFileHandler(tmp_path / "b")
     outputs = log.LogOutputs([first, second])
-    try:
-        for number in range(3):
-            outputs.handle(logging.LogRecord("x", logging.WARNING, "f", 1, "%s: line %d", ("alpha", number), None))
-    finally:
-        first.close()
-        second.close()
+    for number in range(3):
+        outputs.handle(logging.LogRecord("x", logging.WARNING, "f", 1, "%s: line %d", ("alpha", number), None))
+    first.end(PATIENCE)
+    second.end(PATIENCE)
     assert (tmp_path / "a").read_text() == (tmp_path / "b").read_text() == "alpha: line 0\n"
 
 
 def test_full_disk_is_reported_once(capsys: pytest.CaptureFixture[str]) -> None:
-    handler = log.BoundedLogFile(Path("/dev/full"))
+    file = log.BoundedLogFile(Path("/dev/full"))
     for _ in range(3):
-        handler.handle(logging.LogRecord("x", logging.WARNING, "f", 1, "line", (), None))
+        file.write("line")
     assert capsys.readouterr().err.count("/dev/full cannot be written: [Errno 28]") == 1
 
 
 def test_log_file_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"^--log-file: expected a file that can be written"):
         log.set_up(path=tmp_path / "absent" / "gateway.log")
+
+
+def test_lines_that_a_hanging_disk_cannot_take_are_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(log, "MAX_WAITING", 10)
+    path, drain = hanging_file(tmp_path / "gateway.log")
+    handler = log.LogFileHandler(path)
+    for number in range(100):
+        handler.handle(logging.LogRecord("x", logging.WARNING, "f", 1, "line %d", (number,), None))
+    handler.end(0.0)
+    with os.fdopen(drain) as reading:
+        lines: list[str] = []
+        while not lines or "lost" not in lines[-1]:
+            if found := reading.readline().strip():
+                lines.append(found)
+            handler.end(0.0)
+    written = len(lines) - 1
+    assert lines[:-1] == [f"line {number}" for number in range(written)]
+    assert written in (10, 11)  # those that wait, and the one that the thread holds
+    assert lines[-1] == f"{100 - written} lines lost: disk too slow"
+    assert capsys.readouterr().err.count(f"--log-file: {path} is too slow: lines are lost") == 1

@@ -1,4 +1,4 @@
-"""`anafi-mav run --check`: a line for each thing that a start needs, and nothing is left open."""
+"""`anafi-mav run --check`: a line for each thing that a start needs, and nothing is left open or written."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ import pytest
 from support.world import loopback
 
 from anafi_mav.cli import main
+from anafi_mav.mavlink.key_ring import write_key
 from anafi_mav.state_lock import StateLock
 
 
-def configuration(folder: Path, port: int, more: str = "") -> str:
+def configuration(folder: Path, port: int, more: str = "", *, state: str = "state", signed: str = "") -> str:
     path = folder / "fleet.yaml"
     path.write_text(f"""
-        state: {folder / "state"}
-        endpoints: ["tcpin://127.0.0.1:{port}"]
+        state: {folder / state}
+        endpoints: ["tcpin://127.0.0.1:{port}{signed}"]
         drones: [{{name: alpha, sysid: 1, address: {loopback()}}}]
         video: {{rtsp_port: 0}}
-        http: {{port: 0}}
-        {more}
+        {more or "http: {port: 0}"}
     """)
     return str(path)
 
 
-def check(path: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, str]:
-    status = main(["run", "-c", path, "--check"])
+def check(path: str, capsys: pytest.CaptureFixture[str], *options: str) -> tuple[int, str]:
+    status = main(["run", "-c", path, "--check", *options])
     return status, capsys.readouterr().out
 
 
@@ -67,3 +67,41 @@ def test_check_names_the_key_of_a_mistake(tmp_path: Path, capsys: pytest.Capture
     assert status == 1
     assert "configuration: WRONG: " in out
     assert "fleet.yaml: pose: expected video or events" in out
+
+
+def files(folder: Path) -> dict[str, bytes | None]:
+    """Everything in a folder."""
+    return {str(path): path.read_bytes() if path.is_file() else None for path in folder.rglob("*")}
+
+
+def test_check_writes_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Neither a token, a recorded session, a lock, a log nor the timestamp of a key."""
+    write_key(tmp_path / "state" / "keys", "field", bytes(range(40)))
+    more = f"""
+        http: {{host: 0.0.0.0, port: 0}}
+        recording: {{folder: {tmp_path / "flights"}}}"""
+    path = configuration(tmp_path, 0, more, signed="?signing=field")
+    before = files(tmp_path)
+    status, out = check(path, capsys, "--log-file", str(tmp_path / "gateway.log"))
+    assert (status, "WRONG" in out) == (0, False), out
+    assert "signed with key field" in out
+    assert f"recording: ok: folder can be written: {tmp_path / 'flights'}" in out
+    assert files(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    ("more", "state", "log_file", "wrong"),
+    [
+        ("recording: {folder: FOLDER/fleet.yaml/x}", "state", "log", "recording.folder: WRONG: expected a folder that"),
+        ("", "fleet.yaml/state", "log", "state: WRONG: FOLDER/fleet.yaml/state: Not a directory"),
+        ("", "state", "absent/log", "--log-file: expected a file that can be written, got FOLDER/absent/log: No such"),
+        ("", "state", "", "--log-file: expected a file that can be written, got FOLDER: Is a directory"),
+    ],
+)
+def test_check_names_what_cannot_be_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], more: str, state: str, log_file: str, wrong: str
+) -> None:
+    path = configuration(tmp_path, 0, more.replace("FOLDER", str(tmp_path)), state=state)
+    status, out = check(path, capsys, "--log-file", str(tmp_path / log_file))
+    assert status == 1
+    assert wrong.replace("FOLDER", str(tmp_path)) in out

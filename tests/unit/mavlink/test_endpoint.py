@@ -124,7 +124,7 @@ def test_udp_url_with_options_keeps_each(scheme: str, query: str, flavour: str |
 def test_mapping_and_url_give_the_same_options() -> None:
     options = {
         "flavour": "ardupilot",
-        "access": "observe",
+        "access": "control",
         "systems": [1, "7-9"],
         "allow_messages": ["ATTITUDE", "SYS_STATUS"],
         "frames": "many",
@@ -132,6 +132,8 @@ def test_mapping_and_url_give_the_same_options() -> None:
         "max_clients": 3,
         "idle_limit": 0.5,
         "allowed_peers": ["10.8.0.0/24", "::1"],
+        "operator_control": True,
+        "secondaries": ["250-252", 254],
     }
     query = "&".join(
         f"{name}={','.join(map(str, value)) if isinstance(value, list) else value}" for name, value in options.items()
@@ -140,7 +142,9 @@ def test_mapping_and_url_give_the_same_options() -> None:
     by_key = parse_endpoint(mapping, FLAVOURS)
     by_url = parse_endpoint(f"udpin://0.0.0.0:14550?{query}", FLAVOURS)
     assert by_key.options.system_ids == by_url.options.system_ids == {1, 7, 8, 9}
-    assert replace(by_url.options, systems=by_key.options.systems) == by_key.options
+    assert by_key.options.secondary_ids == by_url.options.secondary_ids == {250, 251, 252, 254}
+    lists = {"systems": by_key.options.systems, "secondaries": by_key.options.secondaries}
+    assert replace(by_url.options, **lists) == by_key.options
     assert by_key.options.changed() == list(options)
     assert str(by_key.options.networks[0] if by_key.options.networks else None) == "10.8.0.0/24"
 
@@ -152,9 +156,12 @@ def test_mapping_and_url_give_the_same_options() -> None:
         ({"url": "udpin://0.0.0.0:1?access=all"}, "url", "expected the options as keys beside url"),
         ({"url": "udpin://0.0.0.0:1", "flavour": "x"}, "flavour", "expected px4, ardupilot or standard, got 'x'"),
         ({"url": "tcpin://0.0.0.0:1", "frames": "many"}, "frames", "expected none for tcpin://"),
+        ({"url": "tcpin://0.0.0.0:1", "secondaries": [7]}, "secondaries", "together with operator_control true"),
+        ({"url": "serial:///x:9", "operator_control": True, "access": "observe"}, "operator_control", "expected false"),
+        ({"url": "udpin://0.0.0.0:1", "operator_control": True, "secondaries": ["9-7"]}, "secondaries", "a range like"),
     ],
 )
-async def test_error_in_a_mapping_names_its_key(mapping: dict[str, str], key: str, problem: str) -> None:
+async def test_error_in_a_mapping_names_its_key(mapping: dict[str, object], key: str, problem: str) -> None:
     entry = msgspec.convert(mapping, EndpointConfig)
     with pytest.raises(ConfigError) as caught:
         parse_endpoint(entry, FLAVOURS)

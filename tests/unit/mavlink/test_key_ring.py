@@ -9,11 +9,13 @@ import time
 from pathlib import Path
 
 import pytest
+from support.hanging_disk import hanging
 
 from anafi_mav.clock import SystemClock
 from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink.key_ring import OLD_SUFFIX, KeyRing, path_of, read_key, write_key
 from anafi_mav.mavlink.signing import SAVED_AHEAD, Signing, ticks
+from anafi_mav.state_lock import STATE_WRITER
 
 SECRET = bytes(range(32))
 CONTENT = SECRET + bytes(8)
@@ -149,3 +151,15 @@ async def test_refused_frames_are_one_line_in_the_log(folder: Path, caplog: pyte
         "key field: frames refused: 1 replay, 1000 unsigned; newest on udpin://0.0.0.0:14550 from 10.0.0.9:5"
     ]
     await one.close()
+
+
+async def test_hanging_disk_at_the_end_leaves_the_timestamp_ahead(folder: Path) -> None:
+    one = ring(folder)
+    signing = opened(one)
+    await one.start()
+    ahead = saved(folder)
+    with hanging(STATE_WRITER):
+        await one.close()
+        assert one.problem.startswith("key field: the disk does not answer")
+    assert await STATE_WRITER.drain(30.0)
+    assert saved(folder) == ahead > signing.timestamp  # what was not begun in time is not written later

@@ -6,7 +6,9 @@ import os
 from pathlib import Path
 
 import pytest
+from support.hanging_disk import hanging
 
+from anafi_mav.disk_writer import HANGS
 from anafi_mav.recording import session_folder
 from anafi_mav.recording.session_folder import ARSDK, MAVLINK, SessionFolder, parts_of
 
@@ -72,3 +74,12 @@ async def test_bytes_beyond_what_may_wait_are_dropped(tmp_path: Path, monkeypatc
     await session.close()
     assert session.counters == {"written_bytes": 100, "dropped_bytes": 100}
     assert session.problem == "the disk is too slow"
+
+
+async def test_hanging_disk_does_not_hold_up_the_end(tmp_path: Path) -> None:
+    session = SessionFolder(tmp_path, 1_000_000)
+    session.start()
+    with hanging(session.writer):
+        session.append(MAVLINK, b"x" * 100)
+        await session.close()
+        assert session.problem == HANGS

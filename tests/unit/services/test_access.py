@@ -33,6 +33,7 @@ OBSERVE = [
 ]
 
 CONTROL = [
+    "COMMAND_ACK",
     "COMMAND_CANCEL",
     "FOLLOW_TARGET",
     "GIMBAL_MANAGER_SET_ATTITUDE",
@@ -83,10 +84,11 @@ async def test_commands_that_act_need_control_and_queries_do_not(system: System)
         return needed_access(dialect.MAVLink_command_long_message(1, 1, command, 0, 0, 0, 0, 0, 0, 0, 0))
 
     for component in system.components:
-        assert {needed(command) for command in component.commands._queries} == {Access.OBSERVE}
+        queries = component.commands._queries.keys() - {dialect.MAV_CMD_REQUEST_OPERATOR_CONTROL}
+        assert {needed(command) for command in queries} == {Access.OBSERVE}
         for command in component.commands._actions:
             assert needed(command) is (Access.ALL if command in MAINTENANCE_COMMANDS else Access.CONTROL), command
-    assert needed(60_000) is Access.CONTROL
+    assert needed(60_000) is needed(dialect.MAV_CMD_REQUEST_OPERATOR_CONTROL) is Access.CONTROL
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ from anafi_mav.texts import REASON_BYTES, STATUSTEXT_BYTES, OperatorText, Reason
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.manual_flight import Sticks
 
-SETPOINT, STICKS, TARGET, GIMBAL, REGION = InputStream
+SETPOINT, STICKS, TARGET, GIMBAL, REGION, CHANGE = InputStream
 PACKAGE = Path(texts.__file__).parent
 
 
@@ -118,7 +118,7 @@ def test_sender_of_a_closed_channel_is_forgotten() -> None:
 # The table.
 
 
-@pytest.mark.parametrize("stream", InputStream)
+@pytest.mark.parametrize("stream", [stream for stream in InputStream if stream is not CHANGE])
 def test_every_stream_reports_reasons_of_the_drone(stream: InputStream) -> None:
     assert cause_of(stream, texts.from_below("battery is on fire")).reason is None
 
@@ -151,6 +151,7 @@ SOURCES: dict[InputStream, tuple[str, ...]] = {
     TARGET: ("services/setpoint/target_messages.py", "vehicle/follow_flight.py", "vehicle/base/bounds.py"),
     GIMBAL: ("services/gimbal/targets.py", "services/gimbal/motion.py", "services/gimbal/gimbal_service.py"),
     REGION: ("services/gimbal/roi.py",),
+    CHANGE: ("vehicle/operator_control.py",),
 }
 """Modules whose reasons can be those of a dropped input."""
 
@@ -163,6 +164,7 @@ OF_COMMANDS = {
         *("RATE_CLIENT_SILENT", "DRONE_FLIES"),
     },
     REGION: {"ROI_NO_SYSTEM"},
+    CHANGE: set(),
 }
 """Reasons in these modules of commands, of the end of a mode, or of another stream."""
 

@@ -9,10 +9,11 @@ import os
 from pathlib import Path
 
 import pytest
+from support.hanging_disk import PATIENCE, hanging
 
 from anafi_mav import mav_enums
 from anafi_mav.services.memory import MAX_BYTES, Memory
-from anafi_mav.state_lock import state_folder
+from anafi_mav.state_lock import STATE_WRITER, state_folder
 from anafi_mav.vehicle.fence.plan_items import PlanItem, opaque_id
 
 SERIAL = "PI040443BA8K000123"
@@ -70,6 +71,22 @@ async def test_newest_of_many_saves_is_stored(tmp_path: Path) -> None:
     again.load(SERIAL)
     assert again.settings["number"] == 49
     assert len(files(tmp_path)) == 1  # nothing is left of the writing
+
+
+async def test_save_on_a_hanging_disk_is_a_problem_until_it_is_written(tmp_path: Path) -> None:
+    memory = Memory(tmp_path)
+    memory.load(SERIAL)
+    memory.settings["number"] = 7
+    with hanging(STATE_WRITER):
+        problem = await memory.save()
+        assert problem is memory.problem is not None
+        assert "the disk does not answer" in problem
+    assert await STATE_WRITER.drain(PATIENCE)
+    await asyncio.sleep(0.0)
+    assert memory.problem is None
+    again = Memory(tmp_path)
+    again.load(SERIAL)
+    assert again.settings == {"number": 7}
 
 
 def files(folder: Path) -> list[str]:

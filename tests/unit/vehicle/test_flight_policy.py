@@ -77,9 +77,9 @@ def test_return_and_mode_position_are_never_refused(kind: type) -> None:
 
 
 @pytest.mark.parametrize("source", Source)
-def test_gateway_is_refused_for_mission_and_settings(source: Source) -> None:
+def test_gateway_is_refused_for_changed_settings(source: Source) -> None:
     refusal = refusal_of(State.PILOT, request(HAND_LAUNCH, source))
-    assert (refusal is not None) is (source in (Source.MISSION, Source.GATEWAY))
+    assert (refusal is not None) is (source is Source.GATEWAY)
 
 
 def test_first_policy_that_refuses_decides() -> None:

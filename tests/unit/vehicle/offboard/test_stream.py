@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -17,6 +19,7 @@ from anafi_mav.vehicle.offboard.stream import (
     MAX_PILOTS,
     TOGETHER,
     TRANSITIONS,
+    Engagement,
     Event,
     OffboardStream,
     State,
@@ -26,17 +29,34 @@ from anafi_mav.vehicle.offboard.stream import (
 NAN = math.nan
 
 
+IN_THE_AIR = {Event.ENGAGE, Event.ENGAGE_SINGLE, Event.JOIN, Event.LIFT, Event.DISENGAGE}
+
+
 def test_every_offboard_state_has_its_events() -> None:
-    impossible = {
-        (State.IDLE, Event.ENGAGE),
-        (State.IDLE, Event.ENGAGE_SINGLE),
-        (State.IDLE, Event.SILENCE),
-        (State.ENGAGED, Event.ENGAGE_SINGLE),
-        (State.SINGLE, Event.SILENCE),
+    own = {
+        State.IDLE: {Event.CLIMB},
+        State.COUNTING: {Event.CLIMB, Event.STAY, Event.SILENCE},
+        State.ENGAGED: {Event.CLIMB, Event.SILENCE},
+        State.CLIMBING: {Event.CLIMB, Event.STAY, Event.SILENCE},
+        State.LIFTING: {Event.RISEN, Event.SILENCE},
+        State.JOINED: {Event.RISEN, Event.SILENCE},
+        State.SINGLE: set(),
     }
-    for state in State:
-        for event in Event:
-            assert ((state, event) in impossible) is (event not in TRANSITIONS[state])
+    assert {state: set(row) - IN_THE_AIR for state, row in TRANSITIONS.items()} == own
+    assert all(row.keys() >= IN_THE_AIR for row in TRANSITIONS.values())
+
+
+@pytest.mark.parametrize(("state", "event"), list(itertools.product(State, Event)))
+def test_engagement_exists_unless_idle(state: State, event: Event) -> None:
+    """Whatever happens: no state without a pilot, and none of its facts after its end."""
+    stream = OffboardStream().receive("a", LEVEL, 0.0)
+    if state is not State.IDLE:
+        stream = replace(stream, engagement=Engagement("a", state, chosen_by="a"))
+    after = stream.after(event, Engagement("a") if event is not Event.DISENGAGE else None)
+    assert after.state is TRANSITIONS[state].get(event, state)
+    assert (after.engagement is None) is (after.state is State.IDLE)
+    assert (after.setpoint is None) is not after.flying
+    assert (after.deadline is None) is (after.state in (State.IDLE, State.SINGLE))
 
 
 def attitude_target(mask: int, q: tuple[float, ...], thrust: float, yaw_rate: float = 0.0) -> object:
@@ -92,16 +112,15 @@ NOSE_DOWN = AttitudeSetpoint(0, -0.1, 0, 0, 0)
 def test_offboard_session_ends_with_its_setpoints() -> None:
     stream = OffboardStream()
     assert stream.candidate("a", 0.0) is None
-    assert stream.receive("a", LEVEL, 10.0)
+    stream = stream.receive("a", LEVEL, 10.0)
     assert stream.candidate("a", 10.4) == "a"
     assert stream.candidate("a", 10.0 + SILENCE) is None
-    stream.engage("a")
-    assert stream.receive("a", LEVEL, 10.4)
-    assert not stream.expire(10.4 + SILENCE - 0.01)
-    assert stream.expire(10.4 + SILENCE)
-    assert stream.state is State.IDLE
-    assert stream.setpoint is None
-    assert not stream.expire(99.0)
+    stream = stream.engage(Event.ENGAGE, "a", "a").receive("a", LEVEL, 10.4)
+    assert stream.expire(10.4 + SILENCE - 0.01) is stream
+    ended = stream.expire(10.4 + SILENCE)
+    assert ended.state is State.IDLE
+    assert (ended.setpoint, ended.pilot, ended.engagement) == (None, None, None)
+    assert ended.expire(99.0) is ended
 
 
 @pytest.mark.parametrize(
@@ -125,100 +144,136 @@ def test_silence_limit_is_longer_for_guided_velocities_alone(
 
 def test_sticks_of_a_velocity_last_until_shortly_before_end() -> None:
     """The layer below centres sticks of half a second: it must not before a velocity of 1.5 s is over."""
-    stream, velocity = OffboardStream(), MotionSetpoint(PositionReference.LOCAL, velocity=(1.0, 0.0, 0.0))
-    stream.receive("a", velocity, 10.0, 1.45)
-    stream.engage("a")
+    velocity = MotionSetpoint(PositionReference.LOCAL, velocity=(1.0, 0.0, 0.0))
+    stream = OffboardStream().receive("a", velocity, 10.0, 1.45).engage(Event.ENGAGE, "a")
     assert [round(stream.stick_age(10.0 + age), 2) for age in (0.0, 0.5, 1.0, 1.2, 1.45)] == [0.0, 0.0, 0.0, 0.2, 0.45]
-    assert not stream.receive("b", LEVEL, 11.4)  # the pilot's velocity still flies
-    assert not stream.expire(11.44)
-    assert stream.expire(11.45)
+    stream = stream.receive("b", LEVEL, 11.4)
+    assert stream.objection("b") == "another program flies"  # the pilot's velocity still does
+    assert stream.expire(11.44) is stream
+    assert stream.expire(11.45).state is State.IDLE
 
 
 def test_silence_of_an_idle_stream_changes_nothing() -> None:
-    stream = OffboardStream()
-    stream.receive("a", LEVEL, 0.0)
-    assert not stream.expire(5.0)
-    assert stream.state is State.IDLE
+    stream = OffboardStream().receive("a", LEVEL, 0.0)
+    assert stream.deadline is None
+    assert stream.expire(5.0) is stream
 
 
 def test_a_session_has_one_pilot_and_ends_with_him() -> None:
-    stream = OffboardStream()
-    stream.receive("a", LEVEL, 0.0)
-    stream.receive("b", NOSE_DOWN, 0.1)
+    stream = OffboardStream().receive("a", LEVEL, 0.0).receive("b", NOSE_DOWN, 0.1)
     assert stream.candidate("a", 0.2) == "a"  # who asks flies, not who sent last
     assert stream.candidate("c", 0.2) == "b"
-    stream.engage("a")
+    stream = stream.engage(Event.ENGAGE, "a")
     assert stream.setpoint == LEVEL
-    assert not stream.receive("b", NOSE_DOWN, 0.3)
+    stream = stream.receive("b", NOSE_DOWN, 0.3)
+    assert (stream.objection("a"), stream.objection("b")) == (None, "another program flies")
     assert stream.setpoint == LEVEL
-    assert stream.deadline() == SILENCE
-    assert stream.expire(SILENCE)
-    assert stream.state is State.STREAMING  # b streams on, and flies nothing
-    assert stream.setpoint is None
-    assert not stream.expire(0.3 + SILENCE)
-    assert stream.state is State.IDLE
+    assert stream.deadline == SILENCE
+    stream = stream.expire(SILENCE)  # b streams on, and flies nothing
+    assert (stream.state, stream.setpoint) == (State.IDLE, None)
+    assert stream.objection("b") is None
+    assert stream.candidate("a", 0.3 + SILENCE - 0.01) == "b"
+    assert stream.candidate("a", 0.3 + SILENCE) is None
+
+
+def crowd() -> OffboardStream:
+    stream = OffboardStream()
+    for number in range(MAX_PILOTS):
+        stream = stream.receive(number, LEVEL, 0.0)
+    return stream
 
 
 def test_a_crowd_of_senders_is_bounded() -> None:
-    stream = OffboardStream()
-    for number in range(MAX_PILOTS):
-        assert stream.receive(number, LEVEL, 0.0)
-    assert not stream.receive("one more", LEVEL, 0.1)
-    assert stream.receive("one more", LEVEL, SILENCE)  # the others have fallen silent
+    stream = crowd()
+    assert {stream.objection(number) for number in range(MAX_PILOTS)} == {None}
+    refused = stream.receive("one more", LEVEL, 0.1)
+    assert refused.objection("one more") == "too many programs stream"
+    assert stream.receive("one more", LEVEL, SILENCE).objection("one more") is None  # the others have fallen silent
+
+
+def test_pilot_whose_silence_is_noticed_late_is_not_crowded_out() -> None:
+    """The timer of a busy host is late: what flies has a setpoint, and a deadline, until it is ended."""
+    stream = crowd().engage(Event.ENGAGE, 3).receive("one more", LEVEL, SILENCE + 0.1)
+    assert stream.setpoint == LEVEL
+    assert stream.deadline == SILENCE
+    assert stream.expire(SILENCE + 0.1).state is State.IDLE
 
 
 PLACE = MotionSetpoint(PositionReference.LOCAL, position=(1.0, 2.0, -3.0))
+ELSEWHERE = MotionSetpoint(PositionReference.LOCAL, position=(5.0, 6.0, -7.0))
+
+
+def is_single(stream: OffboardStream, setpoint: Setpoint, now: float, sender: str = "a") -> bool:
+    return stream.receive(sender, setpoint, now).received[sender].is_single
 
 
 def test_a_single_setpoint_ends_by_no_silence() -> None:
-    stream = OffboardStream()
-    stream.receive("a", PLACE, 0.0)
-    stream.engage_single("a", PLACE, 0.0)
-    assert stream.deadline() is None
-    assert not stream.expire(60.0)
+    stream = OffboardStream().receive("a", PLACE, 0.0).engage(Event.ENGAGE_SINGLE, "a")
+    assert stream.deadline is None
+    assert stream.expire(60.0) is stream
     assert stream.setpoint == PLACE
-    stream.disengage()
-    assert stream.setpoint is None
-    assert not stream.expire(60.0)
-    assert stream.state is State.IDLE
+    ended = stream.after(Event.DISENGAGE)
+    assert (ended.setpoint, ended.state) == (None, State.IDLE)
 
 
-def test_single_setpoint_may_have_waited_in_the_queue() -> None:
-    stream = OffboardStream()
-    stream.receive("a", PLACE, 0.0)
-    stream.expire(SILENCE)
-    assert stream.state is State.IDLE
-    stream.engage_single("a", PLACE, 0.0)
-    assert stream.setpoint == PLACE
-    assert stream.age(1.0) == 1.0
+def test_newest_of_single_setpoints_is_flown() -> None:
+    """The first one waits for what flies to end; by then its sender wants to be elsewhere."""
+    stream = OffboardStream().receive("a", PLACE, 0.0).receive("a", ELSEWHERE, TOGETHER)
+    assert stream.received["a"].is_single
+    assert stream.engage(Event.ENGAGE_SINGLE, "a").setpoint == ELSEWHERE
 
 
 def test_a_second_setpoint_makes_a_stream_of_the_first() -> None:
-    stream = OffboardStream()
-    assert not stream.continues_stream("a", 0.0)
-    stream.receive("a", PLACE, 0.0)
-    stream.engage_single("a", PLACE, 0.0)
-    assert stream.continues_stream("a", TOGETHER - 0.01)
-    assert not stream.continues_stream("a", TOGETHER)
-    assert not stream.continues_stream("b", 0.1)
-    stream.receive("a", PLACE, 0.4)
-    stream.engage("a")
-    assert stream.expire(0.4 + SILENCE)
+    assert is_single(OffboardStream(), PLACE, 0.0)
+    assert not is_single(OffboardStream(), LEVEL, 0.0)  # it has no end
+    stream = OffboardStream().receive("a", PLACE, 0.0).engage(Event.ENGAGE_SINGLE, "a")
+    assert not is_single(stream, PLACE, TOGETHER - 0.01)
+    assert is_single(stream, PLACE, TOGETHER)
+    assert is_single(stream, PLACE, 0.1, sender="b")
+    stream = stream.receive("a", PLACE, 0.4).after(Event.ENGAGE)
+    assert stream.expire(0.4 + SILENCE).state is State.IDLE
 
 
 def test_a_position_straggles_after_the_silence_of_positions_alone() -> None:
-    stream = OffboardStream()
-    stream.receive("a", PLACE, 0.0)
-    stream.engage("a")
-    assert not stream.is_late_after_stream("a", 0.1)
-    assert stream.expire(SILENCE)
-    assert stream.is_late_after_stream("a", SILENCE + LATE_AFTER_STREAM - 0.01)
-    assert not stream.is_late_after_stream("a", SILENCE + LATE_AFTER_STREAM)
-    assert not stream.is_late_after_stream("b", SILENCE + 0.1)
-    stream.receive("b", LEVEL, 10.0)
-    stream.engage("b")
-    assert stream.expire(10.0 + SILENCE)
-    assert not stream.is_late_after_stream("b", 10.0 + SILENCE)
+    stream = OffboardStream().receive("a", PLACE, 0.0).engage(Event.ENGAGE, "a").expire(SILENCE)
+    assert not is_single(stream, PLACE, SILENCE + LATE_AFTER_STREAM - 0.01)
+    assert is_single(stream, PLACE, SILENCE + LATE_AFTER_STREAM)
+    assert is_single(stream, PLACE, SILENCE + 0.1, sender="b")
+    stream = stream.receive("b", LEVEL, 10.0).engage(Event.ENGAGE, "b").expire(10.0 + SILENCE)
+    assert is_single(stream, PLACE, 10.0 + SILENCE + TOGETHER, sender="b")
+
+
+def climbing(*times: float, engaged: bool = False) -> OffboardStream:
+    """A client asks to climb at these times."""
+    stream = OffboardStream().receive("a", UP, times[0])
+    if engaged:
+        stream = stream.engage(Event.ENGAGE, "a", "a")
+    for now in times:
+        stream = stream.receive("a", UP, now).climb("a", now)
+    return stream
+
+
+UP = AttitudeSetpoint(0, 0, 0, 0, 0.4)
+
+
+@pytest.mark.parametrize("engaged", [False, True])
+def test_climb_is_counted_for_a_second_without_a_gap(engaged: bool) -> None:
+    counted = climbing(0.0, 0.4, 0.8, 0.99, engaged=engaged)
+    assert counted.state is (State.CLIMBING if engaged else State.COUNTING)
+    assert (counted.climbs_since, counted.flying) == (0.0, engaged)
+    assert climbing(0.0, 0.4, 0.8, 1.0, engaged=engaged).state is State.LIFTING
+    again = climbing(0.0, 0.4, 0.86, 1.0, engaged=engaged)
+    assert (again.state, again.climbs_since) == (counted.state, 0.86)
+    stayed = counted.after(Event.STAY)
+    assert stayed.state is (State.ENGAGED if engaged else State.IDLE)
+    assert climbing(0.0, 0.4, engaged=engaged).expire(0.4 + SILENCE).state is State.IDLE
+
+
+def test_climb_of_another_client_does_not_count() -> None:
+    stream = climbing(0.0, 0.4, 0.8)
+    assert stream.climb("b", 1.1) is stream
+    later = stream.climb("b", 1.3)
+    assert (later.pilot, later.climbs_since, later.state) == ("b", 1.3, State.COUNTING)
 
 
 IGNORE_POSITION, IGNORE_VELOCITY, IGNORE_ACCELERATION = 0x007, 0x038, 0x1C0

@@ -1,0 +1,81 @@
+"""Role that a message needs while a station is the operator of the aircraft. No I/O.
+
+Every client reads and stops: Hold, Land, Return, pause and disarm. The gimbal is decided by its manager
+(MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE). Sticks, setpoints and targets are judged by their services, which know the
+centred stick that asks for nothing. All else that changes something needs a role: also a message that is added later.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.access import Access, needed_access
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.commands import EFFECT_OF_MODE, Command, is_stop_of_flight
+from anafi_mav.services.flavours import flavour_of
+from anafi_mav.vehicle.operator_control import Need
+
+INPUT_MESSAGES = frozenset(
+    {
+        dialect.MAVLINK_MSG_ID_MANUAL_CONTROL,
+        dialect.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE,
+        dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET,
+        dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED,
+        dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT,
+        dialect.MAVLINK_MSG_ID_FOLLOW_TARGET,
+    }
+)
+"""Their services ask `Host.input_objection`."""
+
+GIMBAL_MESSAGES = frozenset(
+    {
+        dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_ATTITUDE,
+        dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_PITCHYAW,
+        dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_MANUAL_CONTROL,
+        dialect.MAVLINK_MSG_ID_MOUNT_CONFIGURE,
+        dialect.MAVLINK_MSG_ID_MOUNT_CONTROL,
+        dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+    }
+)
+"""The last one is the place of another system, at which the gimbal may look."""
+
+GIMBAL_COMMANDS = frozenset(
+    {
+        dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
+        dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE,
+        dialect.MAV_CMD_DO_MOUNT_CONFIGURE,
+        dialect.MAV_CMD_DO_MOUNT_CONTROL,
+        dialect.MAV_CMD_DO_SET_ROI_LOCATION,
+        dialect.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET,
+        dialect.MAV_CMD_DO_SET_ROI_SYSID,
+        dialect.MAV_CMD_DO_SET_ROI_NONE,
+        dialect.MAV_CMD_DO_SET_ROI,
+    }
+)
+"""Those that turn the aircraft too are flight tasks, and refused as such by `vehicle.flight_policy`."""
+
+ACKNOWLEDGEMENTS = frozenset({dialect.MAVLINK_MSG_ID_COMMAND_ACK})
+
+_COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)
+
+
+def need_of(inbound: Inbound, action_of: Callable[[Inbound], Command | None]) -> Need:
+    """Return the role that a message needs.
+
+    `action_of` decodes a COMMAND_LONG or COMMAND_INT that changes something; None for a query, and for a command that
+    the component does not have.
+    """
+    message = inbound.message
+    id = message.get_msgId()
+    if id in _COMMANDS:
+        command = action_of(inbound)
+        free = command is None or command.id in GIMBAL_COMMANDS or command.is_stop_of_flight
+        return Need.NOTHING if free else Need.COMMAND
+    if id in INPUT_MESSAGES or id in GIMBAL_MESSAGES or id in ACKNOWLEDGEMENTS:
+        return Need.NOTHING
+    if id == dialect.MAVLINK_MSG_ID_SET_MODE:
+        mode = flavour_of(inbound.channel).mode_of_number(message.custom_mode)
+        is_stop = mode is not None and is_stop_of_flight(EFFECT_OF_MODE[mode], mode)
+        return Need.NOTHING if is_stop else Need.COMMAND
+    return Need.NOTHING if needed_access(message) is Access.OBSERVE else Need.COMMAND

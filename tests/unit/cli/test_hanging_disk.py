@@ -1,0 +1,49 @@
+"""A gateway beside a disk that hangs: its drones go on, and so does its end."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.hanging_disk import hanging, hanging_file
+from support.mav import Client
+from support.product import product
+from support.world import loopback
+
+from anafi_mav.config import Config, DroneConfig
+from anafi_mav.gateway import Gateway
+from anafi_mav.state_lock import STATE_WRITER, read_holder
+
+
+async def test_hanging_log_file_stops_neither_a_command_nor_the_end(tmp_path: Path) -> None:
+    address = loopback()
+    path, reading = hanging_file(tmp_path / "gateway.log")
+    config = f"""
+        endpoints: ["tcpin://{address}:5760"]
+        drones: [{{name: alpha, sysid: 1, sim: {{address: {loopback()}}}}}]
+    """
+    try:
+        async with product(tmp_path, config, "-vv", "--log-file", str(path)) as p:
+            client = await Client().connect(5760, address)
+            await client.heartbeat(lambda beat: True)
+            ack = await client.command(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+            assert ack.result == dialect.MAV_RESULT_ACCEPTED
+            await client.close()
+            p.process.send_signal(signal.SIGTERM)
+            assert await p.end() == 0
+    finally:
+        os.close(reading)
+
+
+async def test_state_folder_on_a_hanging_disk_stays_locked_behind_the_end(tmp_path: Path) -> None:
+    """What is still to be written there would replace files of the next gateway."""
+    host = loopback()
+    drones = (DroneConfig(name="alpha", sysid=1, address=host),)
+    config = Config(endpoints=(f"tcpin://{host}:5760",), drones=drones, video=False, http=False, state=str(tmp_path))
+    gateway = Gateway(config)
+    await gateway.open()
+    with hanging(STATE_WRITER):
+        await gateway.close()
+        assert read_holder(tmp_path) is not None
