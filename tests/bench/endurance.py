@@ -48,6 +48,8 @@ import yaml
 from common import ROOT, loopback, machine
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from anafi_mav import mav_enums as enums
+
 GROUPS = 2
 """Simulator processes."""
 PORTS = (5760, 5761, 14550, 14551)
@@ -600,8 +602,9 @@ class Endurance:
                     await self._crash
                 held.append(await self.rest())
                 spent += self.minutes * share
-                print(f"after {spent:.1f} min: {held[-1]['mebibytes']:.1f} MiB, "
-                      f"{sum(held[-1]['tasks'].values())} tasks, files {held[-1]['files']}", flush=True)  # fmt: skip
+                tasks, files = held[-1]["tasks"], held[-1]["files"]
+                counts = f"{sum(tasks.values())} tasks, {sum(files.values())} files"
+                print(f"after {spent:.1f} min: {held[-1]['mebibytes']:.1f} MiB, {counts}: {tasks} {files}", flush=True)
             self.judge(held, errors.read_text(errors="replace"))
         finally:
             for task in work:
@@ -652,7 +655,8 @@ class Endurance:
             if lost := client.count_lost():
                 self.wrong.append(f"void: this computer lost {lost} datagrams for client {client.number}")
         left = sum(len(client.abandoned) for client in self.clients)
-        named = {mavlink.enums["MAV_RESULT"][key].name[11:]: count for key, count in results.most_common()}
+        names = {getattr(enums, name): name[11:] for name in dir(enums) if name.startswith("MAV_RESULT_")}
+        named = {names[key]: count for key, count in results.most_common()}
         print(
             f"{total} commands, {left} of them left by clients that lost their connection; results {named}; "
             f"{len(self.cuts)} cuts"
