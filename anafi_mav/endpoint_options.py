@@ -43,6 +43,12 @@ MAX_KEY_NAME = 64
 
 KEY_NAME = rf"\A[A-Za-z0-9][A-Za-z0-9_.-]{{0,{MAX_KEY_NAME - 1}}}\Z"
 
+PREFIX = r"\A[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*\Z"
+"""Parts of a zenoh key, without zenoh's own signs."""
+
+MAX_FILE = 400
+"""Characters of a path."""
+
 MAX_URL = 1000
 """Characters of a URL with its options."""
 
@@ -159,6 +165,54 @@ class EndpointOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
         ),
     ] = None
 
+    prefix: Annotated[
+        str,
+        Meta(
+            max_length=64,
+            pattern=PREFIX,
+            description="First part of the keys on the zenoh network. Gateways and stations with the same one see each "
+            "other. `zenoh` only.",
+            extra=expected("letters, digits, '-', '_' and '.', with '/' between parts"),
+        ),
+    ] = "anafi"
+    link: Annotated[
+        Literal["tcp", "udp", "tls", "quic"],
+        Meta(
+            description="Transport of the link to the zenoh router. `tls` and `quic` encrypt. `zenoh` only.",
+            extra=expected("tcp, udp, tls or quic"),
+        ),
+    ] = "tcp"
+    listen: Annotated[
+        bool,
+        Meta(
+            description="Listen at the address instead of connecting to it: for one gateway without a router. "
+            "`zenoh` only.",
+            extra=expected("true or false"),
+        ),
+    ] = False
+    ca: Annotated[
+        Annotated[str, Meta(min_length=1, max_length=MAX_FILE)] | None,
+        Meta(
+            description="File with the certificate of the authority that signed the other end's (PEM). `zenoh` with "
+            "`tls` or `quic` only.",
+            extra=expected("the path of a file"),
+        ),
+    ] = None
+    certificate: Annotated[
+        Annotated[str, Meta(min_length=1, max_length=MAX_FILE)] | None,
+        Meta(
+            description="File with the gateway's own certificate (PEM): by its name a router grants keys. `zenoh` "
+            "with `tls` or `quic` only.",
+            extra=expected("the path of a file"),
+        ),
+    ] = None
+    private_key: Annotated[
+        Annotated[str, Meta(min_length=1, max_length=MAX_FILE)] | None,
+        Meta(
+            description="File with the private key of that certificate (PEM). `zenoh` with `tls` or `quic` only.",
+            extra=expected("the path of a file"),
+        ),
+    ] = None
     operator_control: Annotated[
         bool,
         Meta(

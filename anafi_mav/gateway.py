@@ -19,6 +19,7 @@ from types import TracebackType
 from typing_extensions import Self
 
 from anafi_mav import texts
+from anafi_mav.access_token import load_token
 from anafi_mav.arsdk.video.rtsp import DEFAULT_PORT as RTSP_PORT
 from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.config import Config, DroneConfig, MediaConfig
@@ -27,7 +28,10 @@ from anafi_mav.drone import Drone, events
 from anafi_mav.drone.contention import Contention
 from anafi_mav.drone.rest import HTTP_PORT
 from anafi_mav.errors import AnafiMavError, ConfigError, HandshakeRefused
+from anafi_mav.fabric.endpoint import FabricEndpoint
+from anafi_mav.fabric.system_state import StatePosition, SystemState
 from anafi_mav.gateway_status import ReportedDrone, StatusReport
+from anafi_mav.mavlink.base import Endpoint, EndpointUrl, Sink
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.key_ring import KeyRing, folder_of
 from anafi_mav.mavlink.node import Node
@@ -56,7 +60,6 @@ from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.flying import ON_GROUND
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.failsafe_settings import FailsafeLimits
-from anafi_mav.web.access_token import load_token
 from anafi_mav.web.definition_routes import DefinitionRoutes
 from anafi_mav.web.live_page import DroneEntry, LivePage
 from anafi_mav.web.live_video import LiveVideo
@@ -292,6 +295,7 @@ class Gateway:
             flavours=tuple(FLAVOURS),
             keys=self._keys,
             on_setup_signing=signing.receive,
+            factories={"zenoh": self._fabric_endpoint},
         )
         video = config.video_server
         self.relay = (
@@ -345,11 +349,15 @@ class Gateway:
         try:
             self._recorder = self._start_recording()
             await self._node.start(self.config.endpoints)
+            if any(one is not None and one.is_open_to_network for one in (self.relay, self.web)):
+                token = load_token(self._state if self._saves else None)
+                if self.relay is not None and self.relay.is_open_to_network:
+                    self.relay.token = token
+                if self.web is not None and self.web.is_open_to_network:
+                    self.web.token = token
             if self.relay is not None:
                 await self.relay.start()
             if self.web is not None:
-                if self.web.is_open_to_network:
-                    self.web.token = load_token(self._state if self._saves else None)
                 await self.web.start()
             if self._live is not None:
                 await self._live.load()
@@ -466,6 +474,27 @@ class Gateway:
     def _position_of(self, sysid: int) -> SystemPosition | None:
         found = (supervised.system for supervised in self._supervised if supervised.config.sysid == sysid)
         return next((system.position for system in found), None)
+
+    def _fabric_endpoint(self, url: EndpointUrl, sink: Sink, clock: Clock) -> Endpoint:
+        return FabricEndpoint(url, sink, clock, _FabricSystems(self))
+
+    def supervised(self, sysid: int) -> _Supervised | None:
+        """Return the drone with this system id; None before `start`."""
+        return next((supervised for supervised in self._supervised if supervised.config.sysid == sysid), None)
+
+    def system_state(self, sysid: int, session: str) -> bytes | None:
+        """Return the state of a system for the fabric, as JSON; None before `start`."""
+        supervised = self.supervised(sysid)
+        if supervised is None:
+            return None
+        found = supervised.system.position
+        position = None
+        if found is not None:
+            latitude, longitude = found.place.point
+            age = round(self._clock.monotonic() - found.at, 2)
+            position = StatePosition(latitude=latitude, longitude=longitude, amsl_m=round(found.amsl, 2), age_s=age)
+        drone = self._report.drone(supervised.reported(), self.relay)
+        return SystemState(gateway=session, drone=drone, position=position).encode()
 
     def _uris(self) -> GatewayUris:
         """Return the addresses of the servers, which are open."""
@@ -585,3 +614,25 @@ class Gateway:
         if not opened:
             for supervised in self._supervised:
                 supervised.system.channel_closed(channel)
+
+
+class _FabricSystems:
+    """The systems of a gateway, as its fabric endpoints see them."""
+
+    def __init__(self, gateway: Gateway) -> None:
+        self._gateway = gateway
+
+    def sysids(self) -> list[int]:
+        return [drone.sysid for drone in self._gateway.config.drones]
+
+    def state(self, sysid: int, session: str) -> bytes | None:
+        return self._gateway.system_state(sysid, session)
+
+    def is_on_ground(self, sysid: int) -> bool:
+        supervised = self._gateway.supervised(sysid)
+        return supervised is not None and supervised.system.active and supervised.system.vehicle.on_ground
+
+    def refused_id(self, sysid: int) -> None:
+        supervised = self._gateway.supervised(sysid)
+        if supervised is not None:
+            supervised.system.announce(Severity.CRITICAL, texts.SYSTEM_ID_TAKEN.fill(sysid=sysid))

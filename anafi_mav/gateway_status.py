@@ -58,6 +58,10 @@ REFUSALS = {
     "refused_replay": "frame with an old time stamp",
     "refused_forwards": "frame that the endpoint must not sign",
     "withheld_frames": "frames to a peer that has not proved its address",
+    "late_frames": "frame too old on arrival",
+    "repeated_samples": "sample repeated or out of order",
+    "misdirected_frames": "frame for another system than its key's",
+    "bad_envelopes": "sample without a valid envelope",
 }
 """Counter of an endpoint or a channel: reason of the refusal, for people."""
 
@@ -130,12 +134,14 @@ class StatusReport:
             uptime_s=round(now - self._started, 1),
             loop_delay=Quantiles.of(self._node.loop_delays()),
             problems=tuple(str(problem) for problem in problems),
-            drones=tuple(self._drone(drone, relay, now) for drone in drones),
+            drones=tuple(self.drone(drone, relay) for drone in drones),
             endpoints=tuple(self._endpoint(endpoint, now) for endpoint in self._node.endpoints),
             video=None
             if relay is None
             else ServerStatus(
-                url=f"rtsp://{relay.host}:{relay.port}/", clients=relay.viewers, counters={"sessions": relay.sessions}
+                url=f"rtsp://{relay.host}:{relay.port}/",
+                clients=relay.viewers,
+                counters={"sessions": relay.sessions, "refused_token": relay.refused["token"]},
             ),
             web=None
             if web is None
@@ -173,7 +179,9 @@ class StatusReport:
             counters=dict(channel.counters + channel.parser.counters),
         )
 
-    def _drone(self, reported: ReportedDrone, relay: RelayServer | None, now: float) -> DroneStatus:
+    def drone(self, reported: ReportedDrone, relay: RelayServer | None) -> DroneStatus:
+        """Return the record of one drone as of now."""
+        now = self._clock.monotonic()
         drone, system = reported.drone, reported.system
         known, connected = drone.identity, system.active
         source = None if relay is None else relay.source(str(reported.sysid))

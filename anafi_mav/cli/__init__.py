@@ -27,6 +27,7 @@ COMMANDS = {
     "media": "list, download and delete the photos and videos of a drone",
     "status": "show the drones, clients, rates and refused commands of a running gateway",
     "replay": "play a recorded session, or any tlog, to a ground station",
+    "ground": "lead ground stations to the drones of all gateways on a zenoh network",
     "info": "connect to one drone and print model, battery, features and limits",
     "keygen": "make a key for signed endpoints, show it, or return to the one before it",
     "doctor": "examine the way to one drone: what is wrong, and how to mend it",

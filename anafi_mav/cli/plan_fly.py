@@ -7,7 +7,7 @@ import asyncio
 from typing import Any
 
 from anafi_mav.cli import interrupts, plan_options
-from anafi_mav.cli.ground import Ground, Texts, connected
+from anafi_mav.cli.ground_client import Ground, Texts, connected
 from anafi_mav.cli.plan_link import give
 from anafi_mav.cli.terminal import say
 from anafi_mav.errors import AnafiMavError, LinkLost, PlanError

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from anafi_mav.cli import interrupts, plan_files, plan_options
-from anafi_mav.cli.ground import Ground, Texts, connected
+from anafi_mav.cli.ground_client import Ground, Texts, connected
 from anafi_mav.cli.terminal import progress, say
 from anafi_mav.errors import AnafiMavError, PlanError
 from anafi_mav.mavlink import dialect

@@ -24,7 +24,7 @@ from anafi_mav.cli.terminal import complain, say
 from anafi_mav.config import Config, DroneConfig, SimConfig, from_mapping, load, remarks
 from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import Gateway, state_in_use
-from anafi_mav.mavlink.endpoint import is_open_to_network, parse_endpoint
+from anafi_mav.mavlink.endpoint import is_open_to_network, is_readable_on_the_way, parse_endpoint
 from anafi_mav.mavlink.key_ring import folder_of, has_key
 from anafi_mav.relay.uri_host import is_loopback
 from anafi_mav.services.flavours import FLAVOURS
@@ -120,6 +120,9 @@ def _serve(arguments: argparse.Namespace) -> int:
                 can = "read the drones' data" if url.options.access == "observe" else "fly the drones"
                 what = f"is open to the network without signing: any program that reaches it can {can}"
                 complain(f"warning: endpoints[{index}]: {url.text} {what}", "yellow")
+            if is_readable_on_the_way(url):
+                what = "crosses the network without TLS: a program on the way can read it and fly the drones"
+                complain(f"warning: endpoints[{index}]: {url.text} {what}; use link=tls", "red")
     http = config.http_server
     if http is not None and not is_loopback(http.host):
         what = (
@@ -127,6 +130,10 @@ def _serve(arguments: argparse.Namespace) -> int:
             "put a reverse proxy with TLS before it"
         )
         complain(f"warning: http.host: {http.host} {what}", "yellow")
+    video = config.video_server
+    if video is not None and not is_loopback(video.host):
+        what = "is open to the network without TLS: a program on the way can watch"
+        complain(f"warning: video.host: {video.host} {what}", "yellow")
     heap.settle()
     problems = asyncio.run(_run(config, arguments.sim_log.absolute() if arguments.sim_log else None))
     for problem in problems:

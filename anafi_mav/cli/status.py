@@ -18,13 +18,13 @@ from urllib.parse import urlsplit
 import aiohttp
 import msgspec
 
+from anafi_mav.access_token import AccessToken, read_token
 from anafi_mav.cli import interrupts, log
 from anafi_mav.cli.terminal import TableRows, is_live, live_tables, say, say_json, say_table
 from anafi_mav.errors import AnafiMavError, ConfigError
 from anafi_mav.relay.uri_host import is_loopback
 from anafi_mav.state_lock import read_holder, state_folder
 from anafi_mav.status_record import PATH, VERSION, ClientStatus, DroneStatus, GatewayStatus, Quantiles
-from anafi_mav.web.access_token import AccessToken, read_token
 from anafi_mav.web.server import QUERY
 
 EVERY = 1.0

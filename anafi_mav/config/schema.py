@@ -314,7 +314,8 @@ class RecordingConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
         Meta(
             ge=200,
             le=1_000_000,
-            description="Most megabytes of all sessions in the folder; the oldest files are deleted.",
+            description="Most megabytes of all sessions in the folder; one takes a quarter at most. The oldest files "
+            "are deleted.",
             extra=expected("a whole number from 200 to 1000000"),
         ),
     ] = 2000
@@ -345,7 +346,7 @@ class WarningsConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
 class VideoConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The gateway's video server (RTSP), which passes on the live video of every drone.
 
-    It has no password.
+    Viewers on other computers need a token as password (docs/video.md).
     """
 
     host: Annotated[

@@ -15,7 +15,7 @@ import socket
 import zlib
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -42,6 +42,9 @@ answers, however small the budget, not of streams."""
 LEAVE_TOGETHER = 4 * 1024
 """Most bytes of a stream that are gathered within one event-loop iteration."""
 
+INDIRECT = ("serial", "zenoh")
+"""Schemes whose address does not limit who is at the other end: a line, and a router with links of its own."""
+
 CANCEL_WAIT = 0.1
 """s until a task that has not ended is cancelled once more."""
 
@@ -65,8 +68,11 @@ class EndpointUrl:
     @property
     def is_loopback(self) -> bool:
         """True when only programs of this computer can be at the other end."""
-        if self.scheme == "serial":
-            return False
+        return self.scheme not in INDIRECT and self.is_loopback_address
+
+    @property
+    def is_loopback_address(self) -> bool:
+        """True when its address is one of this computer that no other can reach."""
         try:
             return self.place.rstrip(".").lower() == "localhost" or is_loopback(self.place)
         except ValueError:
@@ -94,7 +100,11 @@ class Sink(Protocol):
     def proved(self, channel: Channel) -> None:
         """Serve the peer of this channel, which has proved to be at its address, as every other."""
 
-    def received(self, channel: Channel, frames: list[ReceivedFrame]) -> None: ...
+    def received(self, channel: Channel, frames: list[ReceivedFrame], reached: Collection[int] | None = None) -> None:
+        """Deliver frames.
+
+        `reached`: the only systems of ours that they may reach; None: those of the channel.
+        """
 
     def introduce(self, channel: Channel) -> None:
         """Send one heartbeat over a channel that is not open."""

@@ -99,6 +99,8 @@ class Channel:
         self.is_open = True
         self.is_local = False
         """True when only programs of this computer can be its peer."""
+        self.ends_with_station = False
+        """True when the channel closes as soon as its station is gone, and only then."""
         self.parser = Parser()
         self.signing: Signing | None = None
         """The key of the endpoint; None where there is no place for one."""

@@ -3,7 +3,8 @@
 Endpoints and the command line's help are made from that table.
 
     udpout://HOST:PORT      udpin://HOST:PORT      tcpin://HOST:PORT      tcpout://HOST:PORT
-    serial://DEVICE:BAUD    each with ?option=value, those of `endpoint_options` that make sense for it
+    serial://DEVICE:BAUD    zenoh://HOST:PORT
+    each with ?option=value, those of `endpoint_options` that make sense for it
     Several options are joined by &, the elements of a list by commas.
 
 The names are MAVSDK's. An endpoint listens on the address in its URL and no other: beyond loopback only if that says
@@ -13,7 +14,7 @@ so.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from urllib.parse import parse_qsl
 
@@ -38,9 +39,18 @@ OF_DATAGRAMS = ("frames", "datagram_bytes")
 OF_LISTENERS = ("max_clients", "idle_limit", "allowed_peers")
 """Options of an endpoint that waits for clients."""
 
+OF_FABRIC = ("prefix", "link", "listen", "ca", "certificate", "private_key", "max_clients")
+"""Options of an endpoint on a zenoh network."""
+
+ENCRYPTED_LINKS = ("tls", "quic")
+"""Values of `link` with TLS."""
+
 MAX_PORT = 65535
 MAX_BAUD = 4_000_000
 """Fastest rate of common USB bridges."""
+
+
+EndpointFactory = Callable[[EndpointUrl, Sink, Clock], Endpoint]
 
 
 @dataclass(frozen=True)
@@ -50,16 +60,19 @@ class Scheme:
     arguments: str
     """Form of the part after "scheme://"."""
     description: str
-    factory: Callable[[EndpointUrl, Sink, Clock], Endpoint]
+    factory: EndpointFactory | None
+    """None: the factory is the program's, which knows more than MAVLink."""
     listens: bool = False
     """It waits for clients at an address of this machine. Port 0, any free one, makes sense."""
     datagrams: bool = False
     """It sends datagrams."""
+    own: tuple[str, ...] = ()
+    """Options of this scheme alone."""
 
     @property
     def options(self) -> tuple[str, ...]:
         """The names of the options that make sense for it."""
-        return (*COMMON, *(OF_DATAGRAMS if self.datagrams else ()), *(OF_LISTENERS if self.listens else ()))
+        return (*COMMON, *(OF_DATAGRAMS if self.datagrams else ()), *(OF_LISTENERS if self.listens else ()), *self.own)
 
 
 SCHEMES: dict[str, Scheme] = {
@@ -72,6 +85,7 @@ SCHEMES: dict[str, Scheme] = {
     "tcpin": Scheme("HOST:PORT", "serve TCP clients on HOST:PORT (MAVProxy, Mission Planner)", TcpIn, listens=True),
     "tcpout": Scheme("HOST:PORT", "connect to a TCP server, again and again", TcpOut),
     "serial": Scheme("DEVICE:BAUD", "a serial line, e.g. serial:///dev/ttyUSB0:57600", SerialLine),
+    "zenoh": Scheme("HOST:PORT", "connect to a zenoh router, for stations anywhere (fabric.md)", None, own=OF_FABRIC),
 }
 
 _URL = re.compile(r"(?P<scheme>[a-z]+)://(?P<rest>[^?#\s]*)(?:\?(?P<query>[^#\s]*))?")
@@ -170,6 +184,10 @@ def _checked(url: EndpointUrl, flavours: Sequence[str]) -> EndpointUrl:
         raise ConfigError("secondaries", "expected it together with operator_control true")
     if options.operator_control and options.access == "observe":
         raise ConfigError("operator_control", "expected false with access observe, whose clients control nothing")
+    if options.link not in ENCRYPTED_LINKS and (options.ca or options.certificate or options.private_key):
+        raise ConfigError("link", f"expected tls or quic together with certificates, got {options.link}")
+    if (options.certificate is None) != (options.private_key is None):
+        raise ConfigError("certificate", "expected it together with private_key")
     if options.datagram_bytes != DEFAULTS.datagram_bytes and options.frames == "one":
         raise ConfigError("datagram_bytes", "expected it together with frames many")
     return url
@@ -183,6 +201,19 @@ def is_open_to_network(url: EndpointUrl) -> bool:
     return SCHEMES[url.scheme].listens and not url.is_loopback
 
 
-def make_endpoint(url: EndpointUrl, sink: Sink, clock: Clock) -> Endpoint:
-    """The endpoint of a parsed URL, not open yet."""
-    return SCHEMES[url.scheme].factory(url, sink, clock)
+def is_readable_on_the_way(url: EndpointUrl) -> bool:
+    """True for a zenoh endpoint that crosses a network without TLS."""
+    return url.scheme == "zenoh" and not url.is_loopback_address and url.options.link not in ENCRYPTED_LINKS
+
+
+def make_endpoint(
+    url: EndpointUrl, sink: Sink, clock: Clock, factories: Mapping[str, EndpointFactory] | None = None
+) -> Endpoint:
+    """Return the endpoint of a parsed URL, not open yet.
+
+    Raises `ConfigError` for a scheme that neither this table nor `factories` makes.
+    """
+    factory = SCHEMES[url.scheme].factory or (factories or {}).get(url.scheme)
+    if factory is None:
+        raise ConfigError("", f"{url.text}: expected another scheme: {url.scheme}:// is for run and ground only")
+    return factory(url, sink, clock)

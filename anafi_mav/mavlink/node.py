@@ -11,7 +11,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
 import msgspec
@@ -23,7 +23,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.access import Access, needed_access
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, reason
 from anafi_mav.mavlink.channel import Channel, total
-from anafi_mav.mavlink.endpoint import make_endpoint, parse_endpoint
+from anafi_mav.mavlink.endpoint import EndpointFactory, make_endpoint, parse_endpoint
 from anafi_mav.mavlink.frames import Packed, ReceivedFrame, pack
 from anafi_mav.mavlink.key_ring import KeyRing
 from anafi_mav.mavlink.router import Route, Router, targets
@@ -80,11 +80,13 @@ class Node:
         flavours: Sequence[str] = (),
         keys: KeyRing | None = None,
         on_setup_signing: Receiver | None = None,
+        factories: Mapping[str, EndpointFactory] | None = None,
     ) -> None:
         """`flavours` are those that the URL of an endpoint may name.
 
         `keys`: the signing keys; None: no endpoint signs. `on_setup_signing` receives SETUP_SIGNING in place of the
-        host that it is for: the key in it belongs to the endpoint. None: it is dropped.
+        host that it is for: the key in it belongs to the endpoint. None: it is dropped. `factories` make the endpoints
+        of schemes that this room has none for.
         """
         self.on_channel = on_channel
         """Called with True when a channel opened and with False when it closed."""
@@ -101,6 +103,7 @@ class Node:
         self._flavours = flavours
         self._keys = keys
         self._on_setup_signing = on_setup_signing
+        self._factories = factories or {}
         self._heartbeats: dict[tuple[int, int], Packed] = {}
         """The newest of each of our components; without those of autopilots, which depend on the flavour."""
         self._closed_counters: Counter[str] = Counter()
@@ -124,7 +127,11 @@ class Node:
         if self._keys is not None:
             await self._keys.start()
         for index, url in enumerate(parsed):
-            endpoint = make_endpoint(url, self, self._clock)
+            try:
+                endpoint = make_endpoint(url, self, self._clock, self._factories)
+            except ConfigError as error:
+                await self.close()
+                raise ConfigError(f"endpoints[{index}]", error.problem) from error
             endpoint.signing = signings[index]
             try:
                 await endpoint.open()
@@ -246,7 +253,8 @@ class Node:
                 channel.send_packed(packed, sysid, compid)
                 return
 
-    def received(self, channel: Channel, frames: list[ReceivedFrame]) -> None:
+    def received(self, channel: Channel, frames: list[ReceivedFrame], reached: Collection[int] | None = None) -> None:
+        reached = channel.system_ids if reached is None else reached
         now, old = self._clock.monotonic(), self._stalls is not None and self._stalls.old
         if frames:
             channel.heard_at = now
@@ -255,7 +263,7 @@ class Node:
                 self._guarded(self.tap.received, received)
             permitted = channel.access is Access.ALL or self._permits(channel, received)
             may_forward = permitted and (channel.access is not Access.OBSERVE or self._is_harmless(channel, received))
-            route = self._router.route(channel, received, now, channel.system_ids, may_forward=may_forward)
+            route = self._router.route(channel, received, now, reached, may_forward=may_forward)
             if route.forward:
                 self._forward(channel, received, route)
             if not route.hosts or not self._delivers:

@@ -2,6 +2,9 @@
 
     FOLDER/20261122T210000Z/gateway.0001.tlog, arsdk.0001.jsonl, …
 
+A session takes a quarter of the folder's bytes at most: a flood of traffic deletes its own beginning, not the flight of
+yesterday, and the four newest sessions stay whatever is received. Of the others the oldest parts are deleted.
+
 Nothing waits for the disk: what is appended is written by a thread, twice a second. When the disk is too slow or full,
 data is dropped, counted and reported once. Only files with the names of this module are ever deleted.
 """
@@ -14,7 +17,7 @@ import logging
 import re
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import BinaryIO
 
@@ -22,8 +25,14 @@ from anafi_mav.disk_writer import HANGS, DiskWriter
 
 logger = logging.getLogger(__name__)
 
+SESSIONS = 4
+"""The newest, of which no file is deleted for another session."""
+
 PART_BYTES = 32_000_000
-"""Of one file: a flight of half an hour in one part, and what is deleted at once when room is needed."""
+"""Of one file at most: a flight of half an hour in one part, and what is deleted at once when room is needed."""
+
+SESSION_PARTS = 4
+"""Parts that a session has room for at least: two that are written, and two that are full."""
 
 MAX_WAITING = 8_000_000
 """Bytes that may wait for the disk: some ten seconds of 250 drones."""
@@ -54,6 +63,8 @@ class SessionFolder:
         """Why data was dropped last; empty while none was."""
         self._folder = folder
         self._max_bytes = max_bytes
+        self._session_bytes = max_bytes // SESSIONS
+        self._part_bytes = min(PART_BYTES, self._session_bytes // SESSION_PARTS)
         self._waiting: dict[str, list[bytes]] = {MAVLINK: [], ARSDK: []}
         self._waiting_bytes = 0
         self._parts: dict[str, tuple[BinaryIO, int]] = {}
@@ -138,7 +149,7 @@ class SessionFolder:
     def _write(self, batch: dict[str, bytes]) -> None:
         for name, data in batch.items():
             file, size = self._parts.get(name, (None, 0))
-            if file is None or size + len(data) > PART_BYTES:
+            if file is None or size + len(data) > self._part_bytes:
                 if file is not None:
                     del self._parts[name]  # also if the disk is full: a closed file takes nothing more
                     file.close()
@@ -151,21 +162,27 @@ class SessionFolder:
             self.counters["written_bytes"] += len(data)
 
     def _make_room(self, size: int) -> None:
-        """Delete the oldest parts, so that a new part may become full."""
-        parts = list(parts_of(self._folder))
+        """Delete the oldest parts of this session, then of others: a new part may become full."""
         held = {Path(file.name) for file, _ in self._parts.values()}
-        total = sum(part.stat().st_size for part in parts) + max(PART_BYTES, size) * (1 + len(held))
-        for part in parts:
-            if total <= self._max_bytes:
-                return
-            if part in held:
-                continue
-            total -= part.stat().st_size
+        needed = max(self._part_bytes, size) * (1 + len(held))
+        sizes = {part: part.stat().st_size for part in parts_of(self._folder)}
+        own = {part: sizes.pop(part) for part in tuple(sizes) if part.parent == self.path}
+        kept = self._delete({part: own[part] for part in own if part not in held}, own, self._session_bytes - needed)
+        self._delete(sizes, sizes, self._max_bytes - needed - kept)
+
+    def _delete(self, oldest_first: Mapping[Path, int], sizes: Mapping[Path, int], bound: int) -> int:
+        """Delete files until those of `sizes` have `bound` bytes at most; return their bytes."""
+        total = sum(sizes.values())
+        for part, size in oldest_first.items():
+            if total <= bound:
+                break
             part.unlink()
+            total -= size
             self.counters["deleted_files"] += 1
             if part.parent != self.path:
                 with contextlib.suppress(OSError):  # not empty
                     part.parent.rmdir()
+        return total
 
 
 def parts_of(folder: Path) -> Iterator[Path]:

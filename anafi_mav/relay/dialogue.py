@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from anafi_mav.arsdk.video import rtsp
 from anafi_mav.arsdk.video.rtsp import Headers, Response, RtpInfo, RtspRequest, RtspTransport, Status
+from anafi_mav.relay.digest import DigestChallenge
 
 SERVER = "anafi-mav"
 
@@ -88,9 +89,15 @@ class ViewerRequest:
 class ViewerDialogue:
     """The requests of one connection."""
 
-    def __init__(self, session: str, timeout: int = SESSION_TIMEOUT) -> None:
-        """`session` is the id of the session that the viewer may set up."""
+    def __init__(self, session: str, timeout: int = SESSION_TIMEOUT, challenge: DigestChallenge | None = None) -> None:
+        """`session` is the id of the session that the viewer may set up.
+
+        With a `challenge` each request but OPTIONS has to prove that its sender has the token.
+        """
         self.state = DialogueState.INIT
+        self.is_admitted = challenge is None
+        """A request of this viewer has passed the challenge."""
+        self._challenge = challenge
         self._session = session
         self._timeout = timeout
         self._url = ""
@@ -123,6 +130,10 @@ class ViewerDialogue:
             return self._response(request, (("Allow", PUBLIC),), status)
         if len(request.uri) > MAX_PATH + 256:
             return self._response(request, (), Status.URI_TOO_LARGE)
+        if self._challenge is not None and request.method != "OPTIONS":
+            if not self._challenge.admits(request.method, request.uri, request.header("Authorization")):
+                return self._response(request, (self._challenge.header,), Status.UNAUTHORIZED)
+            self.is_admitted = True
         session = request.header("Session")
         named = session is not None and rtsp.parse_session(session)[0] == self._session
         if session is not None and (not named or self.state is DialogueState.INIT):

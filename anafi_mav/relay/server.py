@@ -4,8 +4,8 @@
     server.add(DroneSource(1, "alpha", drone))
     await server.start()
 
-A stream is `rtsp://HOST:PORT/SYSID/STREAM`; the drone's name does as well as its system id. RTSP has no password here,
-so the server is open to this computer only unless it is configured otherwise.
+A stream is `rtsp://HOST:PORT/SYSID/STREAM`; the drone's name does as well as its system id. The server is open to this
+computer only unless it is configured otherwise. Viewers on other computers then need the gateway's token as password.
 """
 
 from __future__ import annotations
@@ -15,9 +15,11 @@ import errno
 import logging
 import secrets
 import socket
+from collections import Counter
 from contextlib import suppress
 
 from anafi_mav import __version__
+from anafi_mav.access_token import AccessToken
 from anafi_mav.arsdk.video import rtcp, rtsp
 from anafi_mav.arsdk.video.rtsp import InterleavedData, MalformedRtsp, MessageReader, Response, RtspRequest, Status
 from anafi_mav.clock import Clock
@@ -32,6 +34,7 @@ from anafi_mav.relay.dialogue import (
     ViewerDialogue,
     ViewerRequest,
 )
+from anafi_mav.relay.digest import DigestChallenge
 from anafi_mav.relay.feed import Feed, FeedReader, PackedPicture
 from anafi_mav.relay.outlet import Outlet, TcpOutlet, UdpOutlet
 from anafi_mav.relay.source import DroneSource, NotShown
@@ -57,6 +60,9 @@ TICK = 1.0
 MAX_REQUESTS = 64
 """Requests of one viewer in a `TICK`. A player sends five to begin, and then one in some seconds."""
 
+FIRST_LIMIT = 10.0
+"""s that a viewer without the token may stay: it takes a place of others."""
+
 STUCK = 10.0
 """s without taking a byte after which a viewer inside its RTSP connection is gone."""
 
@@ -80,6 +86,10 @@ class RelayServer:
         self.port = 0
         """TCP port while it is open, else 0."""
         self.clock = clock
+        self.token: AccessToken | None = None
+        """With one, viewers on other computers need it. Set before `start`."""
+        self.refused: Counter[str] = Counter()
+        """Refused requests by reason: token, which was wrong."""
         self._public_host = public_host
         self._wanted_port = port
         self._sources: dict[str, DroneSource] = {}
@@ -207,11 +217,13 @@ class _Connection:
         self._server = server
         self._reader = reader
         self._writer = writer
-        self._dialogue = ViewerDialogue(secrets.token_hex(8).upper())
         self._here: str = writer.get_extra_info("sockname")[0]
         self._there: str = writer.get_extra_info("peername")[0]
+        token = None if is_loopback(self._there) else server.token
+        challenge = None if token is None else DigestChallenge(token, secrets.token_hex(16))
+        self._dialogue = ViewerDialogue(secrets.token_hex(8).upper(), challenge=challenge)
         self._name = "{}:{}".format(*writer.get_extra_info("peername")[:2])
-        self._heard = self._moved = server.clock.monotonic()
+        self._opened = self._heard = self._moved = server.clock.monotonic()
         self._waited = 0
         """Bytes that waited at the last look."""
         self._requests = 0
@@ -270,6 +282,9 @@ class _Connection:
 
     async def _answer(self, wanted: ViewerRequest) -> None:
         if wanted.response is not None:
+            if wanted.response.status == Status.UNAUTHORIZED and wanted.request.header("Authorization") is not None:
+                self._server.refused["token"] += 1
+                log.info("video: %s has a wrong token", self._name)
             self._write(wanted.response)
             return
         request, dialogue = wanted.request, self._dialogue
@@ -360,6 +375,9 @@ class _Connection:
     def tick(self, now: float) -> None:
         """Report to the viewer, and close when nothing is heard of it."""
         self._requests = 0
+        if not self._dialogue.is_admitted and now - self._opened > FIRST_LIMIT:
+            self.close()
+            return
         if self._watch is None:
             if now - self._heard > SESSION_TIMEOUT:
                 self.close()

@@ -8,6 +8,7 @@ consequence. The policy is off unless a user sets it (conformance E11).
 from __future__ import annotations
 
 import enum
+from collections.abc import Hashable
 from dataclasses import dataclass
 
 
@@ -35,11 +36,13 @@ class GcsWatch:
     def __init__(self) -> None:
         self._heard: float | None = None
         """Time of the last heartbeat of a ground station; None: none yet, so that none can be lost."""
+        self._clients: dict[Hashable, float] = {}
+        """Time of the last heartbeat over each channel."""
         self.lost = False
 
-    def heard(self, now: float) -> bool:
-        """Note a ground station's heartbeat; True when it ends a loss."""
-        self._heard = now
+    def heard(self, now: float, client: Hashable = None) -> bool:
+        """Note a ground station's heartbeat over a channel; True when it ends a loss."""
+        self._heard = self._clients[client] = now
         back, self.lost = self.lost, False
         return back
 
@@ -50,12 +53,28 @@ class GcsWatch:
         """
         if self._heard is not None:
             self._heard = now
+        self._clients = dict.fromkeys(self._clients, now)
         self.lost = False
 
     def stalled(self, seconds: float) -> None:
         """Leave out a time in which the host could not receive heartbeats."""
         if self._heard is not None:
             self._heard += seconds
+        self._clients = {client: heard + seconds for client, heard in self._clients.items()}
+
+    def closed(self, client: Hashable, now: float, after: float, *, is_certain: bool) -> float | None:
+        """Note that a channel has closed.
+
+        Return the silence, s, when the last ground station is lost by that, and None otherwise. `is_certain`: its
+        station is known to be gone. Otherwise it may return over another channel: silence decides.
+        """
+        last = self._clients.pop(client, None)
+        if last is None or not is_certain or self.lost:
+            return None
+        if any(now - heard < after for heard in self._clients.values()):
+            return None
+        self.lost = True
+        return now - last
 
     def expire(self, now: float, after: float) -> bool:
         """True at the first call after the ground stations have been silent for `after` s."""

@@ -37,9 +37,9 @@ from aiohttp.http_exceptions import HttpProcessingError
 from aiohttp.typedefs import Handler
 from aiohttp.web_protocol import RequestHandler
 
+from anafi_mav.access_token import AccessToken
 from anafi_mav.errors import ConfigError, LocalProtocolError
 from anafi_mav.relay.uri_host import EVERY_ADDRESS, is_loopback, uri_host
-from anafi_mav.web.access_token import AccessToken
 
 log = logging.getLogger("anafi_mav.web")
 

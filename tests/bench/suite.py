@@ -6,6 +6,9 @@
 Each run appends a line of JSON to the tally (tests/bench/suite_runs.jsonl unless `--tally` names another file): date,
 commit, machine, busy processes, wall and processor time, counts, failed and repeated tests. The summary at the end is
 of the whole tally: runs of several days and landings add up. Exit status 1 when a run of this call was not green.
+
+The whole output of a run that was not green, with the logs and seeds of its failures, is kept beside the tally in the
+file that its row names. Its failures are printed.
 """
 
 from __future__ import annotations
@@ -31,6 +34,13 @@ from common import machine
 
 ROOT = Path(__file__).resolve().parents[2]
 TALLY = Path(__file__).with_name("suite_runs.jsonl")
+
+KEPT = "suite_output_{}.txt"
+"""Name of the output of a run; ignored by git."""
+
+FAILURES = re.compile(
+    r"^=+ (?:FAILURES|ERRORS) =+$.*?(?=^=+ (?!FAILURES|ERRORS)[^=]* =+$|\Z)", re.MULTILINE | re.DOTALL
+)
 
 REPEATED = re.compile(r"^repeated: (\S+)", re.MULTILINE)
 
@@ -70,8 +80,9 @@ def processor_time() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def run(busy: int, arguments: list[str]) -> dict[str, Any]:
+def run(busy: int, arguments: list[str], folder_of_outputs: Path) -> dict[str, Any]:
     """One run of pytest; its line of the tally."""
+    date = datetime.datetime.now(datetime.timezone.utc)
     began, used = time.monotonic(), processor_time()
     with tempfile.TemporaryDirectory() as folder, ExitStack() as burning:
         report = Path(folder) / "report.xml"
@@ -79,15 +90,21 @@ def run(busy: int, arguments: list[str]) -> dict[str, Any]:
             burning.enter_context(burner())
         words = [sys.executable, "-m", "pytest", f"--junitxml={report}", *arguments]
         try:
-            done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=LIMIT, check=False)
-            status, out = done.returncode, done.stdout
+            done = subprocess.run(
+                words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=LIMIT, check=False
+            )
+            status, output = done.returncode, done.stdout
         except subprocess.TimeoutExpired as error:
-            status, out = -1, (error.stdout or b"").decode(errors="replace")
+            status, output = -1, error.stdout or b""
+        out = output.decode(errors="replace")
         wall, cpu = time.monotonic() - began, processor_time() - used
         cases = list(ElementTree.parse(report).iter("testcase")) if report.exists() else []
     failed = sorted({_name(case) for case in cases if any(case.find(tag) is not None for tag in ("failure", "error"))})
-    if status not in (0, 1) or failed:
-        print(out[-20_000:])
+    kept = None
+    if status or failed:
+        kept = KEPT.format(date.strftime("%Y%m%dT%H%M%S.%fZ"))
+        (folder_of_outputs / kept).write_text(out, encoding="utf-8")
+        print("".join(FAILURES.findall(out)) or out[-20_000:])
     return {
         "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
         "commit": commit(),
@@ -101,6 +118,7 @@ def run(busy: int, arguments: list[str]) -> dict[str, Any]:
         "skipped": sum(case.find("skipped") is not None for case in cases),
         "failed": failed,
         "repeated": sorted(set(REPEATED.findall(out))),
+        "output": kept,
     }
 
 
@@ -131,7 +149,7 @@ def main() -> int:
     options = parser.parse_args()
     rows = []
     for number in range(options.runs):
-        row = run(options.busy, options.arguments)
+        row = run(options.busy, options.arguments, options.tally.parent)
         rows.append(row)
         with options.tally.open("a", encoding="utf-8") as tally:
             tally.write(json.dumps(row) + os.linesep)

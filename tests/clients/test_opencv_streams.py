@@ -13,8 +13,11 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as stock
 from support.mav import CAMERA, Client
+from support.own_address import own_address
 from support.process import gateway_process, simulator_process
 from support.world import VIDEO_PORT, loopback
+
+from anafi_mav.access_token import read_token
 
 pytestmark = pytest.mark.third_party
 
@@ -35,8 +38,9 @@ for line in sys.stdin:
     print(json.dumps(shapes), flush=True)
 """
 CONFIG = """
+state: {state}
 endpoints: ["tcpin://{gateway}:5760"]
-video: {{host: {gateway}, rtsp_port: 0}}
+video: {{host: {video}, rtsp_port: 0}}
 http: off
 drones: [{{name: alpha, sysid: 1, address: {drone}, rtsp_port: {port}}}]
 """
@@ -85,7 +89,8 @@ async def described(client: Client) -> list[Any]:
 @pytest.mark.parametrize("model", SIZES)
 async def test_opencv_opens_each_stream_after_its_choice(model: str, tmp_path: Path) -> None:
     drone, gateway, config = loopback(), loopback(), tmp_path / "fleet.yaml"
-    config.write_text(CONFIG.format(gateway=gateway, drone=drone, port=VIDEO_PORT))
+    text = CONFIG.format(gateway=gateway, video=gateway, drone=drone, port=VIDEO_PORT, state=tmp_path / "state")
+    config.write_text(text)
     options = ("--model", model, "--http-port", "0", "--rtsp-port", str(VIDEO_PORT))
     async with (
         simulator_process(drone, tmp_path / "sim.jsonl", *options),
@@ -109,3 +114,32 @@ async def test_opencv_opens_each_stream_after_its_choice(model: str, tmp_path: P
                 assert [await viewer.watch("tcp", uri) for uri in others[:1]] == [[]]
         finally:
             await client.close()
+
+
+async def test_opencv_on_another_computer_needs_the_token(tmp_path: Path) -> None:
+    drone, gateway, config, here = loopback(), loopback(), tmp_path / "fleet.yaml", own_address()
+    state = tmp_path / "state"
+    config.write_text(CONFIG.format(gateway=gateway, video="0.0.0.0", drone=drone, port=VIDEO_PORT, state=state))
+    options = ("--model", "4k", "--http-port", "0", "--rtsp-port", str(VIDEO_PORT))
+    async with (
+        simulator_process(drone, tmp_path / "sim.jsonl", *options),
+        gateway_process(config, 100.0),
+        player() as viewer,
+    ):
+        token = read_token(state)
+        assert token is not None
+        client = await Client().connect(5760, gateway)
+        try:
+            await client.heartbeat(lambda beat: True, timeout=20.0)
+            (stream,) = await described(client)
+            assert stream.uri.startswith(f"rtsp://{gateway}:")
+            assert token.text not in stream.uri
+        finally:
+            await client.close()
+        path = stream.uri.removeprefix(f"rtsp://{gateway}")
+        for transport in ("tcp", "udp"):
+            for user in ("", "viewer:wrong@"):
+                assert await viewer.watch(transport, f"rtsp://{user}{here}{path}") == []
+            shapes = await viewer.watch(transport, f"rtsp://viewer:{token.text}@{here}{path}")
+            assert shapes == [[stream.resolution_v, stream.resolution_h, 3]] * PICTURES
+        assert len(await viewer.watch("tcp", stream.uri)) == PICTURES  # this computer needs none

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
+import re
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
@@ -87,7 +89,11 @@ class Viewer:
     """One connection to a video server."""
 
     def __init__(self, port: int, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self.base = f"rtsp://127.0.0.1:{port}/"
+        self.base = f"rtsp://{writer.get_extra_info('peername')[0]}:{port}/"
+        self.password: str | None = None
+        """With one, each request answers the newest challenge."""
+        self.challenge = ""
+        """Of the newest 401."""
         self.session = ""
         self.reader = reader
         self.writer = writer
@@ -105,10 +111,28 @@ class Viewer:
         lines = [("CSeq", str(self._cseq)), *((name.replace("_", "-"), value) for name, value in headers.items())]
         if self.session and "Session" not in headers:
             lines.append(("Session", self.session))
+        if self.password is not None and "Authorization" not in headers:
+            lines.append(("Authorization", self.authorization(method, self.base + path)))
         self.writer.write(rtsp.encode(RtspRequest(method, self.base + path, tuple(lines))))
         response = await self.answer()
         assert response.cseq == self._cseq
+        self.challenge = response.header("WWW-Authenticate") or self.challenge
         return response
+
+    def authorization(self, method: str, uri: str) -> str:
+        """The header that answers the newest challenge, as ffmpeg writes it."""
+
+        def md5(text: str) -> str:
+            return hashlib.md5(text.encode()).hexdigest()
+
+        given = dict(re.findall(r'(\w+)="([^"]*)"', self.challenge))
+        realm, nonce = given.get("realm", ""), given.get("nonce", "")
+        first, second = md5(f"viewer:{realm}:{self.password}"), md5(f"{method}:{uri}")
+        response = md5(f"{first}:{nonce}:00000001:0a4f113b:auth:{second}")
+        return (
+            f'Digest username="viewer", realm="{realm}", nonce="{nonce}", uri="{uri}", response="{response}", '
+            'algorithm="MD5", qop="auth", cnonce="0a4f113b", nc=00000001'
+        )
 
     async def answer(self) -> Response:
         if self._pump is not None:
@@ -172,8 +196,8 @@ class Viewer:
 
 
 @asynccontextmanager
-async def viewer(port: int) -> AsyncIterator[Viewer]:
-    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+async def viewer(port: int, host: str = "127.0.0.1") -> AsyncIterator[Viewer]:
+    reader, writer = await asyncio.open_connection(host, port)
     held = Viewer(port, reader, writer)
     try:
         yield held

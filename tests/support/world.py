@@ -157,11 +157,13 @@ async def world(
     quirks: tuple[str, ...] = (),
     before: Callable[[SimulatedDrone], None] = lambda drone: None,
     options: Sequence[str] = (),
+    endpoints: Sequence[str] = (),
 ) -> AsyncIterator[World]:
     """One simulated drone, one gateway with a TCP endpoint, and its clients, connected and ready.
 
     With `flavour` the endpoint shows that autopilot. `also` is the flavour of a second endpoint, at port 5761.
     With `udp` there is another one that waits at UDP_PORT. Each of `options` has one at OPTIONS_PORT and above.
+    `endpoints` are further ones, as URLs.
     With `web` the drone has its web server, which takes flight plans. A drone at the same `drone_address` as an earlier
     one has the same serial number. With another `rtsp_port` the gateway finds a video server of the test there.
     `before` is called with the drone before the gateway is made.
@@ -184,6 +186,7 @@ async def world(
             *([f"tcpin://{address}:5761?flavour={also}"] if also else []),
             *([f"udpin://{address}:{UDP_PORT}?flavour={flavour}"] if udp else []),
             *(f"tcpin://{address}:{OPTIONS_PORT + index}?{query}" for index, query in enumerate(options)),
+            *endpoints,
         ),
         drones=(
             DroneConfig(name="alpha", sysid=sysid, address=drone_address, http_port=WEB_PORT, rtsp_port=rtsp_port),

@@ -31,6 +31,7 @@ class Status(enum.IntEnum):
 
     OK = 200
     BAD_REQUEST = 400
+    UNAUTHORIZED = 401
     NOT_FOUND = 404
     METHOD_NOT_ALLOWED = 405
     ENTITY_TOO_LARGE = 413
@@ -50,6 +51,7 @@ class Status(enum.IntEnum):
 REASONS = {
     Status.OK: "OK",
     Status.BAD_REQUEST: "Bad Request",
+    Status.UNAUTHORIZED: "Unauthorized",
     Status.NOT_FOUND: "Not Found",
     Status.METHOD_NOT_ALLOWED: "Method Not Allowed",
     Status.ENTITY_TOO_LARGE: "Request Entity Too Large",

@@ -7,6 +7,7 @@ import math
 from anafi_mav import texts
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.stall import STALL
 from anafi_mav.services.service import Host, Service
@@ -37,15 +38,20 @@ class LinkLossService(Service):
         self._ticked = now
         policy = self.host.vehicle.gcs_loss
         if policy.action is not LossAction.NOTHING and self._watch.expire(now, policy.after):
-            self._lost()
+            self._lost(policy.after)
 
     def heartbeat(self, inbound: Inbound) -> None:
-        if inbound.message.type == dialect.MAV_TYPE_GCS and self._watch.heard(inbound.now):
+        if inbound.message.type == dialect.MAV_TYPE_GCS and self._watch.heard(inbound.now, inbound.channel):
             self.host.text(Severity.NOTICE, texts.STATION_BACK)
 
-    def _lost(self) -> None:
+    def channel_closed(self, channel: Channel) -> None:
+        policy, now = self.host.vehicle.gcs_loss, self.host.clock.monotonic()
+        silence = self._watch.closed(channel, now, policy.after, is_certain=channel.ends_with_station)
+        if silence is not None and policy.action is not LossAction.NOTHING:
+            self._lost(round(silence, 1))
+
+    def _lost(self, seconds: float) -> None:
         vehicle, policy = self.host.vehicle, self.host.vehicle.gcs_loss
-        seconds = policy.after
         if vehicle.landed not in (Landed.IN_AIR, Landed.TAKEOFF):
             self.host.text(Severity.WARNING, texts.STATION_LOST.fill(seconds=seconds))
         elif vehicle.mode is FlightMode.RETURN:

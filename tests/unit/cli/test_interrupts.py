@@ -15,7 +15,7 @@ import pytest
 from support.product import Process, program
 from support.world import loopback
 
-from anafi_mav.cli.ground import Ground
+from anafi_mav.cli.ground_client import Ground
 
 MISSIONS = Path(__file__).parents[3] / "missions"
 

@@ -11,10 +11,10 @@ import pytest
 from aiohttp import web
 from support.product import program
 
+from anafi_mav.access_token import AccessToken, load_token
 from anafi_mav.cli.status import TOKEN_VARIABLE, AskedGateway, fetch, find
 from anafi_mav.errors import AnafiMavError, ConfigError
 from anafi_mav.state_lock import StateLock
-from anafi_mav.web.access_token import AccessToken, load_token
 from anafi_mav.web.server import HttpServer
 
 ELSEWHERE = "http://192.168.1.7:8088/"

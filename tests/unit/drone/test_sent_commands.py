@@ -316,6 +316,114 @@ def test_start_unanswered_at_a_lost_link_is_not_undone(sent: SentCommands) -> No
     assert sent.attribute(playing(PLAYING), 4.1) is None
 
 
+# -- effects to undo
+
+
+def withdrawn_plan(sent: SentCommands) -> SentCommand:
+    """A start sent at 0 s and withdrawn at 1 s; PLAYING counts as its effect until 21 s."""
+    one = plan("a")
+    sent.place(one, 0.0)
+    one.apply(Event.WITHDRAWN, 1.0)
+    return one
+
+
+def test_withdrawn_start_is_unwanted_until_its_report_expires(sent: SentCommands) -> None:
+    one = withdrawn_plan(sent)
+    assert [sent.is_unwanted(one, now) for now in (1.0, 20.9, 21.0)] == [True, True, False]
+
+
+@pytest.mark.parametrize("event", [None, Event.DELIVERED, Event.EXECUTED, Event.OVER, Event.REFUSED, Event.ABANDONED])
+def test_start_that_is_not_withdrawn_is_never_unwanted(sent: SentCommands, event: Event | None) -> None:
+    one = plan("a")
+    sent.place(one, 0.0)
+    if event is Event.OVER:
+        one.apply(Event.EXECUTED)
+    if event is not None:
+        one.apply(event, 1.0)
+    assert not sent.is_unwanted(one, 1.1)
+
+
+@pytest.mark.parametrize(
+    ("events", "unwanted"),
+    [
+        ((), False),
+        ((Event.DELIVERED,), False),
+        ((Event.EXECUTED,), False),
+        ((Event.EXECUTED, Event.OVER), True),
+        ((Event.REFUSED,), True),
+        ((Event.WITHDRAWN,), True),
+        ((Event.ABANDONED, Event.EXECUTED), False),
+        ((Event.ABANDONED, Event.REFUSED), True),
+    ],
+    ids=lambda events: "-".join(event.value for event in events) or "queued" if isinstance(events, tuple) else "",
+)
+def test_newer_start_in_force_keeps_the_older_from_being_undone(
+    sent: SentCommands, events: tuple[Event, ...], unwanted: bool
+) -> None:
+    older, newer = withdrawn_plan(sent), plan("b")
+    sent.place(newer, 1.1)
+    for event in events:
+        newer.apply(event, 1.2)
+    assert sent.is_unwanted(older, 1.3) is unwanted
+
+
+def test_newer_start_abandoned_at_a_lost_link_may_be_in_force_for_ten_seconds(sent: SentCommands) -> None:
+    older, newer = withdrawn_plan(sent), plan("b")
+    sent.place(newer, 1.1)
+    sent.abandon(2.0)
+    assert [sent.is_unwanted(older, now) for now in (2.0, 11.9, 12.0, 20.9, 21.0)] == [False, False, True, True, False]
+
+
+@pytest.mark.parametrize("in_force", [0, 1])
+def test_newer_start_in_force_counts_beside_one_that_is_not(sent: SentCommands, in_force: int) -> None:
+    older, newer = withdrawn_plan(sent), (plan("b"), plan("c"))
+    for number, one in enumerate(newer):
+        assert sent.is_unwanted(older, 1.1) is (number == 0 or in_force == 1)
+        sent.place(one, 1.1)
+        one.apply(Event.EXECUTED if number == in_force else Event.REFUSED)
+    assert not sent.is_unwanted(older, 1.2)
+
+
+def test_older_start_in_force_does_not_keep_the_newer(sent: SentCommands) -> None:
+    """The Stop against the newer one ends the plan before it, too: that one was ended by its being replaced."""
+    older, newer = plan("a"), plan("b")
+    sent.place(older, 0.0)
+    older.apply(Event.EXECUTED)
+    sent.place(newer, 0.5)
+    newer.apply(Event.WITHDRAWN, 1.0)
+    assert older.phase is C
+    assert sent.is_unwanted(newer, 1.1)
+
+
+def test_command_of_another_slot_does_not_keep_a_withdrawn_start(sent: SentCommands) -> None:
+    one = withdrawn_plan(sent)
+    sent.place(launch(), 1.1)
+    sent.place(SentCommand(Slot.FOLLOW, undo=common.Stop()), 1.2)
+    assert sent.is_unwanted(one, 1.3)
+
+
+def test_newest_command_is_the_last_of_its_slot(sent: SentCommands) -> None:
+    older, newer = plan("a"), plan("b")
+    sent.place(older, 0.0)
+    assert sent.is_newest(older)
+    sent.place(launch(), 0.1)
+    assert sent.is_newest(older)  # another slot
+    sent.place(newer, 0.2)
+    assert (sent.is_newest(older), sent.is_newest(newer)) == (False, True)
+    newer.apply(Event.REFUSED)
+    assert (sent.is_newest(older), sent.is_newest(newer)) == (False, True)  # however it ended
+
+
+def test_equal_command_is_not_the_newest(sent: SentCommands) -> None:
+    """Two starts of one plan are equal in every field; which one is the newest is a matter of identity."""
+    older, newer = plan("a"), plan("a")
+    for one in (older, newer):
+        sent.place(one, 0.0)
+        one.apply(Event.WITHDRAWN, 0.0)
+    assert not sent.is_newest(older)
+    assert sent.is_newest(newer)
+
+
 # -- any order
 
 

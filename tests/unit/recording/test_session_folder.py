@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
@@ -41,17 +40,52 @@ async def test_session_is_written_in_parts_of_bounded_size(tmp_path: Path) -> No
     assert session.counters["written_bytes"] == 3510
 
 
-async def test_oldest_parts_of_all_sessions_are_deleted(tmp_path: Path) -> None:
-    first = await written(tmp_path, 900, 900)
-    for age, part in enumerate(parts_of(tmp_path)):
-        os.utime(part, (1000 + age, 1000 + age))
+def sizes(session: SessionFolder) -> dict[str, int]:
+    """Bytes of each part of a session."""
+    return {part.name: part.stat().st_size for part in parts_of(session.path.parent) if part.parent == session.path}
+
+
+async def test_flood_in_one_session_deletes_its_own_oldest_parts_only(tmp_path: Path) -> None:
+    flight = await written(tmp_path, 900, 900, 900, max_bytes=16_000)
+    before = sizes(flight)
+    flood = await written(tmp_path, *[900] * 40, max_bytes=16_000)
+    assert sizes(flight) == before == {f"gateway.{number:04}.tlog": 900 for number in (1, 2, 3)}
+    assert sizes(flood) == {f"gateway.{number:04}.tlog": 900 for number in (37, 38, 39, 40)}
+    assert flood.counters["deleted_files"] == 36
+
+
+async def test_flood_in_every_session_leaves_the_four_newest(tmp_path: Path) -> None:
     strange = tmp_path / "holiday.tlog"
-    strange.write_bytes(b"x" * 5000)
-    second = await written(tmp_path, 900, 900, 900, max_bytes=3000)
-    assert not first.path.exists()
-    assert sum(part.stat().st_size for part in parts_of(tmp_path)) <= 3000
+    strange.write_bytes(b"x" * 50_000)
+    floods = []
+    for day in range(7):
+        flood = await written(tmp_path, *[900] * 8, max_bytes=16_000)
+        flood.path = flood.path.rename(tmp_path / f"2026010{day}T120000Z")
+        floods.append(flood)
+    newest = await written(tmp_path, 900, max_bytes=16_000)
+    assert [sum(sizes(flood).values()) for flood in floods[-3:]] == [3600, 3600, 3600]
+    assert sizes(newest) == {"gateway.0001.tlog": 900}
+    assert not floods[0].path.exists()
+    assert sum(part.stat().st_size for part in parts_of(tmp_path)) <= 16_000
     assert strange.exists()
-    assert {part.name for part in second.path.iterdir()} >= {"gateway.0003.tlog"}
+
+
+async def test_restarts_delete_nothing_while_there_is_room(tmp_path: Path) -> None:
+    flight = await written(tmp_path, 900, 900, 900, max_bytes=16_000)
+    for _ in range(20):
+        await written(tmp_path, 50, max_bytes=16_000)
+    assert len(sizes(flight)) == 3
+
+
+async def test_session_of_a_computer_with_a_late_clock_stays(tmp_path: Path) -> None:
+    """Without a clock of its own a computer starts in the past: the running session then looks like the oldest one."""
+    future = tmp_path / "20991231T235959Z"
+    future.mkdir()
+    for number in range(1, 19):
+        (future / f"gateway.{number:04}.tlog").write_bytes(b"x" * 900)
+    session = await written(tmp_path, 900, 900, 900, max_bytes=16_000)
+    assert len(sizes(session)) == 3
+    assert sum(part.stat().st_size for part in parts_of(tmp_path)) <= 16_000
 
 
 async def test_full_disk_is_a_problem_and_no_error(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import random
 
 import pytest
 
+from anafi_mav.access_token import AccessToken
 from anafi_mav.arsdk.video.rtsp import METHODS, Response, RtspRequest, RtspTransport, Status, encode
 from anafi_mav.relay.dialogue import (
     PUBLIC,
@@ -16,6 +17,9 @@ from anafi_mav.relay.dialogue import (
     ViewerRequest,
     stream_path,
 )
+from anafi_mav.relay.digest import DigestChallenge
+
+CHALLENGE = DigestChallenge(AccessToken("secret"), "0123")
 
 URL = "rtsp://127.0.0.1:8555/1/visible"
 UDP = "RTP/AVP;unicast;client_port=5000-5001"
@@ -32,8 +36,8 @@ def refused(judged: ViewerRequest) -> int:
     return judged.response.status
 
 
-def in_state(state: DialogueState) -> ViewerDialogue:
-    dialogue = ViewerDialogue("S1")
+def in_state(state: DialogueState, challenge: DigestChallenge | None = None) -> ViewerDialogue:
+    dialogue = ViewerDialogue("S1", challenge=challenge)
     if state is not DialogueState.INIT:
         dialogue.set_up(request("SETUP", URL + "/video", Transport=UDP), RtspTransport())
     if state is DialogueState.PLAYING:
@@ -153,3 +157,26 @@ def test_noise_in_requests_never_raises() -> None:
         dialogue = in_state(generator.choice(list(DialogueState)))
         headers = (("CSeq", "1"), ("Session", generator.choice(["S1", text[0]])), ("Transport", text[1]))
         dialogue.judge(RtspRequest(generator.choice(METHODS), "rtsp://h/" + text[2], headers))
+
+
+@pytest.mark.parametrize("state", DialogueState)
+@pytest.mark.parametrize("method", PUBLIC.split(", "))
+@pytest.mark.parametrize("authorization", [None, "Digest x", "Basic dmlld2VyOnNlY3JldA=="])
+def test_request_without_the_token_is_challenged_in_each_state(
+    state: DialogueState, method: str, authorization: str | None
+) -> None:
+    dialogue = in_state(state, CHALLENGE)
+    headers = {"Transport": UDP}
+    if state is not DialogueState.INIT:
+        headers["Session"] = "S1"
+    if authorization is not None:
+        headers["Authorization"] = authorization
+    judged = dialogue.judge(request(method, **headers))
+    assert judged.action is ViewerAction.ANSWER
+    assert judged.response is not None
+    if method == "OPTIONS":
+        assert judged.response.status == Status.OK
+    else:
+        assert judged.response.status == Status.UNAUTHORIZED
+        assert judged.response.header("WWW-Authenticate") == CHALLENGE.header[1]
+    assert (dialogue.state, dialogue.is_admitted) == (state, False)

@@ -9,10 +9,12 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
 
 import pytest
+from support.own_address import own_address
 from support.rtsp_client import LIMIT, Viewer, viewer
 from support.scripted_device import ScriptedDevice
 from support.video_server import KEY, PPS, SLICE, SPS, VideoServer, refused
 
+from anafi_mav.access_token import AccessToken
 from anafi_mav.arsdk.video import rtcp
 from anafi_mav.arsdk.video.rtcp import Goodbye, SenderReport
 from anafi_mav.clock import SystemClock
@@ -34,7 +36,9 @@ class Studio:
 
 
 @asynccontextmanager
-async def studio(server: VideoServer | None = None) -> AsyncIterator[Studio]:
+async def studio(
+    server: VideoServer | None = None, host: str = "127.0.0.1", token: AccessToken | None = None
+) -> AsyncIterator[Studio]:
     """A connected drone with its own video server, and the relay."""
     async with AsyncExitStack() as stack:
         server = await stack.enter_async_context(server or VideoServer())
@@ -42,7 +46,8 @@ async def studio(server: VideoServer | None = None) -> AsyncIterator[Studio]:
         drone = device.drone(rtsp_port=server.port)
         await drone.connect()
         stack.push_async_callback(drone.close)
-        relay = RelayServer("127.0.0.1", 0, SystemClock())
+        relay = RelayServer(host, 0, SystemClock())
+        relay.token = token
         relay.add(DroneSource(1, "alpha", drone))
         await relay.start()
         stack.push_async_callback(relay.close)
@@ -269,3 +274,74 @@ async def test_viewer_with_too_many_requests_is_aborted(monkeypatch: pytest.Monk
         assert answers.count(b"RTSP/1.0 200") <= server_module.MAX_REQUESTS
         async with viewer(held.relay.port) as other:
             await other.describe(LIVE)
+
+
+# -- the token
+
+TOKEN = AccessToken("t" * 43)
+
+
+@pytest.mark.parametrize("transport", ["UDP", "TCP"])
+async def test_viewer_on_another_computer_sees_pictures_with_the_token(transport: str) -> None:
+    """UDP here ends at the answer to SETUP: the client's ports are those of loopback."""
+    here = own_address()
+    async with studio(host="0.0.0.0", token=TOKEN) as held, viewer(held.relay.port, here) as client:
+        assert (await client.ask("OPTIONS", LIVE)).status == 200
+        assert (await client.ask("DESCRIBE", LIVE)).status == 401
+        client.password = TOKEN.text
+        assert (await client.describe(LIVE)).name == "alpha"
+        if transport == "TCP":
+            eye = await client.setup_inside(f"{LIVE}/video")
+            await client.play(LIVE)
+            assert all(picture.complete for picture in await eye.first(3))
+            assert (await client.ask("TEARDOWN", LIVE)).status == 200
+        else:
+            await client.setup(f"{LIVE}/video")
+        assert held.relay.refused == {}
+
+
+async def test_viewer_on_another_computer_without_the_token_gets_nothing(caplog: pytest.LogCaptureFixture) -> None:
+    here = own_address()
+    caplog.set_level("DEBUG")
+    async with studio(host="0.0.0.0", token=TOKEN) as held, viewer(held.relay.port, here) as client:
+        for password in (None, "wrong", f"{TOKEN.text}x"):
+            client.password = password
+            for method in ("DESCRIBE", "SETUP", "PLAY", "PAUSE", "TEARDOWN", "GET_PARAMETER", "SET_PARAMETER"):
+                answer = await client.ask(method, f"{LIVE}/video", Transport="RTP/AVP/TCP;unicast;interleaved=0-1")
+                assert answer.status == 401
+                assert (answer.header("WWW-Authenticate") or "").startswith("Digest ")
+                assert TOKEN.text not in str(answer)
+        assert held.relay.refused == {"token": 14}
+        assert (held.relay.sessions, held.server.playing) == (0, 0)
+    assert TOKEN.text not in caplog.text
+    assert "has a wrong token" in caplog.text
+
+
+async def test_answer_to_the_challenge_of_another_connection_is_refused() -> None:
+    here = own_address()
+    async with (
+        studio(host="0.0.0.0", token=TOKEN) as held,
+        viewer(held.relay.port, here) as first,
+        viewer(held.relay.port, here) as second,
+    ):
+        for client in (first, second):
+            assert (await client.ask("DESCRIBE", LIVE)).status == 401
+        assert first.challenge != second.challenge
+        first.password = TOKEN.text
+        recorded = first.authorization("DESCRIBE", first.base + LIVE)
+        assert (await second.ask("DESCRIBE", LIVE, Authorization=recorded)).status == 401
+        assert (await first.ask("DESCRIBE", LIVE, Authorization=recorded)).status == 200
+
+
+async def test_viewer_of_this_computer_needs_no_token() -> None:
+    async with studio(host="0.0.0.0", token=TOKEN) as held, viewer(held.relay.port) as client:
+        assert (await client.describe(LIVE)).name == "alpha"
+
+
+async def test_connection_without_the_token_keeps_no_place() -> None:
+    here = own_address()
+    async with studio(host="0.0.0.0", token=TOKEN) as held, viewer(held.relay.port, here) as client:
+        began = held.relay.clock.monotonic()
+        assert (await client.ask("DESCRIBE", LIVE)).status == 401
+        assert await client.reader.read() == b""
+        assert 10.0 < held.relay.clock.monotonic() - began < 12.0

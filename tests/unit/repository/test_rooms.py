@@ -24,6 +24,7 @@ FOLDERS = sorted(path.parent.relative_to(PACKAGE).as_posix() for path in PACKAGE
 """Of the package, as "drone/status"."""
 
 KIT = {
+    "access_token",
     "errors",
     "units",
     "geo",
@@ -59,7 +60,9 @@ CORES = [
     ),
     *("drone/contention.py", "drone/piloting/sticks.py", "drone/sent_commands.py", "drone/video/picture_clock.py"),
     "drone/video/stream_intrinsics.py",
-    *("relay/admission.py", "relay/dialogue.py", "relay/feed.py", "relay/uri_host.py"),
+    *("fabric/claims.py", "fabric/envelope.py", "fabric/keys.py", "fabric/sample_age.py", "fabric/settings.py"),
+    "fabric/system_state.py",
+    *("relay/admission.py", "relay/dialogue.py", "relay/digest.py", "relay/feed.py", "relay/uri_host.py"),
     *("sim/autopilot/firmware.py", "sim/autopilot/flight.py", "sim/world/scramble.py"),
     *("vehicle/base/clients.py", "vehicle/base/control_machine.py", "vehicle/base/height.py"),
     *("vehicle/link_loss.py", "vehicle/base/modes.py", "vehicle/base/requester.py"),

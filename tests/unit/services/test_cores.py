@@ -409,6 +409,19 @@ def test_a_ground_station_is_lost_once_for_each_silence() -> None:
     assert not watch.heard(122.0)
 
 
+def test_station_whose_end_is_certain_is_lost_at_once_if_it_was_the_last() -> None:
+    watch = GcsWatch()
+    watch.heard(100.0, "fabric")
+    watch.heard(101.0, "udp")
+    assert watch.closed("fabric", 102.0, 10.0, is_certain=True) is None  # the other one is there
+    watch.heard(103.0, "fabric")
+    assert watch.closed("udp", 104.0, 10.0, is_certain=False) is None  # it may return: silence decides
+    assert watch.closed("other", 104.0, 10.0, is_certain=True) is None  # no station was heard on it
+    assert watch.closed("fabric", 104.5, 10.0, is_certain=True) == 1.5
+    assert not watch.expire(120.0, 10.0)  # it is one loss
+    assert watch.heard(121.0, "fabric")
+
+
 def test_silence_before_a_watch_restart_does_not_count() -> None:
     watch = GcsWatch()
     watch.restart(50.0)

@@ -12,9 +12,9 @@ import pytest
 from aiohttp import web
 from support.world import loopback
 
+from anafi_mav.access_token import FILE, AccessToken, load_token, read_token
 from anafi_mav.config import Config, DroneConfig, HttpConfig, VideoConfig
 from anafi_mav.gateway import Gateway
-from anafi_mav.web.access_token import FILE, AccessToken, load_token, read_token
 from anafi_mav.web.server import HttpServer
 
 TOKEN = AccessToken("t" * 43)
@@ -59,6 +59,8 @@ async def test_bearer_token_passes(server: HttpServer) -> None:
         for path in ("/", "/status.json"):
             async with client.get(at(server, path)) as answer:
                 assert answer.status == 200
+        async with client.post(at(server, "/whep/1")) as answer:
+            assert answer.status == 200
 
 
 async def test_link_with_the_token_gives_a_cookie_for_everything(server: HttpServer) -> None:
@@ -117,5 +119,29 @@ async def test_gateway_open_to_the_network_needs_the_token_it_keeps(tmp_path: Pa
             bearer = {"Authorization": f"Bearer {kept.text}"}
             async with client.get(at(gateway.web, "/metrics"), headers=bearer) as answer:
                 assert answer.status == 200
+    finally:
+        await gateway.close()
+
+
+@pytest.mark.parametrize(("video", "web"), [("0.0.0.0", "127.0.0.1"), ("127.0.0.1", "0.0.0.0"), ("0.0.0.0", "0.0.0.0")])
+async def test_video_and_web_open_to_the_network_have_one_token(tmp_path: Path, video: str, web: str) -> None:
+    host = loopback()
+    config = Config(
+        endpoints=(f"tcpin://{host}:5760",),
+        drones=(DroneConfig(name="alpha", sysid=1, address=host),),
+        http=HttpConfig(host=web, port=0),
+        video=VideoConfig(host=video, rtsp_port=0),
+        state=str(tmp_path),
+    )
+    gateway = Gateway(config)
+    await gateway.open()
+    try:
+        kept = read_token(tmp_path)
+        assert kept is not None
+        assert gateway.relay is not None
+        assert gateway.web is not None
+        for server, address in ((gateway.relay, video), (gateway.web, web)):
+            found = None if server.token is None else server.token.text
+            assert found == (kept.text if address == "0.0.0.0" else None)
     finally:
         await gateway.close()

@@ -1,7 +1,7 @@
-"""The token of a web server that is open to the network: a random text in a file.
+"""The token of web and video server that are open to the network: a random text in a file.
 
-It stands in `web.token` of the state folder, readable by its owner only, so that a bookmark or the configuration of a
-Prometheus server survives a restart of the gateway. To withdraw it, delete the file and restart.
+It stands in `web.token` of the state folder, readable by its owner only, so that a bookmark, the URL in a player or the
+configuration of a Prometheus server survives a restart of the gateway. To withdraw it, delete the file and restart.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def load_token(folder: Path | None) -> AccessToken:
         try:
             _store(folder / FILE, made.text)
         except OSError as error:
-            logger.warning("%s: %s: the token of the web server ends with the gateway", folder, error.strerror)
+            logger.warning("%s: %s: the token of web and video ends with the gateway", folder, error.strerror)
     return made
 
 

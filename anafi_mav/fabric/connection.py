@@ -1,0 +1,107 @@
+"""A connection to the fabric for code of the event loop."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import importlib
+import secrets
+from collections import Counter
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from anafi_mav.fabric.arrivals import Arrival, ArrivalQueue, FabricSample, LinkChange, SampleQueue
+from anafi_mav.fabric.keys import SESSION_BYTES, FabricKeys, session_text
+from anafi_mav.fabric.settings import session_settings
+from anafi_mav.mavlink.base import EndpointUrl
+
+if TYPE_CHECKING:
+    from anafi_mav.fabric.zenoh_session import ZenohSession
+
+MISSING = "the fabric needs eclipse-zenoh: pip install 'anafi-mav[fabric]'"
+
+MAX_QUEUED = 2048
+"""Samples that may wait to be published: half a second of 20 drones with 60 messages a second each for three
+stations. Telemetry that waits longer is history."""
+
+OPEN_LIMIT = 5.0
+"""s to open a listening address."""
+
+CLOSE_LIMIT = 3.0
+"""s to close a session. It is left alone after that."""
+
+
+class FabricConnection:
+    """A zenoh session, its keys, and the queues to and from it. `open` once, `close` once."""
+
+    def __init__(self, url: EndpointUrl, counters: Counter[str], receive: Callable[[Arrival], None]) -> None:
+        """Create it, closed. The queues count into `counters`.
+
+        `receive` is called in the event loop with each report of the session.
+        """
+        self.session = int.from_bytes(secrets.token_bytes(SESSION_BYTES), "big")
+        """Of this process; another one after each start."""
+        self.session_text = session_text(self.session)
+        self.keys = FabricKeys(url.options.prefix)
+        self.is_up = False
+        """True while there is a link to another zenoh program, or a listening address."""
+        self.problem = "not tried yet"
+        """Why there is no link."""
+        self._url = url
+        self._receive = receive
+        self._loop = asyncio.get_running_loop()
+        self._queue = SampleQueue(MAX_QUEUED, counters)
+        self._arrivals = ArrivalQueue(self._wake, counters)
+        self._zenoh: ZenohSession | None = None
+        self._is_closed = False
+
+    @property
+    def zenoh(self) -> ZenohSession:
+        """The session. Only after `open`."""
+        assert self._zenoh is not None
+        return self._zenoh
+
+    async def open(self) -> None:
+        """Begin to connect, or listen.
+
+        Raises OSError without zenoh, or where the address cannot be listened on.
+        """
+        try:
+            module = importlib.import_module("anafi_mav.fabric.zenoh_session")
+        except ImportError as error:
+            raise OSError(MISSING) from error
+        options = self._url.options
+        self._zenoh = module.ZenohSession(
+            session_settings(self._url), self._queue, self._arrivals.put, retries=not options.listen
+        )
+        assert self._zenoh is not None
+        self._zenoh.start()
+        if options.listen:
+            await self._loop.run_in_executor(None, self._zenoh.opened.wait, OPEN_LIMIT)
+            if self._zenoh.failure:
+                raise OSError(self._zenoh.failure)
+
+    async def close(self) -> None:
+        """Close the session: its tokens end."""
+        self._is_closed = True
+        if self._zenoh is not None:
+            self._zenoh.stop()
+            await self._loop.run_in_executor(None, self._zenoh.ended.wait, CLOSE_LIMIT)
+
+    def publish(self, key: str, payload: bytes, attachment: bytes = b"") -> None:
+        """Queue a sample to be published."""
+        self._queue.add_sample(FabricSample(key, payload, attachment))
+
+    def _wake(self) -> None:
+        with contextlib.suppress(RuntimeError):  # the loop has been closed
+            self._loop.call_soon_threadsafe(self._take)
+
+    def _take(self) -> None:
+        for arrival in self._arrivals.take():
+            if self._is_closed:
+                return
+            if isinstance(arrival, LinkChange):
+                self.is_up, self.problem = arrival.is_up, arrival.problem
+                if not arrival.is_up:
+                    self._queue.clear_samples()
+            self._receive(arrival)

@@ -1,0 +1,347 @@
+"""The gateway's `zenoh://` endpoint: a channel for each station, and one for all readers."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Protocol
+
+from anafi_mav import texts
+from anafi_mav.clock import Clock
+from anafi_mav.fabric.arrivals import (
+    Arrival,
+    FabricSample,
+    LinkChange,
+    ReadersChange,
+    StateQuery,
+    TokenChange,
+    TokensListed,
+)
+from anafi_mav.fabric.claims import ClaimStep, SystemClaims
+from anafi_mav.fabric.connection import FabricConnection
+from anafi_mav.fabric.envelope import MAX_SAMPLE, Pong, UpEnvelope, sender_of
+from anafi_mav.fabric.keys import KeyKind, session_of
+from anafi_mav.fabric.sample_age import INPUTS, StationInput, refusal_of
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.base import Endpoint, EndpointUrl, Outbox, Sink, shaped_channel
+from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.frames import ReceivedFrame
+from anafi_mav.mavlink.router import targets
+
+logger = logging.getLogger(__name__)
+
+STATE_EVERY = 1.0
+"""s between two states of a system, between two pings of a station, and between looks at refused system ids."""
+
+FIRST_PINGS = 0.2
+"""s between pings until the first is answered: a station's frames are dropped until then."""
+
+REPORT_EVERY = 10.0
+"""s between two texts about late frames to one station."""
+
+ALL = "*"
+
+
+class FabricSystems(Protocol):
+    """The gateway's systems, as far as the endpoint has to know them."""
+
+    def sysids(self) -> Iterable[int]:
+        """Return the system ids of the gateway's drones."""
+
+    def state(self, sysid: int, session: str) -> bytes | None:
+        """Return the state of a system as JSON; None while there is none."""
+
+    def is_on_ground(self, sysid: int) -> bool:
+        """Return True while the drone is known to stand."""
+
+    def refused_id(self, sysid: int) -> None:
+        """Report that another gateway has this system id."""
+
+
+@dataclass
+class _Lane:
+    """One channel and its samples, which hold frames of one system each."""
+
+    channel: Channel
+    outboxes: dict[int, Outbox]
+
+    def flush(self) -> None:
+        for outbox in self.outboxes.values():
+            outbox.flush()
+
+
+@dataclass
+class _Station:
+    """A station on the fabric."""
+
+    lane: _Lane
+    input: StationInput
+    pinged: float = 0.0
+    has_answered: bool = False
+    reported: float = -math.inf
+    """Time of the last text about a late frame."""
+
+
+class FabricEndpoint(Endpoint):
+    """Puts the gateway's systems on a zenoh network.
+
+    A station is a channel from the beginning of its liveliness token to its end.
+    """
+
+    def __init__(self, url: EndpointUrl, sink: Sink, clock: Clock, systems: FabricSystems) -> None:
+        super().__init__(url, sink, clock)
+        self._systems = systems
+        self._connection = FabricConnection(url, self.counters, self._arrived)
+        shown = url.options.system_ids
+        wanted = [sysid for sysid in systems.sysids() if shown is None or sysid in shown]
+        self.claims = SystemClaims(self._connection.session_text, wanted)
+        self._is_listed = False
+        """True while all tokens that exist are known."""
+        self._stations: dict[str, _Station] = {}
+        self._readers: set[int] = set()
+        """Systems whose frames to all somebody reads."""
+        self._open_lane: _Lane | None = None
+        self._timer: asyncio.TimerHandle | None = None
+        self._stated = -STATE_EVERY
+
+    async def open(self) -> None:
+        connection = self._connection
+        await connection.open()
+        session, keys = connection.zenoh, connection.keys
+        session.watch_tokens(keys.drone_token(ALL, ALL))
+        session.watch_tokens(keys.station_token(ALL))
+        session.declare_token(keys.gateway_token(connection.session_text))
+        self._timer = asyncio.get_running_loop().call_later(FIRST_PINGS, self._tick)
+
+    async def close(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        for station in tuple(self._stations):
+            self._drop(station)
+        self._close_lane()
+        await self._connection.close()
+
+    def describe(self) -> str:
+        if not self._connection.is_up:
+            return f"{self.url}: not connected ({self._connection.problem}), retrying"
+        count = len(self._stations)
+        kept_off = "".join(f", system {sysid} is another gateway's" for sysid in sorted(self.claims.refused))
+        return f"{self.url}: connected, {count} station{'' if count == 1 else 's'}{kept_off}"
+
+    # What the fabric reports.
+
+    def _arrived(self, arrival: Arrival) -> None:
+        if isinstance(arrival, FabricSample):
+            self._sample(arrival)
+        elif isinstance(arrival, TokenChange):
+            self._token(arrival)
+        elif isinstance(arrival, ReadersChange):
+            self._read(arrival)
+        elif isinstance(arrival, StateQuery):
+            self._answer(arrival)
+        elif isinstance(arrival, TokensListed):
+            self._is_listed = True
+            self._claim()
+        elif isinstance(arrival, LinkChange):
+            self._linked(arrival)
+
+    def _linked(self, change: LinkChange) -> None:
+        if change.is_up:
+            logger.log(logging.WARNING if self.counters["reopened"] else logging.INFO, "%s: connected", self.url)
+            self._connection.zenoh.list_tokens(
+                self._connection.keys.drone_token(ALL, ALL), self._connection.keys.station_token(ALL)
+            )
+        else:
+            logger.warning("%s: %s", self.url, change.problem)
+            self.counters["reopened"] += 1
+            self._is_listed = False
+
+    def _token(self, change: TokenChange) -> None:
+        key = self._connection.keys.parse(change.key)
+        if key is None:
+            self.counters["unknown_keys"] += 1
+        elif key.kind is KeyKind.DRONE:
+            self.claims.token(key.sysid, key.owner, is_alive=change.is_alive)
+            self._claim()
+        elif key.kind is KeyKind.STATION:
+            if not change.is_alive:
+                self._drop(key.owner)
+            elif key.owner not in self._stations:
+                self._add(key.owner)
+
+    def _claim(self) -> None:
+        keys, session = self._connection.keys, self._connection.zenoh
+        for change in self.claims.decide(is_listed=self._is_listed, can_claim=self._systems.is_on_ground):
+            sysid, token = change.sysid, keys.drone_token(change.sysid, self._connection.session_text)
+            if change.step is ClaimStep.HOLD:
+                session.declare_token(token)
+                session.subscribe(keys.up(sysid, "**"))
+                session.answer_queries(keys.state(sysid))
+                session.publish_on(keys.down(sysid))
+                continue
+            logger.critical("%s: system %d is held by gateway %s", self.url, sysid, change.holder)
+            self._systems.refused_id(sysid)
+            if change.step is ClaimStep.RELEASE:
+                for key in (token, keys.up(sysid, "**"), keys.state(sysid), keys.down(sysid)):
+                    session.end(key)
+
+    def _add(self, station: str) -> None:
+        if len(self._stations) >= self.parsed.options.max_clients:
+            self.counters["refused_peers"] += 1
+            logger.debug("%s: station %s refused: all places are taken", self.url, station)
+            return
+        keys = self._connection.keys
+        lane = self._lane(f"{self.url} from {station}", lambda sysid: keys.down(sysid, station))
+        lane.channel.ends_with_station = True
+        self._stations[station] = _Station(lane, StationInput(session_of(station)))
+        self._ping(station)
+        self._sink.opened(lane.channel)
+
+    def _drop(self, station: str) -> None:
+        gone = self._stations.pop(station, None)
+        if gone is not None:
+            gone.lane.flush()
+            gone.lane.channel.close()
+            self._sink.closed(gone.lane.channel)
+
+    def _read(self, change: ReadersChange) -> None:
+        key = self._connection.keys.parse(change.key)
+        if key is None:
+            return
+        if change.has_readers:
+            self._readers.add(key.sysid)
+        else:
+            self._readers.discard(key.sysid)
+        if self._readers and self._open_lane is None:
+            self._open_lane = self._lane(self.url, self._connection.keys.down)
+            self._sink.opened(self._open_lane.channel)
+        elif not self._readers:
+            self._close_lane()
+
+    def _close_lane(self) -> None:
+        lane, self._open_lane = self._open_lane, None
+        if lane is not None:
+            lane.channel.close()
+            self._sink.closed(lane.channel)
+
+    def _lane(self, name: str, key_of: Callable[[int], str]) -> _Lane:
+        outboxes: dict[int, Outbox] = {}
+
+        def write(raw: bytes) -> None:
+            sysid = sender_of(raw)
+            if sysid not in self.claims.held:
+                self.counters["foreign_frames"] += 1  # systems behind other endpoints are not this gateway's to publish
+                return
+            outbox = outboxes.get(sysid)
+            if outbox is None:
+                key = key_of(sysid)
+                outbox = outboxes[sysid] = Outbox(lambda data: self._connection.publish(key, data), MAX_SAMPLE)
+            outbox.add(raw)
+
+        channel = shaped_channel(name, write, self.parsed.options, datagrams=True)
+        self._protect(channel)
+        return _Lane(channel, outboxes)
+
+    def _sample(self, sample: FabricSample) -> None:
+        key = self._connection.keys.parse(sample.key)
+        station = None if key is None else self._stations.get(key.owner)
+        if key is None or station is None or key.sysid not in self.claims.held:
+            self.counters["unknown_keys"] += 1
+            return
+        now = self._clock.monotonic()
+        if key.kind is KeyKind.PONG:
+            self._pong(station, sample, now)
+        elif key.kind is KeyKind.UP:
+            self._frames(station, key.sysid, sample, now)
+
+    def _pong(self, station: _Station, sample: FabricSample, now: float) -> None:
+        pong = Pong.decode(sample.payload)
+        if pong is None or not station.input.pong(pong, now):
+            station.lane.channel.counters["bad_envelopes"] += 1
+            return
+        station.has_answered = True
+
+    def _frames(self, station: _Station, sysid: int, sample: FabricSample, now: float) -> None:
+        channel = station.lane.channel
+        envelope = UpEnvelope.decode(sample.attachment)
+        if envelope is None or len(sample.payload) > MAX_SAMPLE:
+            channel.counters["bad_envelopes"] += 1
+            return
+        if not station.input.is_next(sysid, envelope):
+            channel.counters["repeated_samples"] += 1
+            return
+        age = station.input.age(envelope, now)
+        accepted = []
+        for received in channel.receive(sample.payload):
+            if targets(received.message)[0] not in (0, sysid):
+                channel.counters["misdirected_frames"] += 1
+            elif station.input.is_late(received, age, now):
+                self._refuse(station, sysid, received, now)
+            else:
+                accepted.append(received)
+        if accepted:
+            self._sink.received(channel, accepted, frozenset({sysid}))
+        station.lane.flush()
+
+    def _refuse(self, station: _Station, sysid: int, received: ReceivedFrame, now: float) -> None:
+        """Count a late frame, and answer it if it is a command."""
+        channel, answer = station.lane.channel, refusal_of(received)
+        channel.counters["late_frames"] += 1
+        if answer is not None:
+            channel.counters["late_commands"] += 1
+            compid = targets(received.message)[1] or dialect.MAV_COMP_ID_AUTOPILOT1
+            channel.send(answer, sysid, compid, is_answer=True)
+        elif received.id in INPUTS:
+            channel.counters["late_inputs"] += 1
+        else:
+            return
+        if now - station.reported >= REPORT_EVERY:
+            station.reported = now
+            text = texts.COMMAND_LATE if answer is not None else texts.INPUT_LATE
+            channel.send(
+                dialect.MAVLink_statustext_message(dialect.MAV_SEVERITY_WARNING, text.encode()),
+                sysid,
+                dialect.MAV_COMP_ID_AUTOPILOT1,
+                is_answer=True,
+            )
+
+    # What is due by time.
+
+    def _tick(self) -> None:
+        now = self._clock.monotonic()
+        for station in tuple(self._stations):
+            self._ping_if_due(station, now)
+        if now - self._stated >= STATE_EVERY and self._connection.is_up:
+            self._stated = now
+            for sysid in sorted(self.claims.held):
+                state = self._systems.state(sysid, self._connection.session_text)
+                if state is not None:
+                    self._connection.publish(self._connection.keys.state(sysid), state)
+            self._claim()
+        self._timer = asyncio.get_running_loop().call_later(FIRST_PINGS, self._tick)
+
+    def _ping_if_due(self, name: str, now: float) -> None:
+        station = self._stations[name]
+        if now - station.pinged >= (STATE_EVERY if station.has_answered else FIRST_PINGS):
+            self._ping(name)
+
+    def _ping(self, name: str) -> None:
+        if not self.claims.held:
+            return
+        now = self._clock.monotonic()
+        station = self._stations[name]
+        station.pinged = now
+        key = self._connection.keys.ping(min(self.claims.held), name)
+        self._connection.publish(key, station.input.ping(self._connection.session, now).encode())
+
+    def _answer(self, query: StateQuery) -> None:
+        key, session = self._connection.keys.parse(query.key), self._connection.zenoh
+        if key is not None and key.sysid in self.claims.held:
+            state = self._systems.state(key.sysid, self._connection.session_text)
+            if state is not None:
+                session.reply(query.query, query.key, state)
+        session.finish(query.query)

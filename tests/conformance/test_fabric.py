@@ -1,0 +1,110 @@
+"""Stations and a gateway on a zenoh network: real sessions over a router that is a process of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+import zenoh
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support import missions
+from support.fabric import FabricStation, RouterProcess, StallingRelay, ground, router
+from support.ftp import Ftp
+from support.media import DAY, add_photo
+from support.setpoints import VELOCITY_ONLY, engage, local, streaming
+from support.world import HOME, World, world
+
+ACCEPTED, REJECTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_TEMPORARILY_REJECTED
+PARTITION = 5.0
+
+
+@asynccontextmanager
+async def flown(**more: Any) -> AsyncIterator[tuple[World, RouterProcess]]:
+    """A world whose first client is a station on the fabric."""
+    async with router() as node, world(endpoints=(node.url,), **more) as w, ground(node.url) as port:
+        w.clients.insert(0, await FabricStation().join(port))
+        yield w, node
+
+
+def counted(w: World, name: str) -> int:
+    return w.gateway.counters()[name]
+
+
+async def test_station_on_the_fabric_flies_a_mission_and_downloads_a_picture() -> None:
+    async with flown(speed=8.0, web=True) as (w, _):
+        photo = add_photo(w.drone)
+        await missions.put(w, [missions.takeoff(6.0), missions.way(12.0, 0.0, 6.0), missions.RTL])
+        await missions.start(w)
+        content = await Ftp(w.client, component=100).download(f"/media/{DAY}/{photo.id}")
+        assert content == photo.content()
+        await w.client.wait("MISSION_ITEM_REACHED", lambda m: m.seq == 1, since=0, timeout=30.0)
+        assert counted(w, "late_inputs") == counted(w, "late_commands") == 0
+
+
+async def test_state_of_a_system_is_published_and_answered() -> None:
+    async with router() as node, world(endpoints=(node.url,)):
+        config = zenoh.Config()
+        config.insert_json5("mode", '"client"')
+        config.insert_json5("connect/endpoints", json.dumps([f"tcp/127.0.0.1:{node.port}"]))
+        with await asyncio.to_thread(zenoh.open, config) as session:
+            samples = session.declare_subscriber("anafi/1/state")
+            published = await asyncio.to_thread(samples.recv)
+            (reply,) = await asyncio.to_thread(lambda: list(session.get("anafi/*/state")))
+            tokens = await asyncio.to_thread(lambda: [str(one.ok.key_expr) for one in session.liveliness().get("**")])
+        for sample in (published, reply.ok):
+            state = json.loads(sample.payload.to_string())
+            assert state["version"] == 1
+            assert (state["drone"]["sysid"], state["drone"]["connected"]) == (1, True)
+            assert math.isclose(state["position"]["latitude"], HOME[0], abs_tol=1e-4)
+        gateway = state["gateway"]
+        assert sorted(tokens) == [f"anafi/1/drone/v1/{gateway}", f"anafi/gateway/v1/{gateway}"]
+
+
+async def test_setpoints_of_a_partition_move_nothing_after_it() -> None:
+    async with router() as node, world(endpoints=(node.url,)) as w:
+        relay = StallingRelay(node.port)
+        try:
+            async with ground(f"zenoh://127.0.0.1:{await relay.start()}", "tcpin") as port:
+                station = await FabricStation().join(port, tcp=True)
+                w.clients.insert(0, station)
+                await w.take_off()
+                async with streaming(station, local(VELOCITY_ONLY, v=(2.0, 0.0, 0.0))) as sent:
+                    await engage(station, "px4")
+                    await station.wait("LOCAL_POSITION_NED", lambda m: m.x > 1.0)
+                    relay.stall()
+                    mark = station.mark()
+                    station.send_command(dialect.MAV_CMD_NAV_LAND)
+                    count = len(sent)
+                    await asyncio.sleep(PARTITION)
+                await asyncio.sleep(0.5)  # the last setpoint is now too old, too
+                began, before = len([*w.drone.log]), w.drone.pose
+                relay.resume()
+                ack = await station.wait("COMMAND_ACK", lambda m: m.command == dialect.MAV_CMD_NAV_LAND, since=mark)
+                assert ack.result == REJECTED
+                assert (await station.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
+                await asyncio.sleep(1.0)
+                after = w.drone.pose
+                assert math.dist((before.north, before.east, before.up), (after.north, after.east, after.up)) < 0.3
+                later = [entry for entry in [*w.drone.log][began:] if entry.kind == "command"]
+                assert not [entry for entry in later if entry.name.endswith((".Landing", ".moveTo", ".moveBy"))]
+                sticks = [entry.args for entry in later if entry.name.endswith(".PCMD")]
+                assert not [args for args in sticks if any(args[axis] for axis in ("roll", "pitch", "yaw", "gaz"))]
+                assert counted(w, "late_inputs") >= len(sent) - count > 50
+                assert counted(w, "late_commands") == 1
+        finally:
+            await relay.close()
+
+
+async def test_killed_router_that_returns_brings_the_station_back() -> None:
+    async with flown() as (w, node):
+        await node.kill()
+        await w.client.silence("HEARTBEAT", 2.0)
+        await node.start()
+        await w.client.heartbeat(lambda beat: True, timeout=20.0)
+        # The first heartbeats come before the first ping is answered.
+        await w.client.heartbeat(lambda beat: True)
+        assert (await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED

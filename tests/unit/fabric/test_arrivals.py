@@ -1,0 +1,57 @@
+"""The queues between zenoh's threads and the event loop: bounds, order, what is dropped and counted."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from anafi_mav.fabric.arrivals import MAX_SAMPLES, ArrivalQueue, FabricSample, SampleQueue, TokenChange
+
+
+def sample(number: int) -> FabricSample:
+    return FabricSample("key", b"%d" % number, b"")
+
+
+def test_arrivals_are_taken_in_their_order_and_wake_once() -> None:
+    woken: list[int] = []
+    queue = ArrivalQueue(lambda: woken.append(1), Counter())
+    arrivals = [TokenChange("a", True), sample(1), TokenChange("a", False), sample(2)]
+    for arrival in arrivals:
+        queue.put(arrival)
+    assert queue.take() == arrivals
+    assert queue.take() == []
+    assert len(woken) == 1
+    queue.put(sample(3))
+    assert len(woken) == 2
+
+
+def test_full_arrival_queue_drops_the_oldest_sample_and_no_token() -> None:
+    counters: Counter[str] = Counter()
+    queue = ArrivalQueue(lambda: None, counters)
+    queue.put(TokenChange("a", True))
+    for number in range(MAX_SAMPLES + 2):
+        queue.put(sample(number))
+    taken = queue.take()
+    assert taken[:2] == [TokenChange("a", True), sample(2)]
+    assert len(taken) == 1 + MAX_SAMPLES
+    assert counters == {"dropped_arrivals": 2}
+    queue.put(sample(0))
+    assert queue.take() == [sample(0)]
+
+
+def test_full_sample_queue_drops_the_oldest_and_counts_it() -> None:
+    counters: Counter[str] = Counter()
+    queue = SampleQueue(2, counters)
+    for number in (1, 22, 333):
+        queue.add_sample(sample(number))
+    assert [queue.next(0.0), queue.next(0.0), queue.next(0.0)] == [sample(22), sample(333), None]
+    assert counters == {"dropped_samples": 1, "dropped_sample_bytes": 1}
+
+
+def test_work_comes_before_samples_and_is_kept() -> None:
+    counters: Counter[str] = Counter()
+    queue, work = SampleQueue(2, counters), lambda session: None
+    queue.add_sample(sample(1))
+    queue.add_work(work)
+    queue.clear_samples()
+    assert [queue.next(0.0), queue.next(0.0)] == [work, None]
+    assert counters == {"dropped_samples": 1}
