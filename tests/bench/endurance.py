@@ -18,6 +18,7 @@ After a rest both simulators are started again.
 | tasks, files and sockets at the end | as after a sixth |
 | final results of each command (IN_PROGRESS before it is allowed) | one |
 | a command that FAILED while its drone was silent | with a text of that drone |
+| a command without a result | sent when the link was lost, with a text of that drone |
 | the gateway's process and its stderr | runs, no traceback |
 
 Exit status 1 when one of these is exceeded. A run in which this computer lost datagrams for a client is void.
@@ -75,6 +76,8 @@ TEXT_WITHIN = 5.0
 """s before or after a FAILED in which its text has arrived."""
 SILENT_AFTER = 3.0
 """s of silence after which open commands are answered (docs/connecting.md)."""
+SILENT_FOR, RECONNECTED_AFTER = 2.0, 12.0
+"""s of silence after which a link may count as lost, and after its end until the drone is connected again."""
 MEMORY_LIMIT = 1.05
 PHASES = (1 / 6, 1 / 6, 2 / 3)
 """Shares of the time, each of which ends with a rest."""
@@ -636,19 +639,22 @@ class Endurance:
                 before, after = Counter(early[what]), Counter(end[what])
                 self.wrong.append(f"{what}: more {dict(after - before)}, fewer {dict(before - after)}")
         results: Counter[int] = Counter()
-        mute = total = 0
+        total = absent = 0
         for client in self.clients:
             self.wrong += client.unexpected[:10]
             for one in [one for sent in client.commands.values() for one in sent]:
                 total += 1
                 if not one.results:
-                    if id(one) not in client.abandoned:
-                        self.wrong.append(f"no result: {one.command} of client {client.number} to drone {one.drone}")
+                    if self._absent(client, one):
+                        absent += 1
+                    elif id(one) not in client.abandoned:
+                        self.wrong.append(
+                            f"no result: {one.command} of client {client.number} to drone {one.drone}{self._when(one)}"
+                        )
                     continue
                 at, result = one.results[0]
                 results[result] += 1
                 if result == mavlink.MAV_RESULT_FAILED and self._cut(one, at) and not self._text(client, one.drone, at):
-                    mute += 1
                     self.wrong.append(
                         f"FAILED without text: {one.command} of client {client.number}, drone {one.drone}"
                     )
@@ -658,7 +664,8 @@ class Endurance:
         names = {getattr(enums, name): name[11:] for name in dir(enums) if name.startswith("MAV_RESULT_")}
         named = {names[key]: count for key, count in results.most_common()}
         print(
-            f"{total} commands, {left} of them left by clients that lost their connection; results {named}; "
+            f"{total} commands, {left} of them left by clients that lost their connection, {absent} sent to an absent "
+            f"drone; results {named}; "
             f"{len(self.cuts)} cuts"
         )
         print(f"steps: {dict(sorted(self.tally.items()))}")
@@ -671,6 +678,24 @@ class Endurance:
     def _cut(self, one: Commanded, at: float) -> bool:
         """Whether the drone was silent between a command and its result."""
         return any(drone == one.drone and begin < at and one.at < end + SILENT_AFTER for begin, end, drone in self.cuts)
+
+    def _absent(self, client: BenchClient, one: Commanded) -> bool:
+        """Whether a command was sent to a drone whose link was lost, of which a text had notified the client.
+
+        The system of such a drone does not exist until the next handshake: nothing of it is answered.
+        """
+        return any(
+            drone == one.drone
+            and begin + SILENT_FOR <= one.at <= end + RECONNECTED_AFTER
+            and any(system == drone and begin <= when <= one.at + TEXT_WITHIN for when, system, _ in client.texts)
+            for begin, end, drone in self.cuts
+        )
+
+    def _when(self, one: Commanded) -> str:
+        """When a command was sent in terms of the cut of its drone's link, if there was one."""
+        near = [(one.at - begin, end - begin) for begin, end, drone in self.cuts
+                if drone == one.drone and begin - SILENT_AFTER < one.at < end + SILENT_AFTER]  # fmt: skip
+        return "".join(f", {after:.1f} s into a silence of {length:.1f} s" for after, length in near)
 
     def _text(self, client: BenchClient, drone: int, at: float) -> bool:
         return any(system == drone and abs(when - at) < TEXT_WITHIN for when, system, _ in client.texts)
