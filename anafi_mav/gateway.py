@@ -425,6 +425,11 @@ class Gateway:
         problems = [problem for problem in (self._state_problem, self._keys.problem) if problem]
         return problems + [s.system.memory.problem for s in self._supervised if s.system.memory.problem]
 
+    async def endpoint_problems(self) -> list[str]:
+        """Return a line for each problem of an open endpoint, once they are known."""
+        found = await asyncio.gather(*(endpoint.problems() for endpoint in self._node.endpoints))
+        return [problem for problems in found for problem in problems]
+
     def _recording_problems(self) -> list[str]:
         problem = "" if self._recorder is None else self._recorder.files.problem
         return [f"recording has gaps: {problem}"] if problem else []
@@ -632,7 +637,11 @@ class _FabricSystems:
         supervised = self._gateway.supervised(sysid)
         return supervised is not None and supervised.system.active and supervised.system.vehicle.on_ground
 
-    def refused_id(self, sysid: int) -> None:
+    def is_started(self) -> bool:
+        return bool(self._gateway.systems)
+
+    def refused_id(self, sysid: int) -> bool:
         supervised = self._gateway.supervised(sysid)
         if supervised is not None:
             supervised.system.announce(Severity.CRITICAL, texts.SYSTEM_ID_TAKEN.fill(sysid=sysid))
+        return supervised is not None

@@ -215,6 +215,8 @@ class StatusReport:
             silence_s=None if silence is None or not connected else round(silence, 2),
             stream=drone.streams.shown.kind.value if connected and source is not None else "",
             viewers=0 if source is None else source.viewers,
+            operator=vehicle.operators.operator if connected else 0,
+            secondaries=tuple(vehicle.operators.shown_secondaries(now)) if connected else (),
             warnings=tuple(warnings),
             commands=_commands([component.commands.log for component in system.components], now),
             counters=dict(drone.counters),

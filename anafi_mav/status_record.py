@@ -126,6 +126,10 @@ class DroneStatus(msgspec.Struct, frozen=True, kw_only=True):
     stream: str
     """The video stream that it shows; empty: no picture can be watched."""
     viewers: int
+    operator: int = 0
+    """System id of the station that has the drone by operator control; 0: none, and while it is not connected."""
+    secondaries: tuple[int, ...] = ()
+    """System ids of the heard stations that may command beside an operator."""
     warnings: tuple[str, ...]
     """Dangerous settings and reasons against a take-off."""
     commands: CommandsStatus

@@ -44,6 +44,10 @@ async def findings(config: Config, place: Place) -> list[Finding]:
         found += [wrong("state", problem, "give the gateway a folder that it can write") for problem in problems]
         if not problems:
             found.append(ok("state", "folder can be written, and no other gateway uses it"))
+        found += [
+            wrong("fabric", problem, "end that gateway, or change the id")
+            for problem in await gateway.endpoint_problems()
+        ]
         found += [ok("open", line) for line in gateway.lines()]
         if config.recording.folder is not None:
             found.append(ok("recording", f"folder can be written: {config.recording.folder}"))

@@ -170,7 +170,20 @@ def tables(status: GatewayStatus) -> list[TableRows]:
     """Return drones, clients and refused commands as tables."""
     result = [
         TableRows(
-            ("drone", "id", "state", "mode", "battery", "GPS", "height", "radio", "heard", "commands", "warnings"),
+            (
+                "drone",
+                "id",
+                "state",
+                "mode",
+                "battery",
+                "GPS",
+                "height",
+                "radio",
+                "heard",
+                "operator",
+                "commands",
+                "warnings",
+            ),
             [_drone(drone) for drone in status.drones],
         ),
         TableRows(
@@ -193,7 +206,7 @@ def tables(status: GatewayStatus) -> list[TableRows]:
 
 def _drone(drone: DroneStatus) -> Sequence[str]:
     if not drone.connected:
-        return (drone.name, str(drone.sysid), "not connected", *("",) * 7, drone.problem)
+        return (drone.name, str(drone.sysid), "not connected", *("",) * 8, drone.problem)
     radio = " ".join(
         part for part in (_number(drone.radio_quality, "/5"), _number(drone.radio_dbm, " dBm")) if part != "-"
     )
@@ -207,9 +220,18 @@ def _drone(drone: DroneStatus) -> Sequence[str]:
         _number(drone.height_m, " m"),
         radio or "-",
         _number(drone.silence_s, " s"),
+        _operator(drone),
         _quantiles(drone.commands.latency),
         "; ".join(drone.warnings),
     )
+
+
+def _operator(drone: DroneStatus) -> str:
+    """Return the operator, with the secondaries in parentheses."""
+    if not drone.operator:
+        return "-"
+    beside = ", ".join(map(str, drone.secondaries))
+    return f"{drone.operator} ({beside})" if beside else str(drone.operator)
 
 
 def _client(client: ClientStatus) -> Sequence[str]:

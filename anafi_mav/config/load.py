@@ -201,6 +201,11 @@ def _contradictions(config: Config) -> Iterator[tuple[str, str]]:
     }
     yield from _twice("an endpoint", endpoints)
     yield from _twice("a sysid", {f"{key_path}.sysid": drone.sysid for key_path, drone in drones.items()})
+    if config.sysids is not None:
+        low, high = map(int, config.sysids.split("-"))
+        for key_path, drone in drones.items():
+            if not low <= drone.sysid <= high:
+                yield f"{key_path}.sysid", f"expected one of sysids, {config.sysids}, got {drone.sysid}"
     yield from _twice("a name", {f"{key_path}.name": drone.name for key_path, drone in drones.items()})
     simulated = {f"{path}.sim": drone.sim for path, drone in drones.items() if drone.sim is not None}
     bound = {f"{path}.address": sim.address for path, sim in simulated.items() if sim.address is not None}

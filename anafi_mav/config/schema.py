@@ -408,6 +408,14 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             extra=expected(f"a list of 1 to {MAX_DRONES} drones"),
         ),
     ] = (DroneConfig(name="anafi", sysid=1, sim=SimConfig()),)
+    sysids: Annotated[
+        Annotated[str, Meta(pattern=r"\A\d{1,3}-\d{1,3}\Z")] | None,
+        Meta(
+            description="Range of the system ids of this gateway, where several share a [network](fabric.md): each "
+            "drone's `sysid` must be in it. Default: none.",
+            extra=expected("a range like 1-80"),
+        ),
+    ] = None
     allow_kill: Annotated[
         bool,
         Meta(

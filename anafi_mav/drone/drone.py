@@ -772,8 +772,9 @@ class Drone:
         reaction = self._reactions.get(kind)
         if reaction is not None:
             reaction(message, now)
-        for expectation in tuple(self._commander.waiting.get(kind, ())):
-            expectation.offer(message)
+        if waiting := self._commander.waiting.get(kind):
+            for expectation in tuple(waiting):
+                expectation.offer(message)
         for callback in self._subscribers:
             try:
                 callback(message, now)

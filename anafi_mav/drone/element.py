@@ -11,6 +11,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Callable, Mapping
+from operator import is_
 from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 
 import msgspec
@@ -66,6 +67,27 @@ class Element(Generic[StateT]):
     def reset(self) -> None:
         """Forget everything the drone reported."""
         self.state = self.NOTHING
+
+
+class StateWatch:
+    """Notices that one of some elements has another state than at the last look."""
+
+    def __init__(self, *elements: Element[Any]) -> None:
+        self._elements = elements
+        self._seen: list[object] = []
+        """The states themselves: each update makes another object."""
+
+    def has_changed(self) -> bool:
+        """Return True at the first look, and at each look after an update of one of the elements."""
+        states = [element.state for element in self._elements]
+        if len(states) == len(self._seen) and all(map(is_, states, self._seen)):
+            return False
+        self._seen = states
+        return True
+
+    def reset(self) -> None:
+        """Make the next look the first."""
+        self._seen = []
 
 
 def finite(value: float) -> float | None:

@@ -387,9 +387,8 @@ class Commander:
             self._withdraw(sent)
 
     def _withdraw(self, sent: SentCommand) -> None:
-        sent.apply(Event.WITHDRAWN, loop_time())
-        if sent.undo is not None:
-            self.send_stop_if_connected(sent.undo)
+        if (undo := self.sent.withdraw(sent, loop_time())) is not None:
+            self.send_stop_if_connected(undo)
 
     def dispatch(self, expectation: Expectation[Any], command: Message, timeout: float, *, stops: bool = False) -> None:
         """Send the command whose answer is expected. `stops`: see `send`."""

@@ -209,6 +209,17 @@ class SentCommands:
         )
         return sent.phase is Phase.WITHDRAWN and not in_force and now < sent.reported_until
 
+    def withdraw(self, sent: SentCommand, now: float) -> Message | None:
+        """Withdraw a command and those that it has replaced; return the command against them.
+
+        A hand launch that a take-off has replaced may still start the motors when the take-off has failed.
+        """
+        replaced = [one for one in self._slots[sent.slot] if one.phase is Phase.ABANDONED and one.may_begin(now)]
+        undo = next((one.undo for one in (sent, *replaced) if one.undo is not None), None)
+        for one in (sent, *replaced):
+            one.apply(Event.WITHDRAWN, now)
+        return undo
+
     def is_newest(self, sent: SentCommand) -> bool:
         """Return True while no newer command of its slot was sent."""
         return self._slots[sent.slot][-1] is sent

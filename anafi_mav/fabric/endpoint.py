@@ -39,6 +39,9 @@ STATE_EVERY = 1.0
 FIRST_PINGS = 0.2
 """s between pings until the first is answered: a station's frames are dropped until then."""
 
+LIST_LIMIT = 5.0
+"""s for a link to the router and a list of the tokens there."""
+
 REPORT_EVERY = 10.0
 """s between two texts about late frames to one station."""
 
@@ -57,8 +60,11 @@ class FabricSystems(Protocol):
     def is_on_ground(self, sysid: int) -> bool:
         """Return True while the drone is known to stand."""
 
-    def refused_id(self, sysid: int) -> None:
-        """Report that another gateway has this system id."""
+    def is_started(self) -> bool:
+        """Return True once drones are connected to; before, an id is looked up and not claimed."""
+
+    def refused_id(self, sysid: int) -> bool:
+        """Report to clients that another gateway has this system id; False before the start."""
 
 
 @dataclass
@@ -106,6 +112,10 @@ class FabricEndpoint(Endpoint):
         self._open_lane: _Lane | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._stated = -STATE_EVERY
+        self._listed = asyncio.Event()
+        """Set once all tokens have been reported."""
+        self._reported: set[int] = set()
+        """Refused ids that clients know of."""
 
     async def open(self) -> None:
         connection = self._connection
@@ -132,6 +142,19 @@ class FabricEndpoint(Endpoint):
         kept_off = "".join(f", system {sysid} is another gateway's" for sysid in sorted(self.claims.refused))
         return f"{self.url}: connected, {count} station{'' if count == 1 else 's'}{kept_off}"
 
+    async def problems(self) -> list[str]:
+        listed = asyncio.ensure_future(self._listed.wait())
+        try:
+            await asyncio.wait({listed}, timeout=LIST_LIMIT)
+        finally:
+            listed.cancel()
+        if not self._listed.is_set():
+            return []  # a router that is not there yet is no mistake
+        return [
+            f"{self.url}: system {sysid} is held by gateway {holder}: give each drone an id of its own"
+            for sysid, holder in sorted(self.claims.refused.items())
+        ]
+
     # What the fabric reports.
 
     def _arrived(self, arrival: Arrival) -> None:
@@ -145,6 +168,7 @@ class FabricEndpoint(Endpoint):
             self._answer(arrival)
         elif isinstance(arrival, TokensListed):
             self._is_listed = True
+            self._listed.set()
             self._claim()
         elif isinstance(arrival, LinkChange):
             self._linked(arrival)
@@ -175,7 +199,8 @@ class FabricEndpoint(Endpoint):
 
     def _claim(self) -> None:
         keys, session = self._connection.keys, self._connection.zenoh
-        for change in self.claims.decide(is_listed=self._is_listed, can_claim=self._systems.is_on_ground):
+        can_hold = self._is_listed and self._systems.is_started()
+        for change in self.claims.decide(is_listed=can_hold, can_claim=self._systems.is_on_ground):
             sysid, token = change.sysid, keys.drone_token(change.sysid, self._connection.session_text)
             if change.step is ClaimStep.HOLD:
                 session.declare_token(token)
@@ -184,7 +209,6 @@ class FabricEndpoint(Endpoint):
                 session.publish_on(keys.down(sysid))
                 continue
             logger.critical("%s: system %d is held by gateway %s", self.url, sysid, change.holder)
-            self._systems.refused_id(sysid)
             if change.step is ClaimStep.RELEASE:
                 for key in (token, keys.up(sysid, "**"), keys.state(sysid), keys.down(sysid)):
                     session.end(key)
@@ -313,6 +337,11 @@ class FabricEndpoint(Endpoint):
 
     def _tick(self) -> None:
         now = self._clock.monotonic()
+        self._claim()
+        self._reported &= self.claims.refused.keys()
+        self._reported |= {
+            sysid for sysid in self.claims.refused if sysid in self._reported or self._systems.refused_id(sysid)
+        }
         for station in tuple(self._stations):
             self._ping_if_due(station, now)
         if now - self._stated >= STATE_EVERY and self._connection.is_up:
@@ -321,7 +350,6 @@ class FabricEndpoint(Endpoint):
                 state = self._systems.state(sysid, self._connection.session_text)
                 if state is not None:
                     self._connection.publish(self._connection.keys.state(sysid), state)
-            self._claim()
         self._timer = asyncio.get_running_loop().call_later(FIRST_PINGS, self._tick)
 
     def _ping_if_due(self, name: str, now: float) -> None:

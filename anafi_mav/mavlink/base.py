@@ -25,6 +25,7 @@ from anafi_mav.mavlink.byte_budget import ByteBudget
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.frames import ReceivedFrame
 from anafi_mav.mavlink.signing import Signing
+from anafi_mav.receive_buffer import limit_reads
 
 logger = logging.getLogger(__name__)
 
@@ -160,6 +161,10 @@ class Endpoint(ABC):
     @abstractmethod
     async def close(self) -> None:
         """End every channel and release every socket."""
+
+    async def problems(self) -> list[str]:
+        """Return what keeps it from its work though it is open, once that is known."""
+        return []
 
     @abstractmethod
     def describe(self) -> str:
@@ -301,6 +306,7 @@ class StreamPeer(asyncio.Protocol):
         self._transport = transport  # type: ignore[assignment]
         self.channel.local_host = seen_host(transport.get_extra_info("sockname"), transport.get_extra_info("peername"))
         transport.set_write_buffer_limits(high=self._write_ahead)
+        limit_reads(transport)
         self._sink.opened(self.channel)
 
     def data_received(self, data: bytes) -> None:

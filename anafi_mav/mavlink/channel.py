@@ -85,12 +85,8 @@ class Channel:
         """While the peer has not proved to be at its address: what may be sent to it. None: everything."""
         self.when_proved: set[Callable[[], None]] = set()
         """Called by `prove`."""
-        self.counters: Counter[str] = Counter()
-        """sent_frames, dropped_frames (queue full, or sent after the channel had closed), refused_access (frames that
-        need more than its access, also by name), refused_operator (of a station while another one is the operator, also
-        by name), refused_forwards (from senders that the gateway does not sign for),
-        refused_observer (what observers send to all, or in the name of others),
-        withheld_frames (the peer has not proved to be at its address)."""
+        self._counters: Counter[str] = Counter()
+        self.sent_frames = 0
         self.sent_bytes = 0
         self.received_bytes = 0
         self.dropped_bytes = 0
@@ -127,6 +123,19 @@ class Channel:
 
     def __repr__(self) -> str:
         return f"<Channel {self.name}>"
+
+    @property
+    def counters(self) -> Counter[str]:
+        """Return sent_frames and what else happened, by kind.
+
+        dropped_frames (queue full, or sent after the channel had closed), refused_access (frames that need more than
+        its access, also by name), refused_operator (of a station while another one is the operator, also by name),
+        refused_forwards (from senders that the gateway does not sign for), refused_observer (what observers send to
+        all, or in the name of others), withheld_frames (the peer has not proved to be at its address).
+        """
+        if self.sent_frames:
+            self._counters["sent_frames"] = self.sent_frames
+        return self._counters
 
     def protect(self, signing: Signing) -> None:
         """Sign what is sent and verify what is received while `signing` is on."""
@@ -290,14 +299,19 @@ class Channel:
         sequence = self._sequence.get(sender, 0)
         self._sequence[sender] = (sequence + 1) & 0xFF
         if self.signing is None or not self.signing.is_on:
-            self._give(frame(packed, sequence, sysid, compid))
+            raw = packed.framed(sequence, sysid, compid)
         else:
-            self._give(self._signed(frame(packed, sequence, sysid, compid, SIGNED), is_own=True))
+            raw = self._signed(frame(packed, sequence, sysid, compid, SIGNED), is_own=True)
+        self.sent_frames += 1
+        self.sent_bytes += len(raw)
+        self._write(raw)
 
     def _pass_on(self, raw: bytes) -> None:
         if self.is_signed and not raw[2] & SIGNED:
             raw = self._signed(with_flags(raw, SIGNED), is_own=False)
-        self._give(raw)
+        self.sent_frames += 1
+        self.sent_bytes += len(raw)
+        self._write(raw)
 
     def _signed(self, raw: bytes, *, is_own: bool) -> bytes:
         assert self.signing is not None
@@ -313,11 +327,6 @@ class Channel:
             signing.refused[verdict.value] += 1
             signing.last_refused = self.name
         return verdict
-
-    def _give(self, raw: bytes) -> None:
-        self.counters["sent_frames"] += 1
-        self.sent_bytes += len(raw)
-        self._write(raw)
 
     def _wait(self, waiting: _Waiting, give_way: bool) -> None:
         if not self.is_open:

@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Callable
 from enum import Enum
 from operator import attrgetter
-from typing import Any, NamedTuple
+from typing import Any
 
 import fastcrc
 import msgspec
@@ -70,12 +70,34 @@ Judge = Callable[[bytes, int], Verdict]
 """Takes a frame with a right checksum and its message id."""
 
 
-class Packed(NamedTuple):
+class Packed:
     """A message as payload bytes, not yet of a sender."""
 
-    id: int
-    payload: bytes
-    """Without the trailing zeros, but at least one byte (serialization.md §payload_truncation)."""
+    __slots__ = ("_framed", "_header", "id", "payload")
+
+    def __init__(self, id: int, payload: bytes) -> None:
+        self.id = id
+        self.payload = payload
+        """Without the trailing zeros, but at least one byte (serialization.md §payload_truncation)."""
+        self._header = (-1, -1, -1)
+        self._framed = b""
+        """The last unsigned frame, of the sequence number and sender in `_header`."""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Packed) and (self.id, self.payload) == (other.id, other.payload)
+
+    def __hash__(self) -> int:
+        return hash((self.id, self.payload))
+
+    def framed(self, seq: int, sysid: int, compid: int) -> bytes:
+        """Return the unsigned frame.
+
+        Channels with the same streams are at the same sequence numbers: one frame is made for all of them.
+        """
+        header = (seq, sysid, compid)
+        if header != self._header:
+            self._header, self._framed = header, frame(self, seq, sysid, compid)
+        return self._framed
 
 
 def pack(message: dialect.MAVLink_message) -> Packed:
@@ -98,7 +120,7 @@ def frame(packed: Packed, seq: int, sysid: int, compid: int, flags: int = 0) -> 
 
     With the flag `SIGNED` a signature has to follow.
     """
-    id, payload = packed
+    id, payload = packed.id, packed.payload
     body = _BODY.pack(len(payload), flags, 0, seq, sysid, compid, id & 0xFFFF, id >> 16) + payload
     return b"\xfd" + body + _CHECKSUM.pack(_crc(body + _EXTRA[id]))
 

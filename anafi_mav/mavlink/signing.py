@@ -141,6 +141,8 @@ class Signing:
         """Channel of the newest of them."""
         secret, timestamp = _CONTENT.unpack(content)
         self._secret: bytes = secret
+        self.is_on: bool = secret != _NO_KEY
+        """True while frames are signed and verified."""
         self.saved: int = timestamp
         """The timestamp in the file."""
         self.timestamp: int = timestamp
@@ -158,11 +160,6 @@ class Signing:
     def __repr__(self) -> str:
         return f"<Signing {self.name}: {'on' if self.is_on else 'off'}>"
 
-    @property
-    def is_on(self) -> bool:
-        """True while frames are signed and verified."""
-        return self._secret != _NO_KEY
-
     def is_key(self, secret: bytes) -> bool:
         """Return True for the present key."""
         return hmac.compare_digest(self._secret, secret)
@@ -179,7 +176,7 @@ class Signing:
         """
         if len(secret) != KEY_BYTES:
             raise LocalProtocolError(f"a key has {KEY_BYTES} bytes, not {len(secret)}")
-        self._secret = secret
+        self._secret, self.is_on = secret, secret != _NO_KEY
         self._streams.clear()
         self._floor = self.timestamp
         if timestamp < self._limit:

@@ -132,8 +132,13 @@ class Streams(Generic[ChannelT]):
         for id in ids:
             lane = audience.lanes.get(id) or self._new_lane(audience, id)
             if now >= lane.until:
-                due = [channel for channel, stream in lane.streams if stream.due(now)]
-                lane.until = min((stream.next for _, stream in lane.streams), default=_NEVER)
+                due, until = [], _NEVER
+                for channel, stream in lane.streams:
+                    if now >= stream.next and stream.due(now):
+                        due.append(channel)
+                    if stream.next < until:
+                        until = stream.next
+                lane.until = until
                 if due:
                     found.append((id, due))
             if lane.until < soonest:

@@ -30,6 +30,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.frames import ReceivedFrame, Verdict
 from anafi_mav.mavlink.listener import Listener
 from anafi_mav.mavlink.router import targets
+from anafi_mav.receive_buffer import limit_reads
 
 logger = logging.getLogger(__name__)
 
@@ -59,6 +60,7 @@ class _Datagrams(asyncio.DatagramProtocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert hasattr(transport, "set_write_buffer_limits")  # asyncio's datagram transports have it, their type not
         transport.set_write_buffer_limits(high=WRITE_AHEAD)
+        limit_reads(transport)
 
     def datagram_received(self, data: bytes, addr: Any) -> None:
         self._received(data, addr)

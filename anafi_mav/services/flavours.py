@@ -118,6 +118,11 @@ class Flavour:
     title: str = ""
     """Name of the autopilot in its banner; empty: none."""
 
+    @property
+    def guided_mode(self) -> FlightMode:
+        """The mode of a vehicle that a client of this family has sent to a place."""
+        return FlightMode.GUIDED if self.guided_setpoints else FlightMode.HOLD
+
     def custom_mode(self, mode: FlightMode) -> int:
         """Return the custom_mode of a heartbeat in this mode."""
         return self.numbers[mode]

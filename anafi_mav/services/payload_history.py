@@ -8,7 +8,6 @@ is carried out again each time: that is harmless, and the drone confirms it. Rul
 from __future__ import annotations
 
 import asyncio
-import contextlib
 from collections import defaultdict
 from collections.abc import Hashable
 
@@ -37,9 +36,9 @@ class PayloadHistory:
         """In the order of use, at most `MAX_CLIENTS`."""
         self._turns: dict[ActionGroup, asyncio.Lock] = defaultdict(asyncio.Lock)
 
-    def turn(self, group: ActionGroup) -> contextlib.AbstractAsyncContextManager[None]:
-        """Return the lock that an action holds while it runs; none unless its group is `in_order`."""
-        return self._turns[group] if group.in_order else contextlib.nullcontext()
+    def turn(self, group: ActionGroup) -> asyncio.Lock:
+        """Return the lock that an action of a group in order holds while it runs."""
+        return self._turns[group]
 
     def retransmission(self, command: Command, now: float) -> int | None:
         """Return the MAV_RESULT that answers a retransmission; None: execute the command."""

@@ -204,10 +204,10 @@ class System:
         self._started = started
         self._texts = TextNumbers()
         self._undo: Callable[[], None] | None = None
-        self._ticker: asyncio.Task[None] | None = None
+        self._ticker = Alarm(self._tick)
         self._tasks: set[asyncio.Task[None]] = set()
         self._last_state: tuple[FlightMode, bool, Health, Landed] | None = None
-        self._next_heartbeat = 0.0
+        self._next_heartbeat = self._next_look = 0.0
         self._mission_over = Alarm(self._show_mode)
         """Runs while heartbeats still say Mission."""
         self._warned_at: dict[str, float] = {}
@@ -275,8 +275,9 @@ class System:
             service.link_up()
         self._subscribed = in_order(self.subscriptions())
         self._changed()
-        self._next_heartbeat = self.clock.monotonic() + HEARTBEAT_EVERY
-        self._ticker = asyncio.get_running_loop().create_task(self._tick())
+        self._next_look = self.clock.monotonic()
+        self._next_heartbeat = self._next_look + HEARTBEAT_EVERY
+        asyncio.get_running_loop().call_soon(self._tick)
 
     async def settle(self) -> None:
         """End the commands that wait for the drone: the link is lost, but the system still exists."""
@@ -289,8 +290,7 @@ class System:
         if self._undo is not None:
             self._undo()
             self._undo = None
-        if self._ticker is not None:
-            self._ticker.cancel()
+        self._ticker.cancel()
         self._mission_over.cancel()
         for service in self.services:
             service.link_down()
@@ -459,21 +459,24 @@ class System:
                 )
         self.send_heartbeat()
 
-    async def _tick(self) -> None:
-        next_look = -math.inf
-        while True:
-            now = self.clock.monotonic()
+    def _tick(self) -> None:
+        if not self.active:
+            return
+        now = self.clock.monotonic()
+        try:
             if now >= self._next_heartbeat:
                 self._next_heartbeat = max(self._next_heartbeat + HEARTBEAT_EVERY, now + HEARTBEAT_EVERY / 2)
                 self._send_heartbeats()
-            if now >= next_look:
-                next_look = now + LOOK_EVERY
+            if now >= self._next_look:
+                self._next_look = now + LOOK_EVERY
                 for service in self._ticking:
                     try:
                         service.tick(now)
                     except Exception:  # the heartbeat goes on whatever happens to one service
                         logger.exception("%s: %s failed", self.drone.name, type(service).__name__)
-            await asyncio.sleep(max(0.0, min(self._next_heartbeat, next_look) - self.clock.monotonic()))
+        finally:
+            if self.active:
+                self._ticker.set(min(self._next_heartbeat, self._next_look))
 
     # What the drone reports.
 

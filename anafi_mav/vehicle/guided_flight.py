@@ -134,7 +134,6 @@ class GuidedFlight:
         `checked`: the place is the drone's own position, which needs no check.
         """
         vehicle, control = self._vehicle, self._vehicle.control
-        control.check(goto, by)
         if not checked:
             check_place(vehicle, goto.place, start=vehicle.place)
         before = self.goto

@@ -99,6 +99,26 @@ GOOD_ACCURACY = 5
 _AUTO = (FlightMode.MISSION, FlightMode.FOLLOW, FlightMode.ORBIT, FlightMode.RETURN, FlightMode.LAND)
 """Modes in which the drone flies without setpoints of a client."""
 
+_ALWAYS_ENTERABLE = frozenset(
+    {
+        FlightMode.HOLD,
+        FlightMode.GUIDED,
+        FlightMode.POSITION,
+        FlightMode.TAKEOFF,
+        FlightMode.LAND,
+        FlightMode.RETURN,
+        FlightMode.OFFBOARD,
+    }
+)
+
+_ENTERABLE = {
+    (False, False): _ALWAYS_ENTERABLE,
+    (False, True): _ALWAYS_ENTERABLE | {FlightMode.MISSION},
+    (True, False): _ALWAYS_ENTERABLE | {FlightMode.FOLLOW},
+    (True, True): _ALWAYS_ENTERABLE | {FlightMode.FOLLOW, FlightMode.MISSION},
+}
+"""By whether the drone's place is known, and whether a mission is stored."""
+
 
 class Landed(enum.Enum):
     """State of the vehicle between ground and air."""
@@ -283,13 +303,7 @@ class Vehicle(Aircraft):
 
         Hold, Land and Return are always among them: whether the drone can, it says itself.
         """
-        modes = {FlightMode.HOLD, FlightMode.GUIDED, FlightMode.POSITION, FlightMode.TAKEOFF}
-        modes |= {FlightMode.LAND, FlightMode.RETURN, FlightMode.OFFBOARD}
-        if self.place is not None:
-            modes.add(FlightMode.FOLLOW)
-        if self.mission.there:
-            modes.add(FlightMode.MISSION)
-        return frozenset(modes)
+        return _ENTERABLE[self.place is not None, self.mission.there]
 
     # What it can be told to do. Each returns when the drone confirmed, or raises.
 

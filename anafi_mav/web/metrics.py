@@ -105,6 +105,7 @@ def _of_drones(drones: list[tuple[dict[str, object], DroneStatus]]) -> Iterator[
     yield each("drone_radio_dbm", "Signal strength.", [one.radio_dbm for one in all_drones])
     yield each("drone_silence_seconds", "Time since the last datagram.", [one.silence_s for one in all_drones])
     yield each("drone_warnings", "Dangerous settings and take-off blockers.", [len(one.warnings) for one in all_drones])
+    yield each("drone_operator", "System id of the operator; 0: none.", [one.operator for one in all_drones])
     yield each("drone_video_viewers", "Viewers of the drone's video.", [one.viewers for one in all_drones])
     yield _counter(
         "drone_link_events_total",

@@ -8,10 +8,11 @@ telemetry walk is a datagram of the drone, so its figures hold all messages of t
 
 A call is a function of the package that is entered, once however often it is resumed. A change is a call in another
 file, or another room, than the call before. An observer is what the drone's and the system's delivery of an event
-calls; for telemetry the service that sends messages is one of them. A room is a folder of the package; in `services`
-each folder is one, below `system.py` and `component.py`, and above the modules beside it. `--against` prints an
-earlier result of `--json` beside this one, its files in the rooms in which git finds them today: in one folder of a
-hundred files no walk would change its room.
+calls, in a later iteration too, and the services that learn of a changed mode or armed state; for telemetry the service
+that sends messages is one of them. A room is a folder of the package; in `services` each folder is one, below
+`system.py` and `component.py`, and above the modules beside it.
+`--against` prints an earlier result of `--json` beside this one, its files in the rooms in which git finds them today:
+in one folder of a hundred files no walk would change its room.
 """
 
 from __future__ import annotations
@@ -20,12 +21,14 @@ import argparse
 import asyncio
 import itertools
 import json
+import math
 import os
 import subprocess
 import sys
 import tempfile
 from collections import Counter
 from collections.abc import Awaitable, Callable, Iterable, Mapping
+from contextvars import ContextVar, Token
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import CodeType, FrameType
@@ -43,6 +46,12 @@ SIMULATOR = "sim/"
 
 DISPATCHERS = ("drone/drone.py", "services/system.py")
 """They deliver the drone's events."""
+
+CHANGE = ("services/system.py", "_changed")
+"""It delivers a change of mode, armed state or health."""
+
+OBSERVER: ContextVar[str] = ContextVar("observer", default="")
+"""The observer that works: what it schedules on the event loop is its own, too."""
 
 COMPOSERS = ("system", "component")
 """Modules above the rooms of `services`."""
@@ -125,6 +134,8 @@ class Tracer:
         self.iterations: list[Iteration] = []
         self._stack: list[tuple[FrameType, str, str, bool, str]] = []
         """(frame, file within the package or "", nearest file of the package, part of the drone's side, observer)."""
+        self._observing: tuple[FrameType, Token[str]] | None = None
+        """The frame with which the present observer began."""
         self._seen: set[FrameType] = set()
         self._files: dict[CodeType, str] = {}
 
@@ -153,16 +164,21 @@ class Tracer:
         if event == "return":
             if self._stack and self._stack[-1][0] is frame:
                 self._stack.pop()
+                if self._observing is not None and self._observing[0] is frame:
+                    OBSERVER.reset(self._observing[1])
+                    self._observing = None
             return
         if event != "call":
             return
         code = frame.f_code
         file = self._file(code)
         _, _, caller, foreign, observer = self._stack[-1] if self._stack else (None, "", "", False, "")
+        observer = observer or OBSERVER.get()
         foreign = foreign or file.startswith(SIMULATOR) or _of_the_drone(frame, file)
         if file and not foreign and code.co_name not in ANONYMOUS:
             if not observer and caller in DISPATCHERS and self._delivers(file):
                 observer = f"{file}:{code.co_qualname if sys.version_info >= (3, 11) else code.co_name}"
+                self._observing = frame, OBSERVER.set(observer)
             if frame not in self._seen:
                 self._seen.add(frame)
                 self.iterations[-1].calls.append((file, code.co_name, caller, observer))
@@ -172,7 +188,9 @@ class Tracer:
         """True when the drone delivers an event, and not to a part of itself."""
         if file in DISPATCHERS or rank(room(file)) <= RANKS["drone"]:
             return False
-        return any(entry[1] == DISPATCHERS[0] for entry in self._stack)
+        caller = self._stack[-1][0].f_code.co_name
+        is_change = file.startswith("services/") and (self._stack[-1][1], caller) == CHANGE
+        return is_change or any(entry[1] == DISPATCHERS[0] for entry in self._stack)
 
 
 def _of_the_drone(frame: FrameType, file: str) -> bool:
@@ -233,11 +251,19 @@ async def quiet(w: Any) -> None:
 
 async def reposition(w: Any) -> Walk:
     """Walk 2: DO_REPOSITION until its acknowledgement."""
-    from support.fault_scenarios import goto
+    from pymavlink.dialects.v20 import ardupilotmega as dialect
+    from support.world import HOME
 
+    from anafi_mav import geo
+
+    command = (dialect.MAV_CMD_DO_REPOSITION, -1, 1, 0, math.nan)
+    north, east = geo.destination(*HOME[:2], 20.0, 0.0)  # the client's own work is no part of the walk
     await quiet(w)
-    iterations = await traced(lambda: goto(w, 20.0, 8.0))
-    return Walk([iteration.calls for iteration in iterations])
+
+    async def send() -> None:
+        assert (await w.client.command(*command, frame=6, x=north, y=east, z=8.0)).result == 0
+
+    return Walk([iteration.calls for iteration in await traced(send)])
 
 
 async def attitude(w: Any) -> Walk:

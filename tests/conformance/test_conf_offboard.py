@@ -36,7 +36,8 @@ from support.world import HOLD, HOME, World, world
 from anafi_mav import geo, mav_enums
 from anafi_mav.arsdk.messages import ardrone3, piloting_style
 from anafi_mav.sim.world.faults import Impairment
-from anafi_mav.vehicle.offboard.stream import GUIDED_TIMEOUT, LATE_AFTER_STREAM
+from anafi_mav.vehicle.base.aircraft import FlightSettings
+from anafi_mav.vehicle.offboard.stream import LATE_AFTER_STREAM
 
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 SET_MODE, GOTO = mav_enums.MAV_CMD_DO_SET_MODE, mav_enums.MAV_CMD_DO_REPOSITION
@@ -82,7 +83,7 @@ async def test_conf_105_silence_of_sticks(flavour: str, setpoint: Any) -> None:
 
     A velocity of ArduPilot's Guided lasts for GUID_TIMEOUT instead.
     """
-    limit = GUIDED_TIMEOUT if flavour == "ardupilot" and setpoint is STEERS else HOVER_WITHIN
+    limit = FlightSettings.guided_timeout if flavour == "ardupilot" and setpoint is STEERS else HOVER_WITHIN
     async with world(speed=1.0, flavour=flavour) as w:
         await w.take_off(8.0)
         async with streaming(w.client, setpoint) as sent:

@@ -5,18 +5,23 @@ from __future__ import annotations
 import asyncio
 import json
 import math
+import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import Any
 
+import pytest
 import zenoh
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support import missions
 from support.fabric import FabricStation, RouterProcess, StallingRelay, ground, router
 from support.ftp import Ftp
 from support.media import DAY, add_photo
+from support.params import write
+from support.process import gateway_process
 from support.setpoints import VELOCITY_ONLY, engage, local, streaming
-from support.world import HOME, World, world
+from support.world import HOME, World, loopback, world
 
 ACCEPTED, REJECTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_TEMPORARILY_REJECTED
 PARTITION = 5.0
@@ -108,3 +113,64 @@ async def test_killed_router_that_returns_brings_the_station_back() -> None:
         # The first heartbeats come before the first ping is answered.
         await w.client.heartbeat(lambda beat: True)
         assert (await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
+
+
+async def test_system_id_of_another_gateway_is_left_to_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    async with router() as node, world(endpoints=(node.url,)) as w, ground(node.url) as port:
+        station = w.take(await FabricStation().join(port))
+        file = tmp_path / "second.yaml"
+        file.write_text(
+            f"state: {tmp_path}/state\nendpoints: ['{node.url}']\nhttp: off\nvideo: off\n"
+            f"drones: [{{name: second, sysid: 1, address: {loopback()}}}]\n"
+        )
+        check = await asyncio.create_subprocess_exec(
+            sys.executable, "-m", "anafi_mav", "run", "--check", "-c", str(file), stdout=asyncio.subprocess.PIPE
+        )
+        output, _ = await check.communicate()
+        assert check.returncode == 1
+        assert "system 1 is held by gateway" in output.decode()
+        # The first goes on, and no sooner than it ends does the second hold the id.
+        monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))  # one gateway uses one state folder
+        async with world(endpoints=(node.url,)) as other:
+            await other.client.wait("STATUSTEXT", lambda m: m.text.startswith("System id 1: another"), since=0)
+            assert (await station.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
+            await w.gateway.close()
+            mark = station.mark()
+            await station.heartbeat(lambda beat: True, since=mark, timeout=10.0)
+            assert "1 station" in "".join(other.gateway.lines())
+
+
+async def test_killed_gateway_that_returns_is_found_by_its_stations(tmp_path: Path) -> None:
+    file = tmp_path / "fleet.yaml"
+    async with router() as node, ground(node.url) as port:
+        file.write_text(
+            f"state: {tmp_path}/state\nendpoints: ['{node.url}']\nhttp: off\nvideo: off\n"
+            "drones: [{name: alpha, sysid: 1, sim: {}}]\n"
+        )
+        station = FabricStation()
+        try:
+            async with gateway_process(file, 10.0) as gateway:
+                await station.join(port)
+                gateway.kill()
+                await gateway.wait()
+            await station.silence("HEARTBEAT", 2.0)
+            async with gateway_process(file, 10.0):
+                await station.heartbeat(lambda beat: True, timeout=20.0)
+                await station.heartbeat(lambda beat: True)  # a ping has been answered since the first
+                assert (await station.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
+        finally:
+            await station.close()
+
+
+async def test_station_whose_token_ends_is_lost_at_once() -> None:
+    async with router() as node, world(endpoints=(node.url,)) as w:
+        await write(w.client, "ANF_GCS_LOSS", 1, dialect.MAV_PARAM_TYPE_INT32)  # a hold, after 10 s of silence
+        async with ground(node.url) as port:
+            station = await FabricStation().join(port)
+            for _ in range(3):  # it sends one for each: the first are dropped until a ping has been answered
+                await station.heartbeat(lambda beat: True)
+            mark = w.client.mark()
+        await station.close()
+        text = await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("No ground station"), since=mark)
+        seconds = float(text.text.removeprefix("No ground station for ").partition(" s")[0])
+        assert seconds < 9.0

@@ -444,6 +444,8 @@ async def test_parameter_of_a_secondary_is_written_and_its_flight_begins() -> No
     async with world(options=[f"{ON}&secondaries=254"]) as w:
         teacher, student = await stations(w, OPTIONS_PORT, OPTIONS_PORT)
         assert await sent(teacher, control_request(teacher)) == ACCEPTED
+        (drone,) = w.gateway.status().drones
+        assert (drone.operator, drone.secondaries) == (TEACHER, (STUDENT,))
         assert await shown(teacher) == (MANAGER, TEACHER, [STUDENT])
         assert (await write(student, "ANF_RTH_ALT", 77.0)).param_value == 77.0
         assert await result(student, ARM, 1) == ACCEPTED

@@ -118,6 +118,7 @@ async def test_goto_ends_when_aircraft_is_given_to_the_pilot() -> None:
         await switch(w, PILOT, other)  # confirmed once the Skycontroller has both
         assert skycontroller(w).source is Source.SKY_CONTROLLER
         await shown(w.client, PILOT, mark)
+        await said(w.client, f"Goto ended: {REFUSED}", mark)
         for client in (w.client, other):
             await said(client, "Aircraft: pilot only")
         await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
@@ -252,6 +253,52 @@ async def test_drone_that_the_pilot_flies_receives_nothing_of_the_switch() -> No
         await switch(w, AUTOMATIC)
         await switch(w, PILOT)
         assert [e.name for e in heard(w, "Landing", "moveBy", "CancelMoveTo", "PCMD", since=began)] == []
+
+
+async def test_drone_found_flying_receives_nothing_of_the_switch() -> None:
+    """A move of before the connection may be under way, but the pilot flies: no zero move takes the source."""
+    async with world(speed=1.0, skycontroller=3) as w:
+        skycontroller(w).press(TAKEOFF_LAND)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 20.0)
+        w.drone.faults.mute = True
+        await asyncio.sleep(6.0)
+        mark, w.drone.faults.mute = w.client.mark(), False
+        await w.client.wait("ATTITUDE", since=mark, timeout=20.0)
+        began = now()
+        await switch(w, PILOT)
+        assert [e.name for e in heard(w, "moveBy", "CancelMoveTo", "PCMD", since=began)] == []
+        assert skycontroller(w).source is Source.SKY_CONTROLLER
+
+
+async def test_turn_ends_when_aircraft_is_given_to_the_pilot() -> None:
+    """It has no flight task of its own: the drone hovers in Hold while it turns."""
+    async with world(speed=1.0, skycontroller=3) as w:
+        await w.take_off(8.0)
+        w.client.send_command(dialect.MAV_CMD_CONDITION_YAW, 170.0, 10.0, 1.0, 1.0)
+        await w.drone.wait_log(lambda e: w.drone.pose.yaw > 0.5, 20.0)
+        await switch(w, PILOT)
+        yaw = w.drone.pose.yaw
+        await asyncio.sleep(3.0)
+        assert w.drone.pose.yaw == pytest.approx(yaw, abs=0.2)
+        assert skycontroller(w).source is Source.SKY_CONTROLLER
+
+
+async def test_goto_during_hand_over_to_pilot_is_refused() -> None:
+    """The switch is at Pilot from the request on, and shows it once it is confirmed."""
+    async with world(speed=1.0, skycontroller=3) as w:
+        await w.take_off(8.0)
+        assert await goto(w, 80.0, 8.0) == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 2.0, 20.0)
+        w.drone.faults.untold = frozenset({ardrone3.MoveToChanged.NAME})
+        began, mark = now(), w.client.mark()
+        send_set(w.client, SWITCH, PILOT, INT32)
+        await asyncio.sleep(0.5)
+        assert await goto(w, 60.0, 8.0) == REJECTED
+        await said(w.client, f"Goto refused: {REFUSED}", mark)
+        assert w.client.since(mark, "PARAM_VALUE") == [], "refused at once, without replacing the stop"
+        await asyncio.sleep(8.0)
+        assert heard(w, "moveTo", since=began) == []
+        assert skycontroller(w).source is Source.SKY_CONTROLLER
 
 
 async def test_end_of_the_connection_gives_the_aircraft_to_the_pilot() -> None:

@@ -82,6 +82,8 @@ def test_status_command_without_a_gateway_names_the_folder(tmp_path: Path) -> No
 def test_tables_of_the_status_show_what_was_refused() -> None:
     drones, clients, refused, peers = command.tables(STATUS)
     assert [row[2] for row in drones.rows] == ["in air, armed", "not connected"]
+    assert [row[9] for row in drones.rows] == ["255 (251, 253)", ""]
+    assert {len(row) for row in drones.rows} == {len(drones.head)}
     assert drones.rows[1][-1] == "no answer yet"
     assert clients.rows[0][3] == "2.5 kB/s"
     assert refused.rows[0][3:] == ("NAV_TAKEOFF", "DENIED", NASTY)  # the terminal cleans it

@@ -8,6 +8,7 @@ import socket
 import sys
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager, suppress
+from pathlib import Path
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -19,7 +20,7 @@ from support.mav import Client
 
 ROUTER = """
 import json, sys, zenoh
-config = zenoh.Config()
+config = zenoh.Config.from_file(sys.argv[2]) if sys.argv[2:] else zenoh.Config()
 for key, value in json.loads(sys.argv[1]).items():
     config.insert_json5(key, json.dumps(value))
 with zenoh.open(config):
@@ -40,8 +41,9 @@ def free_port() -> int:
 class RouterProcess:
     """A router that can be killed and started again at the same port."""
 
-    def __init__(self, port: int, settings: Mapping[str, Any], link: str) -> None:
+    def __init__(self, port: int, settings: Mapping[str, Any], link: str, file: Path | None) -> None:
         self.port = port
+        self._file = [] if file is None else [str(file)]
         self.url = f"zenoh://127.0.0.1:{port}"
         self._settings = {
             "mode": "router",
@@ -55,7 +57,7 @@ class RouterProcess:
     async def start(self) -> None:
         """Start it, and wait until it listens."""
         self._process = await asyncio.create_subprocess_exec(
-            sys.executable, "-c", ROUTER, json.dumps(self._settings),
+            sys.executable, "-c", ROUTER, json.dumps(self._settings), *self._file,
             stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
         )  # fmt: skip
         assert self._process.stdout is not None
@@ -69,9 +71,11 @@ class RouterProcess:
 
 
 @asynccontextmanager
-async def router(settings: Mapping[str, Any] | None = None, link: str = "tcp") -> AsyncIterator[RouterProcess]:
-    """A router for the length of a block."""
-    held = RouterProcess(free_port(), settings or {}, link)
+async def router(
+    settings: Mapping[str, Any] | None = None, link: str = "tcp", file: Path | None = None
+) -> AsyncIterator[RouterProcess]:
+    """A router for the length of a block. `settings` come after those of a configuration `file`."""
+    held = RouterProcess(free_port(), settings or {}, link, file)
     await held.start()
     try:
         yield held

@@ -146,7 +146,8 @@ class Codec(Protocol):
     def decode(self, data: bytes) -> Message | UnknownMessage | None: ...
 
 
-_CODECS: dict[MessageId, Codec] = {}
+_CODECS: dict[bytes, Codec] = {}
+"""By the four bytes of the header."""
 
 
 def command(
@@ -167,9 +168,10 @@ def _declare(
     direction: Direction, name: str, id: MessageId, buffer: Buffer
 ) -> Callable[[type[MessageT]], type[MessageT]]:
     def register(declared: type[MessageT]) -> type[MessageT]:
-        if id in _CODECS:
-            owner = next(iter(_CODECS[id].declared()), None)
-            raise LocalProtocolError(f"{name}: id {id} belongs to {owner.NAME if owner else _CODECS[id]} already")
+        known = _CODECS.get(HEADER.pack(*id))
+        if known is not None:
+            owner = next(iter(known.declared()), None)
+            raise LocalProtocolError(f"{name}: id {id} belongs to {owner.NAME if owner else known} already")
         declared.NAME, declared.ID, declared.BUFFER, declared.DIRECTION = name, id, buffer, direction
         carry(id, _Codec(declared))
         return declared
@@ -182,7 +184,7 @@ def carry(id: MessageId, codec: Codec) -> None:
 
     It is the codec of one message, or one that distinguishes the messages carried under this id.
     """
-    _CODECS[id] = codec
+    _CODECS[HEADER.pack(*id)] = codec
 
 
 def declared_messages() -> Iterator[type[Message]]:
@@ -301,7 +303,7 @@ def encode(message: Message | UnknownMessage) -> bytes:
     """
     if isinstance(message, UnknownMessage):
         return HEADER.pack(*message.id) + message.payload
-    return _CODECS[message.ID].encode(message)
+    return _CODECS[HEADER.pack(*message.ID)].encode(message)
 
 
 def decode(data: bytes) -> Message | UnknownMessage | None:
@@ -312,8 +314,7 @@ def decode(data: bytes) -> Message | UnknownMessage | None:
     """
     if len(data) < HEADER.size:
         return None
-    id: Any = HEADER.unpack_from(data)  # equal to its MessageId, which is worth making for what is unknown only
-    codec = _CODECS.get(id)
+    codec = _CODECS.get(data[: HEADER.size])
     if codec is None:
-        return UnknownMessage(MessageId(*id), bytes(data[HEADER.size :]))
+        return UnknownMessage(MessageId(*HEADER.unpack_from(data)), bytes(data[HEADER.size :]))
     return codec.decode(data)

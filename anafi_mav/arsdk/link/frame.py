@@ -121,11 +121,13 @@ def _decode_v2(version: int, data: bytes) -> tuple[list[Frame], str | None]:
             return frames, "version"
         if type not in _TYPES:
             return frames, "type"
-        size = decode_varint(data, position + _V2_FIXED.size)
-        if size is None:
-            return frames, "header"
-        start = size[1]
-        end = start + size[0]
+        size, start = data[position + _V2_FIXED.size], position + _V2_SMALLEST
+        if size >= 0x80:
+            length = decode_varint(data, position + _V2_FIXED.size)
+            if length is None:
+                return frames, "header"
+            size, start = length
+        end = start + size
         if end > len(data):
             return frames, "size"
         frames.append(Frame(type, id, seq, data[start:end]))

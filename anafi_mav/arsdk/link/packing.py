@@ -120,10 +120,14 @@ class Unpacker:
                 return commands, True
             commands.append(bytes(collected))
         while position < end:
-            read = self._length(payload, position)
-            if read is None:
-                return commands, False
-            size, position = read
+            size = payload[position]
+            if size < 0x80 and self._version == 3:  # nearly every command
+                position += 1
+            else:
+                read = self._length(payload, position)
+                if read is None:
+                    return commands, False
+                size, position = read
             if size < SMALLEST_COMMAND:
                 return commands, False
             if size > end - position:

@@ -29,6 +29,7 @@ from anafi_mav.arsdk.link.transport import (
     Transport,
     Undelivered,
 )
+from anafi_mav.receive_buffer import limit_reads
 
 log = logging.getLogger("anafi_mav.arsdk")
 raw_log = logging.getLogger("anafi_mav.raw")
@@ -168,6 +169,7 @@ class Session(asyncio.DatagramProtocol):
     # -- called by asyncio
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        limit_reads(transport)
         self._endpoint = cast(asyncio.DatagramTransport, transport)
 
     def connection_lost(self, exc: Exception | None) -> None:

@@ -246,8 +246,7 @@ class Transport:
                     continue
                 self._last_seq[id] = seq
                 commands, readable = self._unpacker.unpack(id, type == _WITHACK, payload)
-                for command in commands:
-                    self._command(command, events)
+                self._commands(commands, events)
                 if not readable:
                     self._garbage("payload", events)
             elif type == _ACK and id - ACK_OFFSET in self._queues:
@@ -265,13 +264,17 @@ class Transport:
             return (last - seq) & self._seq_mask <= self._seq_mask >> 1
         return -10 <= seq - last <= 0
 
-    def _command(self, data: bytes, events: list[Event]) -> None:
-        message = wire.decode(data)
-        if message is None:
-            self._garbage("command", events)
-        else:
-            self.counters["received"] += 1
-            events.append(ReceivedMessage(message))
+    def _commands(self, commands: list[bytes], events: list[Event]) -> None:
+        decode, received = wire.decode, 0
+        for data in commands:
+            message = decode(data)
+            if message is None:
+                self._garbage("command", events)
+            else:
+                received += 1
+                events.append(ReceivedMessage(message))
+        if received:
+            self.counters["received"] += received
 
     def _acknowledge(self, id: int, seq: int) -> None:
         self._ack_seq = (self._ack_seq + 1) & self._seq_mask

@@ -29,6 +29,9 @@ from anafi_mav.models import NO_MODEL, Model
 
 API = "/api/v1/upload"
 START_TIMEOUT = PLAN_MEMORY
+DOUBT_TIMEOUT = ANSWER_TIMEOUT
+"""s that a start is awaited after a start error that is attributed to an older one: it may be this one's, and the drone
+then reports nothing else."""
 
 _UID = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,127}")
 
@@ -218,6 +221,9 @@ class FlightPlan(Commanding[FlightPlanState]):
         def judge(message: Any) -> bool | AnafiMavError | None:
             if sent.phase is Phase.REFUSED:
                 return CommandRejected(self._why())
+            if sent.awaited and isinstance(message, common.StartingErrorEvent):
+                seconds = min(timeout, DOUBT_TIMEOUT)
+                sent.answer.expire_after(seconds, CommandTimeout(command.NAME, seconds))
             return True if sent.phase is Phase.CONFIRMED else None
 
         answers = (common.MavlinkFilePlayingStateChanged, common.StartingErrorEvent)

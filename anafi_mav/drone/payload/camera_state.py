@@ -243,9 +243,10 @@ class CamerasState(msgspec.Struct, frozen=True):
 
 
 def changed(state: CamerasState, id: int, **changes: Any) -> CamerasState:
-    """The state with these fields of one camera changed."""
-    camera = replace(state.cameras.get(id, CameraState()), **changes)
-    return replace(state, cameras=with_item(state.cameras, id, camera, 0))
+    """Return the state with these fields of one camera; the same state if none changes."""
+    known = state.cameras.get(id)
+    camera = replace(CameraState() if known is None else known, **changes)
+    return state if camera == known else replace(state, cameras=with_item(state.cameras, id, camera, 0))
 
 
 class CaptureProgress(enum.Enum):

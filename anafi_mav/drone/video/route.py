@@ -14,6 +14,7 @@ from anafi_mav.arsdk.mux.mux_link import MuxControllerSession
 from anafi_mav.arsdk.mux.mux_udp import UdpTunnel
 from anafi_mav.drone.video.rtsp_client import RtspClient
 from anafi_mav.errors import LinkLost
+from anafi_mav.receive_buffer import limit_reads
 
 log = logging.getLogger("anafi_mav")
 
@@ -86,6 +87,7 @@ class _Socket(asyncio.DatagramProtocol):
         self._sock = None
 
     def connection_made(self, transport: Any) -> None:
+        limit_reads(transport)
         self._transport = transport
 
     def datagram_received(self, data: bytes, address: tuple[Any, ...]) -> None:

@@ -33,38 +33,38 @@ def current_pose(drone: Drone) -> CameraPose:
     return CameraPose(place, drone.piloting.state.altitude, camera_angles(drone))
 
 
-def add_attitude(track: PoseTrack, drone: Drone, now: float) -> None:
+def add_attitude(track: PoseTrack, drone: Drone, message: events.Message, now: float) -> None:
     """Add the heading that an event has reported."""
     if (attitude := drone.piloting.state.attitude) is not None:
         track.events.headings.add(now, attitude.yaw)
 
 
-def add_gimbal(track: PoseTrack, drone: Drone, now: float) -> None:
+def add_gimbal(track: PoseTrack, drone: Drone, message: events.Message, now: float) -> None:
     """Add the attitude of the gimbal that an event has reported."""
     if (attitude := drone.gimbal[MAIN].attitude) is not None:
         roll, pitch = attitude.absolute.roll * RAD_PER_DEG, attitude.absolute.pitch * RAD_PER_DEG
         track.events.gimbals.add(now, roll, pitch, attitude.relative.yaw * RAD_PER_DEG)
 
 
-def add_velocity(track: PoseTrack, drone: Drone, now: float) -> None:
+def add_velocity(track: PoseTrack, drone: Drone, message: events.Message, now: float) -> None:
     """Add the velocity that an event has reported."""
     if (velocity := drone.piloting.state.velocity) is not None:
         track.events.velocities.add(now, velocity.north, velocity.east)
 
 
-def add_height(track: PoseTrack, drone: Drone, now: float) -> None:
+def add_height(track: PoseTrack, drone: Drone, message: events.Message, now: float) -> None:
     """Add the height that an event has reported."""
     if (height := drone.piloting.state.altitude) is not None:
         track.events.heights.add(now, height)
 
 
-def add_place(track: PoseTrack, drone: Drone, now: float) -> None:
+def add_place(track: PoseTrack, drone: Drone, message: events.Message, now: float) -> None:
     """Add the position that an event has reported."""
     if (location := drone.gps.state.location) is not None:
         track.events.places.add(now, location.latitude, location.longitude)
 
 
-Sampler = Callable[[PoseTrack, Drone, float], None]
+Sampler = Callable[[PoseTrack, Drone, events.Message, float], None]
 
 SAMPLERS: Mapping[type[events.Message], Sampler] = {
     events.AttitudeChanged: add_attitude,

@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 
 from anafi_mav import texts
+from anafi_mav.drone.element import StateWatch
 from anafi_mav.drone.payload.camera_enums import CameraMode
 from anafi_mav.drone.video.stream_choice import StreamKind
 from anafi_mav.mavlink import dialect
@@ -42,9 +43,11 @@ class CameraService(Service):
         self._sent_settings: tuple[CameraMode | None, float] | None = None
         """Mode and zoom of the last CAMERA_SETTINGS to all."""
         self._sent_flags: int | None = None
+        self._camera = StateWatch(host.drone.camera)
         host.definition.subscribe(self._send_information)
 
     def link_up(self) -> None:
+        self._camera.reset()
         self._sent_settings, self._sent_flags = self._settings(), camera_messages.flags(self.host.drone)
 
     # Messages.
@@ -88,6 +91,8 @@ class CameraService(Service):
 
     def tick(self, now: float) -> None:
         """Send what has changed, by a client or otherwise."""
+        if not self._camera.has_changed():
+            return
         mode, zoom = self._settings()
         if self._sent_settings is not None and mode is not None:
             last_mode, last_zoom = self._sent_settings

@@ -41,7 +41,7 @@ class CameraPose(msgspec.Struct, frozen=True):
 
 
 class SampleTrack:
-    """Values of one kind over time; angles (rad) are unwrapped."""
+    """Values of one kind over time; between two angles (rad) the shorter way is interpolated."""
 
     def __init__(self, *, angles: bool = False) -> None:
         self._angles = angles
@@ -49,12 +49,9 @@ class SampleTrack:
 
     def add(self, at: float, *values: float) -> None:
         """Add a sample; one that is not newer than the last, or not finite, is left out."""
-        if not all(map(math.isfinite, values)) or (self._samples and at <= self._samples[-1][0]):
-            return
-        if self._angles and self._samples:
-            last = self._samples[-1][1]
-            values = tuple(old + wrap_pi(new - old) for old, new in zip(last, values, strict=True))
-        self._samples.append((at, values))
+        samples = self._samples
+        if math.isfinite(sum(values)) and not (samples and at <= samples[-1][0]):
+            samples.append((at, values))
 
     def clear(self) -> None:
         """Forget all samples."""
@@ -83,7 +80,10 @@ class SampleTrack:
             after = sample
         if before is not None and after is not None and after[0] - before[0] <= 2.0 * FURTHEST:
             share = (at - before[0]) / (after[0] - before[0])
-            return tuple(one + share * (two - one) for one, two in zip(before[1], after[1], strict=True))
+            steps = [two - one for one, two in zip(before[1], after[1], strict=True)]
+            if self._angles:
+                steps = [wrap_pi(step) for step in steps]
+            return tuple(one + share * step for one, step in zip(before[1], steps, strict=True))
         nearest = min((s for s in (before, after) if s is not None), key=lambda s: abs(s[0] - at), default=None)
         return nearest[1] if nearest is not None and abs(nearest[0] - at) <= FURTHEST else None
 

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 
 from anafi_mav import texts
 from anafi_mav.drone import events
+from anafi_mav.drone.element import StateWatch
 from anafi_mav.drone.events import FormattingType, FsState, PhyState, StorageFeature
 from anafi_mav.drone.payload.camera import BEGUN, Camera
 from anafi_mav.drone.payload.storage import StorageState
@@ -74,8 +75,11 @@ class StorageService(Service):
         """A storage has been formatted, and nothing has been taken or recorded since."""
         self._problems: dict[int, Reason | None] = {}
         """Reason why nothing can be stored, as last reported in a text."""
+        self._reported = StateWatch(host.drone.storage, host.drone.camera)
+        """The camera says which storage it writes to."""
 
     def link_up(self) -> None:
+        self._reported.reset()
         self._ids, self._sent, self._problems = (), {}, {}
         self._note_storages()
         for id in self.host.drone.storage.state:
@@ -151,6 +155,8 @@ class StorageService(Service):
 
     def tick(self, now: float) -> None:
         """Send what has changed, and the reason why nothing can be stored."""
+        if not self._reported.has_changed():
+            return
         count = len(self._ids)
         self._note_storages()
         if len(self._ids) != count:

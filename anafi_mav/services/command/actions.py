@@ -10,7 +10,6 @@ from functools import partial
 
 from anafi_mav import texts
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.command.guided_service import guided_mode
 from anafi_mav.services.command_targets import height, place
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, ProgressPolicy, effect_of_mode
 from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST
@@ -80,7 +79,7 @@ async def reposition(vehicle: Vehicle, command: Command) -> None:
     heading = None if math.isnan(yaw) else yaw
     if heading == 0.0 and command.flavour.zero_is_unset:
         heading = None
-    mode = guided_mode(command.flavour)
+    mode = command.flavour.guided_mode
     if where is None and ato is None and heading is None:
         if speed > 0.0:
             raise Refused(texts.GOTO, texts.SPEED_ALONE, lasting=True)

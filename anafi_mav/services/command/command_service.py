@@ -7,6 +7,7 @@ Rules: conformance R5-R10, C2, MAVLink command.md.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 from collections.abc import Callable, Coroutine, Hashable, Mapping
 from dataclasses import replace
@@ -233,7 +234,8 @@ class CommandService(Service):
             progress.set_in(LATE_PROGRESS_AFTER if policy is ProgressPolicy.LATE else PROGRESS_AFTER)
         result, reason = dialect.MAV_RESULT_FAILED, ""
         try:
-            async with self.host.payload_history.turn(command.group):
+            in_order = command.group.in_order
+            async with self.host.payload_history.turn(command.group) if in_order else contextlib.nullcontext():
                 await self._actions[command.id].handler(command)
             result = dialect.MAV_RESULT_ACCEPTED
         except AnafiMavError as error:

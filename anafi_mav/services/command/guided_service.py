@@ -46,11 +46,6 @@ _ITEM_GOTO, _ITEM_ALTITUDE = 2, 3
 """`current` of a mission item that is a command (ArduPilot, MAVLink mission.md)."""
 
 
-def guided_mode(flavour: Flavour) -> FlightMode:
-    """Return the mode of a vehicle that a client of this flavour has sent to a place."""
-    return FlightMode.GUIDED if flavour.guided_setpoints else FlightMode.HOLD
-
-
 async def _fly_item(host: Host, inbound: Inbound) -> None:
     item, flavour = inbound.message, flavour_of(inbound.channel)
     scale = 1e7 if item.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT else 1.0
@@ -68,7 +63,7 @@ async def _fly_item(host: Host, inbound: Inbound) -> None:
             if vehicle.takeoff.rises:
                 vehicle.guided.check(where, ato)
                 await vehicle.takeoff.over(GOTO)
-            await vehicle.guided.reposition(where, ato, None, mode=guided_mode(flavour), by=by)
+            await vehicle.guided.reposition(where, ato, None, mode=flavour.guided_mode, by=by)
         else:
             await change_altitude(vehicle, ato, flavour, by)
         result = dialect.MAV_MISSION_ACCEPTED
@@ -89,7 +84,7 @@ async def change_altitude(vehicle: Vehicle, ato: float, flavour: Flavour, by: Ri
     """Go to a height (m above take-off): at the target of a move under way, else here."""
     goto = vehicle.guided.goto
     if goto is None:
-        await vehicle.guided.reposition(None, ato, None, mode=guided_mode(flavour), by=by)
+        await vehicle.guided.reposition(None, ato, None, mode=flavour.guided_mode, by=by)
     else:
         check_height(vehicle, ato)
         move = vehicle.drone.piloting.move
@@ -199,7 +194,7 @@ class GuidedService(Service):
             await vehicle.guided.go(goto.with_heading((now + turn) * units.RAD_PER_DEG), by=command.right)
         else:
             await vehicle.guided.turn(
-                turn * units.RAD_PER_DEG, rate if rate > 0.0 else None, guided_mode(command.flavour), command.right
+                turn * units.RAD_PER_DEG, rate if rate > 0.0 else None, command.flavour.guided_mode, command.right
             )
 
     async def _pause_or_continue(self, command: Command) -> None:
@@ -211,7 +206,7 @@ class GuidedService(Service):
         """
         vehicle = self.host.vehicle
         if command.params[0] == 0.0:
-            await vehicle.hold(guided_mode(command.flavour), command.right, pause=True)
+            await vehicle.hold(command.flavour.guided_mode, command.right, pause=True)
         elif command.params[0] == 1.0:
             task = vehicle.interrupted
             if isinstance(task, Goto):

@@ -114,10 +114,10 @@ class ModesService(Service):
 
     def _announce(self) -> None:
         """CURRENT_MODE once per change; the stream repeats it, rarely."""
-        vehicle, times = self.host.vehicle, self.host.times()
+        vehicle = self.host.vehicle
         state = vehicle.mode, vehicle.link_facts.intended
         if state != self._sent:
-            self._sent = state
+            self._sent, times = state, self.host.times()
             self.host.send_by_flavour(lambda flavour: current_mode(vehicle, times.for_flavour(flavour)))
 
     def tick(self, now: float) -> None:

@@ -393,7 +393,8 @@ class ParameterService(Service):
 
     def _own_values(self) -> bytes:
         """Bytes, so that NaN is equal to NaN."""
-        return struct.pack(f"<{len(self._own)}d", *(one.read(self.host) for one in self._own))
+        host = self.host
+        return struct.pack(f"<{len(self._own)}d", *[one.read(host) for one in self._own])
 
     async def _settle(self) -> None:
         """Store the gateway's own settings that have changed, then notify every client of them.

@@ -18,13 +18,14 @@ from anafi_mav.drone.events import ObstacleAvoidanceMode as AvoidanceMode
 from anafi_mav.services.parameter.parameter import Limits, Parameter, bounds, current, number, own
 from anafi_mav.services.parameter.parameter_codec import ParamType
 from anafi_mav.services.service import Host
+from anafi_mav.vehicle.base.aircraft import FlightSettings
 from anafi_mav.vehicle.base.bounds import LOWEST
 from anafi_mav.vehicle.base.move_heading import MoveHeading
 from anafi_mav.vehicle.base.requester import Source
 from anafi_mav.vehicle.flight_policy import BY_NUMBER, NUMBERS
 from anafi_mav.vehicle.joystick_override import Override
 from anafi_mav.vehicle.link_loss import LossAction
-from anafi_mav.vehicle.offboard.stream import GUIDED_TIMEOUT, LONGEST_TIMEOUT, SHORTEST_TIMEOUT
+from anafi_mav.vehicle.offboard.stream import LONGEST_TIMEOUT, SHORTEST_TIMEOUT
 from anafi_mav.vehicle.return_end import LONGEST_WAIT, SHORTEST_WAIT, EndOfReturn
 
 OFF_ON = {0: "Off", 1: "On"}
@@ -625,14 +626,14 @@ RETURN_WAIT = Parameter(
 
 
 def _put_guided_time(host: Host, value: float) -> None:
-    host.vehicle.offboard.guided_timeout = value
+    host.vehicle.settings = replace(host.vehicle.settings, guided_timeout=value)
 
 
 GUIDED_TIME = Parameter(
     "ANF_GUIDED_T",
     ParamType.REAL32,
     "Timeout of velocity setpoints in ArduPilot's Guided; a hover follows",
-    read=lambda host: host.vehicle.offboard.guided_timeout,
+    read=lambda host: host.vehicle.settings.guided_timeout,
     write=own(_put_guided_time),
     put=_put_guided_time,
     limits=lambda host: (SHORTEST_TIMEOUT, LONGEST_TIMEOUT),
@@ -643,7 +644,7 @@ GUIDED_TIME = Parameter(
     group=GATEWAY,
     long="Velocities and yaw rates only. Attitudes, accelerations and all setpoints of PX4's Offboard time out after "
     "0.5 s.",
-    default=GUIDED_TIMEOUT,
+    default=FlightSettings.guided_timeout,
     source="gateway",
 )
 

@@ -127,7 +127,11 @@ class FenceService(Service):
 
     def _look(self, now: float) -> None:
         self._looked = now
-        watch, before = self._watch, self._watch.state
+        vehicle, watch = self.host.vehicle, self._watch
+        is_told = self._told == (False, watch.breaches)
+        if is_told and watch.rests and (vehicle.on_ground or vehicle.flying_state is None):
+            return
+        before = watch.state
         blind, breaches = watch.blind, watch.breaches
         action = watch.look(self._sight(now), now)
         if watch.blind and not blind:

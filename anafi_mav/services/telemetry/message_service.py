@@ -219,7 +219,7 @@ class MessageService(Service):
     def _send_updated(self) -> None:
         ids, at = self._tracker.take()
         everyone = self.host.channels
-        if not self._sources.requests:
+        if not self._sources.is_used:
             due = self._intervals.due_on(everyone, ids, at)
         else:
             channels = self._sources.on_events(everyone, at)

@@ -23,7 +23,9 @@ class PoseSources(Generic[ChannelT]):
 
     def __init__(self) -> None:
         self.requests: WeakKeyDictionary[ChannelT, set[int]] = WeakKeyDictionary()
-        """The messages for which a channel wants pictures; while it is empty, events are the only source."""
+        """The messages for which a channel wants pictures."""
+        self.is_used = False
+        """False: no channel wants pictures, and events are the only source."""
         self._floors: WeakKeyDictionary[ChannelT, float] = WeakKeyDictionary()
         """Of each channel with pictures: the time (s) after which a picture is newer than its last event."""
         self._shots: WeakKeyDictionary[ChannelT, float] = WeakKeyDictionary()
@@ -34,7 +36,7 @@ class PoseSources(Generic[ChannelT]):
 
     def is_wanted(self, channels: Sequence[ChannelT]) -> bool:
         """Return True when one of these channels wants pictures."""
-        return bool(self.requests) and any(channel in self.requests for channel in channels)
+        return self.is_used and any(channel in self.requests for channel in channels)
 
     def request(self, channel: ChannelT, id: int, *, wanted: bool) -> None:
         """Note that a channel wants a message from pictures, or does not any longer."""
@@ -46,12 +48,15 @@ class PoseSources(Generic[ChannelT]):
             self.requests[channel] = ids
         else:
             del self.requests[channel]
-        self._split = None
+        self._changed()
 
     def close(self, channel: ChannelT) -> None:
         """The channel is closed."""
         self.requests.pop(channel, None)
-        self._split = None
+        self._changed()
+
+    def _changed(self) -> None:
+        self._split, self.is_used = None, bool(self.requests)
 
     def link_down(self) -> None:
         """The drone is disconnected: its pictures ended."""
@@ -89,11 +94,11 @@ class PoseSources(Generic[ChannelT]):
 
     def on_events(self, channels: Sequence[ChannelT], now: float) -> Sequence[ChannelT]:
         """Return the channels whose pose is made of events."""
-        return self._divide(channels, now)[1] if self.requests else channels
+        return self._divide(channels, now)[1] if self.is_used else channels
 
     def has_pictures(self, channel: ChannelT, channels: Sequence[ChannelT], now: float) -> bool:
         """Return True when the channel's pose is made of pictures."""
-        return bool(self.requests) and channel in self._divide(channels, now)[2]
+        return self.is_used and channel in self._divide(channels, now)[2]
 
     def _runs(self, now: float) -> bool:
         return now - self._arrived <= SILENCE

@@ -45,12 +45,17 @@ _ACTIVITIES: Mapping[FlyingState | None, OperatorText] = {
 
 @dataclass(frozen=True)
 class FlightSettings:
-    """Values that clients set for all take-offs, as parameters."""
+    """Values that clients set for all flights, as parameters."""
 
     takeoff_height: float = 2.5
     """m above take-off for a take-off that names no height (PX4's default of MIS_TAKEOFF_ALT)."""
     hand_launch: bool = False
     """Arming starts the motors and waits for the drone to be thrown (Parrot's UserTakeOff)."""
+    guided_timeout: float = 1.5
+    """s that a velocity of ArduPilot's Guided lasts.
+
+    dronekit's documents send one a second; ArduCopter's GUID_TIMEOUT is 3 s.
+    """
 
 
 class Aircraft(ABC):

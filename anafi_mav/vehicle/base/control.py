@@ -248,7 +248,7 @@ class Control:
             raise Refused(rules.what, texts.PILOT)
 
     def leaves_to_pilot(self, by: By) -> bool:
-        """True when a part of the gateway does not act: the Skycontroller's pilot flies, or can at once."""
+        """True when a part of the gateway does not act: the Skycontroller's pilot flies, or can."""
         controller = self._aircraft.drone.controller
         yields = isinstance(by, Source) and by.yields_to_pilot
         return yields and (controller.pilot_has_source or controller.pilot_acquired_control)

@@ -142,7 +142,10 @@ class Hover(PlainTask):
 
     @property
     def rules(self) -> TaskRules:
-        """A mode that is chosen is Guided: programs set it routinely, so it ends what clients commanded alone."""
+        """Rules of a stop; a chosen Guided ends only what clients commanded.
+
+        Programs choose it routinely.
+        """
         ends, what = Extent.ALL if self.client is None else Extent.COMMANDED, texts.Subject(self.mode.value)
         return TaskRules(what, wait=STOP_WAIT, is_hover=True, ends_landing=ends, ends_return=ends, is_flight=False)
 

@@ -216,6 +216,11 @@ class _Side:
         self._calm_since: float | None = None
         """Time since when nothing ahead was seen."""
 
+    @property
+    def rests(self) -> bool:
+        """True when nothing is left of an earlier breach or action."""
+        return self.state is State.INSIDE and self.orders is None and self.retry_at is None
+
     def see(self, event: Event | None, verdict: FenceFinding | None, now: float) -> State:
         """Take an observation, or None without one; return the state before."""
         before = self.state
@@ -301,6 +306,13 @@ class FenceWatch:
         """The worst state of zones, floor and ceiling."""
         states = {side.state for side in self._sides.values()}
         return next(state for state in (State.OUTSIDE, State.LEAVING, State.INSIDE) if state in states)
+
+    @property
+    def rests(self) -> bool:
+        """True when a look at a vehicle on the ground would change nothing."""
+        if self._acting is not None or self.verdict is not None or self.blind or self._above_floor:
+            return False
+        return all(side.rests for side in self._sides.values())
 
     @property
     def healthy(self) -> bool:

@@ -44,7 +44,7 @@ from anafi_mav.vehicle.offboard.goals import Goal, resolve
 from anafi_mav.vehicle.offboard.moves import OffboardMoves
 from anafi_mav.vehicle.offboard.setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint, Setpoint
 from anafi_mav.vehicle.offboard.steering import Steering
-from anafi_mav.vehicle.offboard.stream import COUNTS, GUIDED_TIMEOUT, STREAMS, Event, OffboardStream, State, lasts
+from anafi_mav.vehicle.offboard.stream import COUNTS, STREAMS, Event, OffboardStream, State, lasts
 from anafi_mav.vehicle.offboard.takeoff import Launcher, climbs
 
 WARN_AGAIN = 1.0
@@ -81,8 +81,6 @@ class OffboardFlight(PlainTask):
     """The setpoints of programs on one vehicle, and the drone flown by those of its pilot."""
 
     def __init__(self, vehicle: Aircraft, clock: Clock, takeoff: Launcher) -> None:
-        self.guided_timeout = GUIDED_TIMEOUT
-        """s that a velocity lasts in ArduPilot's Guided (a parameter)."""
         self.motion = MotionEstimate(vehicle.roll)
         """Motion of the drone; other flight tasks that fly by sticks use it too."""
         self.warn_throttled: Callable[[OperatorText], None] = lambda text: vehicle.text(Severity.WARNING, text)
@@ -161,7 +159,8 @@ class OffboardFlight(PlainTask):
         Returns None, or the reason for which the setpoint is not flown. One that waits for the end of a take-off, or
         for mode Offboard and asks for no motion, has none.
         """
-        now, timeout = self._clock.monotonic(), lasts(setpoint, self.guided_timeout if guided else None)
+        now = self._clock.monotonic()
+        timeout = lasts(setpoint, self._vehicle.settings.guided_timeout if guided else None)
         if (reason := self._objection(sender, setpoint)) is not None:
             return reason
         self._stream = stream = self._stream.receive(sender, setpoint, now, timeout)

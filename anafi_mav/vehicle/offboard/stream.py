@@ -29,12 +29,8 @@ from anafi_mav.vehicle.offboard.silence import SILENCE
 from anafi_mav.vehicle.offboard.steering import Steering
 from anafi_mav.vehicle.offboard.takeoff import CLIMB_FOR
 
-GUIDED_TIMEOUT = 1.5
-"""s that a velocity of ArduPilot's Guided lasts, unless a client sets another (dronekit's documents send one a
-second; ArduCopter's GUID_TIMEOUT is 3 s)."""
-
 SHORTEST_TIMEOUT, LONGEST_TIMEOUT = 0.5, 3.0
-"""s that it can be set to."""
+"""s that `FlightSettings.guided_timeout` can be set to."""
 
 TOLD_EARLY = 0.5 - SILENCE
 """s before the end of a timeout at which the drone is commanded to hover."""

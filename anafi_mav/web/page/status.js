@@ -70,7 +70,9 @@ async function showDrone(drone) {
     `GPS ${drone.gps_fix ? "fix" : "no fix"} (${number(drone.satellites, "")})`;
   parts.link.textContent = !drone.connected ? "" :
     `Radio ${number(drone.radio_quality, "/5")}, ${number(drone.radio_dbm, " dBm")}, ` +
-    `last heard ${number(drone.silence_s, " s", 1)} ago, connections ${drone.connections}, viewers ${drone.viewers}`;
+    `last heard ${number(drone.silence_s, " s", 1)} ago, connections ${drone.connections}, viewers ${drone.viewers}` +
+    (drone.operator ? `, operator system ${drone.operator}` : "") +
+    (drone.operator && drone.secondaries.length ? ` (secondaries ${drone.secondaries.join(", ")})` : "");
   parts.commands.textContent = `Commands p50 / p99: ${quantiles(drone.commands.latency)}`;
   parts.warnings.replaceChildren(...drone.warnings.map((text) => element("div", text)));
   held.button.hidden = !drone.stream;

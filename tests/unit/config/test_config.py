@@ -259,6 +259,8 @@ MISTAKES = {
     sim("address: localhost"): "drones[0].sim.address: expected an IPv4 address of this machine, like 127.0.42.1, got 'localhost'",
     # Things that must differ, or agree
     two("name: a, sysid: 7, sim: {}", "name: b, sysid: 7, sim: {}"): "drones[1].sysid: expected a sysid of its own, 7 is already at drones[0].sysid",
+    "sysids: 1-80\n" + two("name: a, sysid: 80, sim: {}", "name: b, sysid: 81, sim: {}"): "drones[1].sysid: expected one of sysids, 1-80, got 81",
+    "sysids: 80": "sysids: expected a range like 1-80, got 80",
     two("name: a, sysid: 1, sim: {}", "name: a, sysid: 2, sim: {}"): "drones[1].name: expected a name of its own, 'a' is already at drones[0].name",
     two("name: a, sysid: 1, address: h", "name: b, sysid: 2, address: h"): "drones[1].address: expected an address and discovery_port of its own, 'h:44445' is already at drones[0].address",
     two("name: a, sysid: 1, address: h, interface: w", "name: b, sysid: 2, address: h, interface: w"): "drones[1].address: expected an address and discovery_port of its own, 'h:44445 on w' is already at drones[0].address",

@@ -156,6 +156,19 @@ def test_take_off_replaces_a_hand_launch_without_stopping_it(sent: SentCommands)
     assert not sent.is_unwanted(hand, 0.2)
 
 
+@pytest.mark.parametrize(("after", "undone"), [(1.0, True), (TAKE_OFF_MEMORY, False)])
+def test_failed_take_off_undoes_the_hand_launch_that_it_replaced(
+    sent: SentCommands, after: float, undone: bool
+) -> None:
+    undo = ardrone3.UserTakeOff(0)
+    hand, newer = SentCommand(Slot.LAUNCH, TAKEN_OFF | {FlyingState.USERTAKEOFF}, undo, undo_refused=True), launch()
+    sent.place(hand, 0.0)
+    sent.place(newer, 0.1)
+    assert sent.withdraw(newer, 0.1 + after) == (undo if undone else None)
+    assert newer.phase is W
+    assert hand.phase is (W if undone else A)
+
+
 @pytest.mark.parametrize("withdrawn", [False, True])
 def test_take_off_against_landing_is_unwanted_from_touchdown_on(sent: SentCommands, withdrawn: bool) -> None:
     one = SentCommand(Slot.LANDING_END)

@@ -188,6 +188,17 @@ async def test_hand_launch(device: ScriptedDevice, drone: Drone) -> None:
     assert [m.state for m in device.got(ardrone3.UserTakeOff)] == [1, 0]
 
 
+async def test_hand_launch_replaced_by_a_failed_take_off_is_cancelled(device: ScriptedDevice, drone: Drone) -> None:
+    """The drone has received both: its motors must not start in a hand after both have failed."""
+    launching = asyncio.ensure_future(drone.piloting.hand_launch())
+    await device.until(ardrone3.UserTakeOff)
+    with pytest.raises(CommandTimeout):
+        await drone.piloting.take_off(timeout=0.3)
+    with pytest.raises(CommandRejected, match="replaced"):
+        await launching
+    assert (await device.until(ardrone3.UserTakeOff, 2)).state == 0
+
+
 async def test_timed_out_hand_launch_is_cancelled(device: ScriptedDevice, drone: Drone) -> None:
     with pytest.raises(CommandTimeout):
         await drone.piloting.hand_launch(timeout=0.3)

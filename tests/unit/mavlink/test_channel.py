@@ -56,6 +56,20 @@ def test_channels_count_for_themselves() -> None:
     assert sequence(other.read(), (1, 1)) == [0]
 
 
+def test_channels_at_one_number_share_a_frame() -> None:
+    one, other, third = Wire(), Wire(), Wire()
+    third.channel.send(ATTITUDE, 1, 1)
+    packed = pack(ATTITUDE)
+    for wire in (one, other, third, one):
+        wire.channel.send_packed(packed, 1, 1)
+    one.channel.send_packed(packed, 2, 1)
+    assert packed.framed(7, 1, 1) is packed.framed(7, 1, 1)
+    frames = one.read()
+    assert (sequence(frames, (1, 1)), sequence(frames, (2, 1))) == ([0, 1], [0])
+    assert sequence(other.read(), (1, 1)) == [0]
+    assert sequence(third.read(), (1, 1)) == [0, 1]
+
+
 def test_full_socket_queues_frames_and_answers_leave_first() -> None:
     wire = Wire()
     wire.channel.pause()

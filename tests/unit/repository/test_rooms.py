@@ -34,6 +34,7 @@ KIT = {
     "endpoint_options",
     "models",
     "printable",
+    "receive_buffer",
     "state_lock",
     "status_record",
     "subject",

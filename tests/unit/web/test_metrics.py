@@ -24,6 +24,8 @@ def test_metrics_have_the_values_of_the_record_in_base_units() -> None:
     assert value("drone_battery_ratio", drone="alpha", sysid="1") == 0.57
     assert value("drone_in_air", drone="alpha", sysid="1") == 1.0
     assert value("drone_connected", drone="bravo", sysid="2") == 0.0
+    assert value("drone_operator", drone="alpha", sysid="1") == 255.0
+    assert value("drone_operator", drone="bravo", sysid="2") == 0.0
     assert value("command_seconds", drone="alpha", sysid="1", quantile="0.99") == 0.25
     assert value("loop_delay_seconds", quantile="0.5") == 0.0002
     assert value("commands_total", drone="alpha", sysid="1", result="DENIED") == 1.0

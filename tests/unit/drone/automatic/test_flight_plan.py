@@ -15,6 +15,7 @@ from anafi_mav.arsdk.messages import common
 from anafi_mav.arsdk.messages import flight_plan as modern
 from anafi_mav.arsdk.messages.common import FlightPlanComponent, MavlinkType, PlayingState
 from anafi_mav.drone import Drone
+from anafi_mav.drone.automatic.flight_plan import DOUBT_TIMEOUT
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
 
 V2 = V1.replace(b"\t3\t93\t2.0\t0.0\t0.0\t0.0\t0.0\t0.0\t0.0", b"\t2\t93\t2.0\t-1\t-1\t-1\tnan\tnan\tnan").replace(
@@ -177,6 +178,24 @@ async def test_late_error_of_a_withdrawn_start_leaves_the_newer(device: Scripted
     device.say(common.StartingErrorEvent())
     device.say(common.MavlinkFilePlayingStateChanged(PlayingState.PLAYING, "abc", MavlinkType.FLIGHT_PLAN))
     await newer
+    await drone.close()
+
+
+async def test_start_error_that_may_be_the_newer_starts_ends_its_wait_early(device: ScriptedDevice) -> None:
+    """The drone never answered the older start, so the error is attributed to that one; the newer one is stopped."""
+    drone = device.drone()
+    await drone.connect()
+    with pytest.raises(CommandTimeout):
+        await drone.flight_plan.start("abc", timeout=0.5)
+    await device.until(common.Stop)
+    newer = asyncio.ensure_future(drone.flight_plan.start("def"))
+    await device.until(common.Start, 2)
+    began = asyncio.get_running_loop().time()
+    device.say(common.StartingErrorEvent())
+    with pytest.raises(CommandTimeout):
+        await newer
+    assert asyncio.get_running_loop().time() - began == pytest.approx(DOUBT_TIMEOUT, abs=0.5)
+    await device.until(common.Stop, 2)
     await drone.close()
 
 

@@ -372,6 +372,25 @@ def test_every_state_can_be_left_and_reached() -> None:
     assert {to for row in TRANSITIONS.values() for to in row.values()} == set(State)
 
 
+def test_fence_rests_on_the_ground_only_when_nothing_is_left_of_a_breach() -> None:
+    landed = sight(0.0, airborne=False, flying=False)
+    watch = watching(Reaction.HOLD)
+    watch.floor = 5.0
+    assert watch.rests
+    watch.look(sight(0.0), 0.0)
+    assert not watch.rests  # the floor counts from now on
+    watch.look(landed, 1.0)
+    assert watch.rests
+    assert watch.look(sight(120.0, ato=1.0), 2.0) is Reaction.HOLD
+    assert not watch.rests  # the action is under way
+    watch.done(2)
+    for now in (3.0, 3.0 + CALM / 2.0):
+        watch.look(landed, now)
+        assert not watch.rests  # not calm for long enough
+    watch.look(landed, 3.0 + CALM)
+    assert watch.rests
+
+
 @pytest.mark.parametrize("action", Reaction)
 def test_a_breach_is_acted_upon_once(action: Reaction) -> None:
     watch = watching(action)
