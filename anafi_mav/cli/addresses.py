@@ -1,6 +1,7 @@
 """Finds loopback addresses for simulated drones.
 
-Each drone has an address of its own, with the ports of the aircraft.
+Each drone has an address of its own, with the ports of the aircraft. Where the loopback network is one address (macOS),
+the first drone has its usual ports, and each further one free ports.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import ipaddress
+import os
 import socket
 from collections.abc import Collection
 from typing import NamedTuple
@@ -22,20 +24,18 @@ RTSP_PORT, RTSP_PORT_FOR_USERS = 554, 8554
 
 
 class Ports(NamedTuple):
-    """Ports of the two servers of a simulated drone.
+    """Ports of a simulated drone: discovery, and the two servers."""
 
-    In a request, None means the aircraft's port or its substitute.
-    """
-
+    discovery: int
     http: int
     rtsp: int
 
 
-CANDIDATES = [f"127.0.42.{host}" for host in range(1, 255)] + ["127.0.0.1"]
-"""Addresses for simulated drones.
+SHARED = "127.0.0.1"
+"""The one loopback address of every system, on which drones can differ by their ports."""
 
-The last is for systems whose loopback is that one address (macOS).
-"""
+CANDIDATES = [f"127.0.42.{host}" for host in range(1, 255)] + [SHARED]
+"""Addresses for simulated drones that have one of their own."""
 
 
 def spot(text: str) -> dict[str, str]:
@@ -62,7 +62,7 @@ class Reservations(contextlib.ExitStack):
         rtsp_port: int | None,
         avoid: Collection[str | None] = (),
     ) -> tuple[str, Ports]:
-        """The first address whose ports are free, and the ports of its servers.
+        """Return the first address whose usual ports are free, else `SHARED`; and the ports there.
 
         Raises `ConfigError`.
         """
@@ -74,10 +74,24 @@ class Reservations(contextlib.ExitStack):
             except OSError as error:
                 if error.errno not in (errno.EADDRINUSE, errno.EADDRNOTAVAIL):
                     raise ConfigError(key_path, f"cannot open ports on {address}: {error.strerror}") from error
-        raise ConfigError(key_path, f"expected free ports on one of {CANDIDATES[0]} to {CANDIDATES[-2]}, found none")
+        try:
+            return SHARED, self._take_free(http_port, rtsp_port)
+        except OSError as error:
+            raise ConfigError(key_path, f"expected free ports on {SHARED}: {error.strerror}") from error
+
+    def _take_free(self, http_port: int | None, rtsp_port: int | None) -> Ports:
+        """Choose free ports on `SHARED` and mark them as ours. Raises OSError if a wanted port is taken."""
+        with contextlib.ExitStack() as probes:
+            found = [
+                probes.enter_context(_bound(socket.SOCK_STREAM, SHARED, port or 0)).getsockname()[1]
+                for port in (None, http_port, rtsp_port)
+            ]
+        ports = Ports(*found)
+        self.enter_context(_bound(socket.SOCK_DGRAM, SHARED, ports.discovery))
+        return ports
 
     def take(self, address: str, discovery_port: int, http_port: int | None, rtsp_port: int | None) -> Ports:
-        """Mark `address` as ours; returns the ports of its servers.
+        """Mark `address` as ours; returns its ports.
 
         Raises OSError if a port is not free.
         """
@@ -87,6 +101,7 @@ class Reservations(contextlib.ExitStack):
                 for port in (discovery_port, HANDSHAKE_PORT):
                     _bound(socket.SOCK_STREAM, address, port).close()
                 found = Ports(
+                    discovery_port,
                     _server_port(address, http_port, HTTP_PORT, HTTP_PORT_FOR_USERS),
                     _server_port(address, rtsp_port, RTSP_PORT, RTSP_PORT_FOR_USERS),
                 )
@@ -128,7 +143,8 @@ def _bound(kind: socket.SocketKind, address: str, port: int) -> socket.socket:
     """
     bound = socket.socket(socket.AF_INET, kind)
     try:
-        if kind is socket.SOCK_STREAM:  # as asyncio's servers do it: a port is free while old connections fade
+        # As asyncio's servers do it: a port is free while old connections fade. On Windows it would be free always.
+        if kind is socket.SOCK_STREAM and os.name == "posix":
             bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         bound.bind((str(ipaddress.IPv4Address(address)), port))
         if kind is socket.SOCK_STREAM:  # with SO_REUSEADDR two may bind on Linux as long as none listens

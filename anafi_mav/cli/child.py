@@ -6,6 +6,7 @@ import asyncio
 import collections
 import contextlib
 import json
+import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -55,6 +56,7 @@ class SimulatorProcess:
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.PIPE,
             start_new_session=True,  # Ctrl-C is for us: a drone in the air must not lose its simulator by it
+            creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),  # the same on Windows
         )
         assert process.stdin is not None
         with contextlib.suppress(ConnectionError):  # it has ended already: its status is looked at below

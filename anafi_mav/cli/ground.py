@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import signal
 
 from anafi_mav.cli import interrupts, log
 from anafi_mav.cli.terminal import complain, say
@@ -53,7 +52,7 @@ def _parsed(option: str, text: str) -> EndpointUrl:
 async def _serve(fabric: EndpointUrl, stations: list[EndpointUrl]) -> None:
     ground = FabricGround(fabric, stations, SystemClock(), on_systems=_say_systems)
     stop = asyncio.Event()
-    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, stop.set)
+    interrupts.listen(lambda number: stop.set(), "SIGTERM")
     await ground.start()
     try:
         for line in ground.lines():

@@ -7,8 +7,10 @@ something to put away: it gets a KeyboardInterrupt, or its coroutine is cancelle
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import functools
 import signal
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
 ResultT = TypeVar("ResultT")
@@ -18,6 +20,25 @@ def raise_on_interrupt() -> None:
     """Let SIGINT raise KeyboardInterrupt from now on, unless it is ignored."""
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def listen(callback: Callable[[signal.Signals], object], *names: str) -> None:
+    """Call `callback` in the event loop with each signal of these names."""
+    loop = asyncio.get_running_loop()
+    for name in names:
+        number = signal.Signals[name]
+        try:
+            loop.add_signal_handler(number, callback, number)
+        except NotImplementedError:  # Windows
+            signal.signal(number, functools.partial(_forward, loop, callback))
+
+
+def _forward(
+    loop: asyncio.AbstractEventLoop, callback: Callable[[signal.Signals], object], number: int, frame: object
+) -> None:
+    """Pass a signal from Python's handler to the event loop, unless that has ended."""
+    with contextlib.suppress(RuntimeError):
+        loop.call_soon_threadsafe(callback, signal.Signals(number))
 
 
 def run(work: Coroutine[Any, Any, ResultT]) -> ResultT:
@@ -31,16 +52,13 @@ def run(work: Coroutine[Any, Any, ResultT]) -> ResultT:
         task = asyncio.current_task()
         assert task is not None
 
-        def interrupt() -> None:
+        def interrupt(_: signal.Signals) -> None:
             nonlocal interrupted
             interrupted = True
             task.cancel()
 
         if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-            try:
-                asyncio.get_running_loop().add_signal_handler(signal.SIGINT, interrupt)
-            except NotImplementedError:  # Windows
-                raise_on_interrupt()
+            listen(interrupt, "SIGINT")
         return await work
 
     try:

@@ -8,14 +8,15 @@ import contextlib
 import logging
 import os
 import signal
+from collections import Counter
 from collections.abc import Callable, Coroutine, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from anafi_mav.cli import heap, log, options, run_check
-from anafi_mav.cli.addresses import Ports, Reservations, spot
+from anafi_mav.cli import heap, interrupts, log, options, run_check
+from anafi_mav.cli.addresses import SHARED, Ports, Reservations, spot
 from anafi_mav.cli.child import SimulatorProcess
 from anafi_mav.cli.scenarios import load as load_scenario
 from anafi_mav.cli.service_manager import ServiceManager
@@ -28,6 +29,7 @@ from anafi_mav.mavlink.key_ring import folder_of, has_key
 from anafi_mav.relay.uri_host import is_loopback
 from anafi_mav.services.flavours import FLAVOURS
 from anafi_mav.sim.world import quirks
+from anafi_mav.sim.world.model import MODELS
 from anafi_mav.state_lock import read_holder, state_folder
 
 READY_LIMIT = 15.0
@@ -167,11 +169,10 @@ class _Interrupts:
         self._told = False
 
     def install(self) -> None:
-        loop = asyncio.get_running_loop()
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            if number == signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN:
-                continue  # nohup
-            loop.add_signal_handler(number, self.receive, number)
+        interrupts.listen(self.receive, "SIGINT", "SIGTERM")
+        hang_up = getattr(signal, "SIGHUP", None)  # Windows has none
+        if hang_up is not None and signal.getsignal(hang_up) is not signal.SIG_IGN:  # nohup
+            interrupts.listen(self.receive, "SIGHUP")
 
     def unsaid(self) -> list[str]:
         """Return what drones in the air do after the gateway ends, unless already shown.
@@ -193,8 +194,8 @@ class _Interrupts:
 
 async def _run(config: Config, sim_log: Path | None) -> list[str]:
     """Run the gateway; return what was wrong with its state folder at the end."""
-    interrupts = _Interrupts()
-    interrupts.install()
+    signals = _Interrupts()
+    signals.install()
     folder = state_folder(config.state)
     holder = read_holder(folder)
     if folder is not None and holder is not None:  # before its simulated drones are found in the way
@@ -203,16 +204,16 @@ async def _run(config: Config, sim_log: Path | None) -> list[str]:
         manager = stack.enter_context(ServiceManager(os.environ))  # signs of life go on while the gateway closes
         gateway_config, fleet = place(config, stack.enter_context(Reservations()))
         gateway = Gateway(gateway_config)
-        if not await _unless(interrupts.stop, _start(gateway, fleet, sim_log, stack)):
+        if not await _unless(signals.stop, _start(gateway, fleet, sim_log, stack)):
             return []
-        interrupts.flying = gateway.drones_in_air
+        signals.flying = gateway.drones_in_air
         for line in gateway.lines():
             say(line)
         say("ready, Ctrl-C ends", "green")
         manager.ready(f"{len(gateway.systems)} drones")
-        await interrupts.stop.wait()
+        await signals.stop.wait()
         manager.stopping()
-        for sentence in interrupts.unsaid():
+        for sentence in signals.unsaid():
             say(sentence, "yellow")
         return gateway.state_problems()
 
@@ -294,7 +295,11 @@ def place(config: Config, reservations: Reservations) -> tuple[Config, dict[str,
     drones = tuple(
         _placed(drone, *places[index]) if index in places else drone for index, drone in enumerate(config.drones)
     )
+    shared = {address for address, count in Counter(address for address, _ in places.values()).items() if count > 1}
     for index, sim in simulated.items():
+        if sim.scenario is not None and places[index][0] in shared:
+            problem = f"expected none: the drone shares {SHARED} with others, and a scenario is for an address"
+            raise ConfigError(f"drones[{index}].sim.scenario", problem)
         quirks.named(sim.firmware_quirks, f"drones[{index}].sim.firmware_quirks")
     first = next(iter(simulated.values()))
     fleet = {
@@ -308,17 +313,26 @@ def place(config: Config, reservations: Reservations) -> tuple[Config, dict[str,
 
 def _placed(drone: DroneConfig, address: str, ports: Ports) -> DroneConfig:
     """A simulated drone as the gateway sees it: one like any other."""
-    return msgspec.structs.replace(drone, address=address, http_port=ports.http, rtsp_port=ports.rtsp, sim=None)
+    return msgspec.structs.replace(
+        drone, address=address, discovery_port=ports.discovery, http_port=ports.http, rtsp_port=ports.rtsp, sim=None
+    )
 
 
 def _entry(drone: DroneConfig, sim: SimConfig, address: str, ports: Ports) -> dict[str, Any]:
-    """A drone as `anafi-mav sim --fleet` reads it."""
+    """A drone as `anafi-mav sim --fleet` reads it.
+
+    One with ports of its own has any free ports for its datagrams, and a serial number of its system id: that of its
+    address would be another drone's too.
+    """
+    own_ports = ports.discovery != drone.discovery_port
+    free = {"handshake_port": 0, "c2d_port": 0, "serial": f"{MODELS[sim.model].serial_prefix}{drone.sysid:06d}"}
     return {
+        **(free if own_ports else {}),
         "name": drone.name,
         "model": sim.model,
         "address": address,
         "home": sim.home,
-        "discovery_port": drone.discovery_port,
+        "discovery_port": ports.discovery,
         "http_port": ports.http,
         "rtsp_port": ports.rtsp,
         "versions": (1, sim.protocol),

@@ -7,14 +7,15 @@ import asyncio
 import contextlib
 import ipaddress
 import os
-import signal
+import stat
 import sys
+import threading
 from dataclasses import fields, replace
 from pathlib import Path
 
 import msgspec
 
-from anafi_mav.cli import heap, log, options, sim_validate
+from anafi_mav.cli import heap, interrupts, log, options, sim_validate
 from anafi_mav.cli.options import integer, number
 from anafi_mav.cli.scenarios import load as load_scenario
 from anafi_mav.cli.terminal import say
@@ -196,9 +197,7 @@ async def _run(fleet: Fleet, log: Path | None, stdin_watch: bool) -> None:
     scenarios = _scenarios(fleet)
     heap.settle()
     stop = asyncio.Event()
-    loop = asyncio.get_running_loop()
-    for signum in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(signum, stop.set)
+    interrupts.listen(lambda number: stop.set(), "SIGINT", "SIGTERM")
     if stdin_watch:
         _watch_stdin(stop)
     try:
@@ -233,18 +232,20 @@ def _line(drone: SimulatedDrone) -> str:
 
 
 def _watch_stdin(stop: asyncio.Event) -> None:
-    """Set `stop` when stdin ends, so that a parent that dies leaves no simulator behind."""
+    """Set `stop` when stdin ends, so that a parent that dies leaves no simulator behind.
+
+    A thread reads it: not every system's event loop can wait for a pipe.
+    """
     loop = asyncio.get_running_loop()
     stdin = sys.stdin.fileno()
+    mode = os.fstat(stdin).st_mode
+    if not (stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode) or os.isatty(stdin)):
+        raise ConfigError("--stdin-watch", "expected stdin to be a pipe or a terminal")  # a file has no end to wait for
 
-    def readable() -> None:
-        with contextlib.suppress(BlockingIOError):
-            if not os.read(stdin, 4096):
-                loop.remove_reader(stdin)
-                stop.set()
+    def read() -> None:
+        with contextlib.suppress(OSError, RuntimeError):  # RuntimeError: the loop has ended before
+            while os.read(stdin, 4096):
+                pass
+            loop.call_soon_threadsafe(stop.set)
 
-    try:
-        loop.add_reader(stdin, readable)
-    except PermissionError:
-        # A regular file or the like, which epoll does not take: it has no end to wait for.
-        raise ConfigError("--stdin-watch", "expected stdin to be a pipe or a terminal") from None
+    threading.Thread(target=read, name="stdin", daemon=True).start()

@@ -156,7 +156,7 @@ with Reservations() as reservations:
         *(sys.executable, "-c", script, loopback(), loopback()), stdout=asyncio.subprocess.PIPE
     )
     out, _ = await asyncio.wait_for(process.communicate(), 30.0)
-    assert out.decode().splitlines() == ["8080 8554", "8081 8555"]
+    assert out.decode().splitlines() == ["44445 8080 8554", "44445 8081 8555"]
 
 
 def test_run_without_configuration_flies_the_default_fleet() -> None:
