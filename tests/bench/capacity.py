@@ -13,8 +13,8 @@ alone, requests RANGEFINDER of each. The delay is from the moment before the gen
 has the datagram: two processes on a busy core are in it. `--web`: with aiortc of the extra `web`, which takes 33 MiB,
 where it is installed; otherwise the gateway runs as if it were not.
 
-A row is void when the generator sent less than 99 % of its rates, which are those of its first row times the drones,
-or when a socket lost datagrams. Exit status 1 then.
+A row is void when drones are not connected in time, when the generator sent less than 99 % of its rates, which are
+those of its first row times the drones, or when a socket lost datagrams. Exit status 1 then.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from common import loopback, machine, product, quantile, usage
+from common import consecutive, loopback, machine, product, quantile, usage
 from pymavlink import mavutil
 
 SCRIPT = str(Path(__file__).resolve())
@@ -54,8 +54,11 @@ LEAST_PROBES = 0.9
 PROBES = 20.0
 """Events of drone 1 per second whose delay is measured."""
 
+CONNECT_LIMIT = 60.0
+"""s in which all drones have to be connected."""
+
 SETTLE = 6.0
-"""s after the start: beyond the connections' own work."""
+"""s after that: beyond the connections' own work."""
 
 FIRST_HEIGHT = 1000.0
 """m: heights that no drone on the ground reports by itself; each event's is 0.25 m above the one before."""
@@ -98,8 +101,7 @@ class Row:
     def __init__(self, drones: int, frames: str, options: argparse.Namespace) -> None:
         self.drones, self.frames = drones, frames
         first, stations = loopback(), loopback()
-        head, _, last = first.rpartition(".")
-        addresses = [f"{head}.{int(last) + number}" for number in range(drones)]
+        addresses = consecutive(first, drones)
         ports = [CLIENT + 1 + number for number in range(ENDPOINTS)]
         config = {
             "endpoints": [f"udpout://{stations}:{port}?frames={frames}" for port in ports]
@@ -125,6 +127,7 @@ class Row:
                 product("run", "-c", str(file), program=program) as gateway,
                 _core(-1),
             ):
+                self.missing = connected(web)
                 time.sleep(SETTLE)
                 client.request()
                 before, counted, sent = status(web), ask(receiver), ask(generator)
@@ -155,6 +158,8 @@ class Row:
 
     def problem(self, reference: float) -> str:
         """Why the row is void; empty: it is not. `reference`: events of a drone per second."""
+        if self.missing:
+            return f"void: {self.missing} drones were not connected within {CONNECT_LIMIT:g} s"
         reached = self.events / (reference * self.drones)
         if reached < LEAST:
             return f"void: the generator reached {reached:.1%} of its rates"
@@ -234,6 +239,16 @@ def status(url: str) -> dict[str, Any]:
     return record
 
 
+def connected(url: str) -> int:
+    """Wait until all drones are connected; return how many are not in time."""
+    end = time.monotonic() + CONNECT_LIMIT
+    while True:
+        missing = sum(not drone["connected"] for drone in status(url)["drones"])
+        if not missing or time.monotonic() > end:
+            return missing
+        time.sleep(1.0)
+
+
 def _frames(record: dict[str, Any], counter: str) -> int:
     """A counter of the three endpoints whose datagrams are counted."""
     clients = [client for endpoint in record["endpoints"][:ENDPOINTS] for client in endpoint["clients"]]
@@ -284,9 +299,10 @@ async def generate(first: str, count: int, rate: float) -> None:
     from anafi_mav.cli import heap
     from anafi_mav.sim import DroneSpec, Simulator
 
-    head, _, last = first.rpartition(".")
-    addresses = [f"{head}.{int(last) + number}" for number in range(count)]
-    specs = [DroneSpec(address=each, http_port=None, rtsp_port=None, telemetry_rate=rate) for each in addresses]
+    specs = [
+        DroneSpec(address=address, http_port=None, rtsp_port=None, telemetry_rate=rate)
+        for address in consecutive(first, count)
+    ]
     heap.settle()
     chance = random.Random(1)
     height = FIRST_HEIGHT

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import ipaddress
 import os
 import platform
 import random
@@ -41,6 +42,11 @@ def machine() -> str:
 def loopback() -> str:
     """A loopback address that nobody is likely to use."""
     return f"127.{random.randint(64, 126)}.{random.randint(1, 250)}.{random.randint(1, 100)}"
+
+
+def consecutive(first: str, count: int) -> list[str]:
+    """Addresses from `first` on."""
+    return [str(ipaddress.IPv4Address(first) + number) for number in range(count)]
 
 
 @contextmanager

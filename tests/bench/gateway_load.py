@@ -24,7 +24,7 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from common import frames_option, loopback, machine
+from common import consecutive, frames_option, loopback, machine
 
 from anafi_mav.arsdk.link import watchdog
 from anafi_mav.arsdk.link.frame import FrameType, decode_frames, encode_frame
@@ -125,8 +125,7 @@ class Replay:
 async def measure(loop: _Loop, drones: int, endpoints: int, rounds: int, query: str, profiled: bool) -> None:
     """Print the figure."""
     first = loopback()
-    head, _, last = first.rpartition(".")
-    addresses = [f"{head}.{int(last) + number}" for number in range(drones)]
+    addresses = consecutive(first, drones)
     specs = [DroneSpec(address=address, http_port=None, rtsp_port=None, telemetry_rate=RATE) for address in addresses]
     simulator = Simulator(specs, seed=1, remember=False)
     sinks = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(endpoints)]
