@@ -23,14 +23,14 @@ from anafi_mav.drone.payload.media_file import Resource
 from anafi_mav.errors import AnafiMavError, CommandRejected
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.camera.camera_pose import SAMPLERS, add_frame
+from anafi_mav.services.camera.camera_pose import SAMPLERS, Sampler, add_frame
 from anafi_mav.services.camera.photo_log import KEY, CapturedImage, PhotoLog, renumbered
 from anafi_mav.services.camera.pose_track import CameraPose, PoseTrack
 from anafi_mav.services.camera.shot_tracker import CapturedShot, ShotTracker, named
 from anafi_mav.services.commands import Command
 from anafi_mav.services.service import Answer, Host
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import EventHandler, Subscriptions
 
 logger = logging.getLogger(__name__)
 
@@ -105,7 +105,11 @@ class PhotoReporter:
 
     def subscriptions(self) -> Subscriptions:
         """Return the handlers of the events that change the camera's pose."""
-        return {kind: partial(sampler, self._track, self.host.drone) for kind, sampler in SAMPLERS.items()}
+        return {kind: self._sampling(sampler) for kind, sampler in SAMPLERS.items()}
+
+    def _sampling(self, sampler: Sampler) -> EventHandler:
+        track, drone = self._track, self.host.drone
+        return lambda message, now: sampler(track, drone, message, now)
 
     def receive(self, update: CaptureUpdate, now: float) -> None:
         """Handle an event about a photo of the active camera."""

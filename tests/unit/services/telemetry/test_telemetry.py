@@ -140,6 +140,7 @@ async def test_default_intervals_are_those_of_the_rows() -> None:
         "GIMBAL_MANAGER_STATUS": 1.0,
         "RC_CHANNELS": 1.0,
         "RADIO_STATUS": 1.0,
+        "CONTROL_STATUS": 1.0,
         "SYSTEM_TIME": 1.0,
         "EKF_STATUS_REPORT": 1.0,
         "CURRENT_EVENT_SEQUENCE": 1.0,
