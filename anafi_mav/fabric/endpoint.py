@@ -86,7 +86,6 @@ class _Station:
     lane: _Lane
     input: StationInput
     pinged: float = 0.0
-    has_answered: bool = False
     reported: float = -math.inf
     """Time of the last text about a late frame."""
 
@@ -278,16 +277,14 @@ class FabricEndpoint(Endpoint):
             return
         now = self._clock.monotonic()
         if key.kind is KeyKind.PONG:
-            self._pong(station, sample, now)
+            self._pong(station, key.sysid, sample, now)
         elif key.kind is KeyKind.UP:
             self._frames(station, key.sysid, sample, now)
 
-    def _pong(self, station: _Station, sample: FabricSample, now: float) -> None:
+    def _pong(self, station: _Station, sysid: int, sample: FabricSample, now: float) -> None:
         pong = Pong.decode(sample.payload)
-        if pong is None or not station.input.pong(pong, now):
+        if pong is None or not station.input.pong(pong, sysid, now):
             station.lane.channel.counters["bad_envelopes"] += 1
-            return
-        station.has_answered = True
 
     def _frames(self, station: _Station, sysid: int, sample: FabricSample, now: float) -> None:
         channel = station.lane.channel
@@ -298,6 +295,7 @@ class FabricEndpoint(Endpoint):
         if not station.input.is_next(sysid, envelope):
             channel.counters["repeated_samples"] += 1
             return
+        station.input.hear(sysid)
         age = station.input.age(envelope, now)
         accepted = []
         for received in channel.receive(sample.payload):
@@ -354,7 +352,7 @@ class FabricEndpoint(Endpoint):
 
     def _ping_if_due(self, name: str, now: float) -> None:
         station = self._stations[name]
-        if now - station.pinged >= (STATE_EVERY if station.has_answered else FIRST_PINGS):
+        if now - station.pinged >= (STATE_EVERY if station.input.has_answered else FIRST_PINGS):
             self._ping(name)
 
     def _ping(self, name: str) -> None:
@@ -363,7 +361,7 @@ class FabricEndpoint(Endpoint):
         now = self._clock.monotonic()
         station = self._stations[name]
         station.pinged = now
-        key = self._connection.keys.ping(min(self.claims.held), name)
+        key = self._connection.keys.ping(station.input.ping_system(self.claims.held), name)
         self._connection.publish(key, station.input.ping(self._connection.session, now).encode())
 
     def _answer(self, query: StateQuery) -> None:

@@ -9,6 +9,7 @@ slept; the older one is then dropped.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -104,8 +105,34 @@ class StationInput:
     """Sent and not answered."""
     _newest: dict[int, int] = field(default_factory=dict)
     """Number of the newest sample by system."""
+    _heard: int = 0
+    """System to which the station sent last; 0: none yet."""
+    _pinged: int = 0
+    """System of the last ping; 0: none yet."""
+    _has_answered: bool = False
     _refused: dict[tuple[Any, ...], float] = field(default_factory=dict)
     """When a command was refused for its age, s of the gateway's clock."""
+
+    @property
+    def has_answered(self) -> bool:
+        """True once it has answered a ping."""
+        return self._has_answered
+
+    def hear(self, sysid: int) -> None:
+        """Note a sample of the station to a system, whatever its age."""
+        self._heard = sysid
+
+    def ping_system(self, held: Collection[int]) -> int:
+        """Return the system over whose key the next ping goes; one of `held`.
+
+        A router may give the station only some systems. It has the one to which it sent last; before its first sample,
+        each held id is tried in turn until a ping is answered.
+        """
+        if self._heard in held:
+            self._pinged = self._heard
+        elif not (self._has_answered and self._pinged in held):
+            self._pinged = min((sysid for sysid in held if sysid > self._pinged), default=min(held))
+        return self._pinged
 
     def ping(self, gateway: int, now: float) -> Ping:
         """Return the next ping to the station."""
@@ -113,12 +140,13 @@ class StationInput:
         self._pings.append(ping)
         return ping
 
-    def pong(self, pong: Pong, now: float) -> bool:
-        """Note the answer to a ping; False for one that was not sent, or has been answered."""
+    def pong(self, pong: Pong, sysid: int, now: float) -> bool:
+        """Note the answer to a ping over a system's key; False for one that was not sent, or has been answered."""
         ping = Ping(pong.session, pong.ping_sent)
         if ping not in self._pings:
             return False
         self._pings.remove(ping)
+        self._has_answered, self._pinged = True, sysid
         self.offset.answered(pong.ping_sent / 1e6, pong.answered / 1e6, now)
         return True
 
