@@ -174,3 +174,17 @@ async def test_station_whose_token_ends_is_lost_at_once() -> None:
         text = await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("No ground station"), since=mark)
         seconds = float(text.text.removeprefix("No ground station for ").partition(" s")[0])
         assert seconds < 9.0
+
+
+async def test_end_of_a_token_without_an_action_is_no_loss() -> None:
+    async with router() as node, world(endpoints=(node.url,)) as w:
+        async with ground(node.url) as port:
+            station = await FabricStation().join(port)
+            for _ in range(3):
+                await station.heartbeat(lambda beat: True)
+        await station.close()
+        while "0 stations" not in "".join(w.gateway.lines()):
+            await asyncio.sleep(0.1)
+        w.client.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+        assert (await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
+        assert "Ground station is back" not in [message.text for _, message in w.client.since(0, "STATUSTEXT")]
