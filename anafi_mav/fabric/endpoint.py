@@ -24,11 +24,12 @@ from anafi_mav.fabric.claims import ClaimStep, SystemClaims
 from anafi_mav.fabric.connection import FabricConnection
 from anafi_mav.fabric.envelope import MAX_SAMPLE, Pong, UpEnvelope, sender_of
 from anafi_mav.fabric.keys import KeyKind, session_of
-from anafi_mav.fabric.sample_age import INPUTS, StationInput, refusal_of
+from anafi_mav.fabric.sample_age import COMMANDS, INPUTS, StationInput, refusal_of
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, Outbox, Sink, shaped_channel
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.frames import ReceivedFrame
+from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.router import targets
 
 logger = logging.getLogger(__name__)
@@ -59,6 +60,9 @@ class FabricSystems(Protocol):
 
     def is_on_ground(self, sysid: int) -> bool:
         """Return True while the drone is known to stand."""
+
+    def is_stop_of_flight(self, sysid: int, inbound: Inbound) -> bool:
+        """Return True for a command to a system that stops its flight, lands it or leads it home."""
 
     def is_started(self) -> bool:
         """Return True once drones are connected to; before, an id is looked up and not claimed."""
@@ -301,13 +305,21 @@ class FabricEndpoint(Endpoint):
         for received in channel.receive(sample.payload):
             if targets(received.message)[0] not in (0, sysid):
                 channel.counters["misdirected_frames"] += 1
-            elif station.input.is_late(received, age, now):
+            elif station.input.is_late(
+                received, age, now, is_stop=age is None and self._is_stop(channel, sysid, received, now)
+            ):
                 self._refuse(station, sysid, received, now)
             else:
                 accepted.append(received)
         if accepted:
             self._sink.received(channel, accepted, frozenset({sysid}))
         station.lane.flush()
+
+    def _is_stop(self, channel: Channel, sysid: int, received: ReceivedFrame, now: float) -> bool:
+        if not isinstance(received.message, COMMANDS):
+            return False
+        inbound = Inbound(received.message, channel, received.sysid, received.compid, now)
+        return self._systems.is_stop_of_flight(sysid, inbound)
 
     def _refuse(self, station: _Station, sysid: int, received: ReceivedFrame, now: float) -> None:
         """Count a late frame, and answer it if it is a command."""

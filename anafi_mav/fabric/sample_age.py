@@ -30,6 +30,9 @@ OFFSET_WINDOW = 60.0
 DRIFT = 0.01
 """s that clocks may drift within that window."""
 
+EARLY_LIMIT = 0.1
+"""s that a sample may be sent in the future, beside the uncertainty of the offset."""
+
 MAX_PONGS = 64
 """Answered pings that are remembered: one in a second."""
 
@@ -86,12 +89,16 @@ class ClockOffset:
         self._intervals = deque([*overlapping, newest], maxlen=MAX_PONGS)
 
     def age(self, sent: float, now: float) -> float | None:
-        """Return how long before `now` a station's time was, s; None while its clock is not known."""
+        """Return how long before `now` a station's time was, s; None while its clock is not known.
+
+        A time in the future shows that a clock has jumped, as in a gateway that was suspended.
+        """
         known = [one for one in self._intervals if now - one.at <= OFFSET_WINDOW]
         if not known:
             return None
         best = min(known, key=lambda one: one.high - one.low)
-        return now - (sent + (best.low + best.high) / 2.0)
+        age = now - (sent + (best.low + best.high) / 2.0)
+        return None if age < -((best.high - best.low) / 2.0 + EARLY_LIMIT) else age
 
 
 @dataclass
@@ -161,12 +168,15 @@ class StationInput:
         """Return the age of a sample, s; None while the station's clock is not known."""
         return self.offset.age(envelope.sent / 1e6, now)
 
-    def is_late(self, received: ReceivedFrame, age: float | None, now: float) -> bool:
+    def is_late(self, received: ReceivedFrame, age: float | None, now: float, *, is_stop: bool = False) -> bool:
         """Return True for a frame that is too old to have an effect.
 
+        `is_stop`: it stops the flight. Of an unknown age it is taken: a person must always be able to stop the drone.
         A command that the station sent before it could read the refusal of an equal one is a repetition of that
         attempt, and refused too: otherwise a refused command would be carried out a moment later.
         """
+        if is_stop and age is None:
+            return False
         limit = INPUT_LIMIT if received.id in INPUTS else LIMIT
         is_late = age is None or age > limit
         if not isinstance(received.message, COMMANDS):

@@ -130,6 +130,22 @@ def test_repetition_of_a_refused_command_is_refused_until_its_sender_could_know(
     assert not station.is_late(command(0), 0.1, 100.3)
 
 
+def test_stop_of_unknown_age_is_taken_and_an_old_one_is_not() -> None:
+    land = received(dialect.MAVLink_command_long_message(1, 1, dialect.MAV_CMD_NAV_LAND, *[0] * 8))
+    station = StationInput(SESSION)
+    assert not station.is_late(land, None, 100.0, is_stop=True)
+    assert station.is_late(land, 2.1, 100.0, is_stop=True)
+    assert station.is_late(command(), None, 100.0)
+
+
+def test_time_in_the_future_is_of_unknown_age() -> None:
+    offset = ClockOffset()
+    offset.answered(100.0, 50.1, 100.2)  # offset 50.0 ± 0.1
+    assert offset.age(51.1, 101.0) == pytest.approx(-0.1)
+    assert offset.age(51.19, 101.0) == pytest.approx(-0.19)
+    assert offset.age(51.21, 101.0) is None
+
+
 def test_refusal_answers_commands_only() -> None:
     answer = refusal_of(command())
     assert answer is not None
