@@ -89,13 +89,20 @@ class ArrivalQueue:
         if is_first:
             self._wake()
 
-    def take(self) -> list[Arrival]:
-        """Return everything that waits, oldest first."""
+    def take(self, limit: int = MAX_SAMPLES + MAX_CHANGES) -> list[Arrival]:
+        """Return what waits, oldest first, `limit` reports at most.
+
+        While `is_waiting`, `wake` is not called for the rest: the caller takes it later.
+        """
         with self._lock:
-            found = list(self._waiting)
-            self._waiting.clear()
-            self._samples = 0
+            found = [self._waiting.popleft() for _ in range(min(limit, len(self._waiting)))]
+            self._samples -= sum(isinstance(one, FabricSample) for one in found)
         return found
+
+    @property
+    def is_waiting(self) -> bool:
+        """True while there is more to take."""
+        return bool(self._waiting)
 
     def _drop_oldest(self) -> None:
         for index, waiting in enumerate(self._waiting):

@@ -55,3 +55,18 @@ def test_work_comes_before_samples_and_is_kept() -> None:
     queue.clear_samples()
     assert [queue.next(0.0), queue.next(0.0)] == [work, None]
     assert counters == {"dropped_samples": 1}
+
+
+def test_arrivals_beyond_the_limit_wait_and_wake_nothing() -> None:
+    woken: list[int] = []
+    queue = ArrivalQueue(lambda: woken.append(1), Counter())
+    for number in range(3):
+        queue.put(sample(number))
+    assert queue.take(2) == [sample(0), sample(1)]
+    assert queue.is_waiting
+    queue.put(sample(3))
+    assert len(woken) == 1
+    assert queue.take(2) == [sample(2), sample(3)]
+    assert not queue.is_waiting
+    queue.put(sample(4))
+    assert len(woken) == 2
