@@ -25,6 +25,7 @@ from anafi_mav.fabric.connection import FabricConnection
 from anafi_mav.fabric.envelope import MAX_SAMPLE, Pong, UpEnvelope, sender_of
 from anafi_mav.fabric.keys import KeyKind, session_of
 from anafi_mav.fabric.sample_age import COMMANDS, INPUTS, StationInput, refusal_of
+from anafi_mav.fabric.station_places import StationPlaces
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, Outbox, Sink, shaped_channel
 from anafi_mav.mavlink.channel import Channel
@@ -110,6 +111,7 @@ class FabricEndpoint(Endpoint):
         self._is_listed = False
         """True while all tokens that exist are known."""
         self._stations: dict[str, _Station] = {}
+        self._places = StationPlaces(url.options.max_clients)
         self._readers: set[int] = set()
         """Systems whose frames to all somebody reads."""
         self._open_lane: _Lane | None = None
@@ -197,8 +199,16 @@ class FabricEndpoint(Endpoint):
         elif key.kind is KeyKind.STATION:
             if not change.is_alive:
                 self._drop(key.owner)
-            elif key.owner not in self._stations:
-                self._add(key.owner)
+                following = self._places.leave(key.owner)
+                if following is not None:
+                    logger.info("%s: station %s has a place now", self.url, following)
+                    self._add(following)
+            elif not self._places.is_known(key.owner):
+                if self._places.arrive(key.owner):
+                    self._add(key.owner)
+                else:
+                    self.counters["refused_peers"] += 1
+                    logger.warning("%s: station %s waits: all places are taken", self.url, key.owner)
 
     def _claim(self) -> None:
         keys, session = self._connection.keys, self._connection.zenoh
@@ -217,10 +227,6 @@ class FabricEndpoint(Endpoint):
                     session.end(key)
 
     def _add(self, station: str) -> None:
-        if len(self._stations) >= self.parsed.options.max_clients:
-            self.counters["refused_peers"] += 1
-            logger.debug("%s: station %s refused: all places are taken", self.url, station)
-            return
         keys = self._connection.keys
         lane = self._lane(f"{self.url} from {station}", lambda sysid: keys.down(sysid, station))
         lane.channel.ends_with_station = True
@@ -346,6 +352,14 @@ class FabricEndpoint(Endpoint):
     # What is due by time.
 
     def _tick(self) -> None:
+        try:
+            self._act_by_time()
+        except Exception:
+            logger.exception("%s: a mistake of ours", self.url)
+        finally:
+            self._timer = asyncio.get_running_loop().call_later(FIRST_PINGS, self._tick)
+
+    def _act_by_time(self) -> None:
         now = self._clock.monotonic()
         self._claim()
         self._reported &= self.claims.refused.keys()
@@ -360,7 +374,6 @@ class FabricEndpoint(Endpoint):
                 state = self._systems.state(sysid, self._connection.session_text)
                 if state is not None:
                     self._connection.publish(self._connection.keys.state(sysid), state)
-        self._timer = asyncio.get_running_loop().call_later(FIRST_PINGS, self._tick)
 
     def _ping_if_due(self, name: str, now: float) -> None:
         station = self._stations[name]

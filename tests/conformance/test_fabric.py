@@ -195,7 +195,7 @@ async def test_end_of_a_token_without_an_action_is_no_loss() -> None:
         assert "Ground station is back" not in [message.text for _, message in w.client.since(0, "STATUSTEXT")]
 
 
-async def test_station_that_answers_no_ping_can_land_and_do_nothing_else() -> None:
+async def test_station_that_answers_no_ping_can_return_and_not_take_off() -> None:
     async with router() as node, world(endpoints=(node.url,)) as w:
         await w.take_off()
         config = zenoh.Config()
