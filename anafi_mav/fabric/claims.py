@@ -57,8 +57,8 @@ class SystemClaims:
     def decide(self, *, is_listed: bool, can_claim: Callable[[int], bool]) -> list[ClaimChange]:
         """Return the steps that are due.
 
-        `is_listed`: all tokens that exist are known. `can_claim` returns False for an id whose drone is in flight: there
-        it is neither claimed once refused, nor released once held.
+        `is_listed`: all tokens that exist are known. `can_claim` returns False for an id whose drone is in flight:
+        it is then neither claimed once refused, nor released once held.
         """
         steps = []
         for sysid in self._wanted:

@@ -94,9 +94,9 @@ class FabricConnection:
             self._zenoh.stop()
             await self._loop.run_in_executor(None, self._zenoh.ended.wait, CLOSE_LIMIT)
 
-    def publish(self, key: str, payload: bytes, attachment: bytes = b"") -> None:
-        """Queue a sample to be published."""
-        self._queue.add_sample(FabricSample(key, payload, attachment))
+    def publish(self, key: str, payload: bytes, attachment: bytes = b"", *, is_urgent: bool = False) -> None:
+        """Queue a sample to be published. `is_urgent`: a ping or pong."""
+        self._queue.add_sample(FabricSample(key, payload, attachment), is_urgent=is_urgent)
 
     def _wake(self) -> None:
         with contextlib.suppress(RuntimeError):  # the loop has been closed

@@ -387,7 +387,7 @@ class FabricEndpoint(Endpoint):
         station = self._stations[name]
         station.pinged = now
         key = self._connection.keys.ping(station.input.ping_system(self.claims.held), name)
-        self._connection.publish(key, station.input.ping(self._connection.session, now).encode())
+        self._connection.publish(key, station.input.ping(self._connection.session, now).encode(), is_urgent=True)
 
     def _answer(self, query: StateQuery) -> None:
         key, session = self._connection.keys.parse(query.key), self._connection.zenoh

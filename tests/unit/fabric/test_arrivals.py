@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from anafi_mav.fabric.arrivals import MAX_SAMPLES, ArrivalQueue, FabricSample, SampleQueue, TokenChange
+from anafi_mav.fabric.arrivals import MAX_SAMPLES, MAX_URGENT, ArrivalQueue, FabricSample, SampleQueue, TokenChange
 
 
 def sample(number: int) -> FabricSample:
@@ -70,3 +70,13 @@ def test_arrivals_beyond_the_limit_wait_and_wake_nothing() -> None:
     assert not queue.is_waiting
     queue.put(sample(4))
     assert len(woken) == 2
+
+
+def test_pings_come_before_samples_and_are_bounded() -> None:
+    counters: Counter[str] = Counter()
+    queue = SampleQueue(2, counters)
+    queue.add_sample(sample(1))
+    for number in range(MAX_URGENT + 1):
+        queue.add_sample(sample(number), is_urgent=True)
+    assert [queue.next(0.0) for _ in range(MAX_URGENT + 1)] == [*map(sample, range(1, MAX_URGENT + 1)), sample(1)]
+    assert counters == {"dropped_samples": 1, "dropped_sample_bytes": 1}
