@@ -80,7 +80,10 @@ class Reservations(contextlib.ExitStack):
             raise ConfigError(key_path, f"expected free ports on {SHARED}: {error.strerror}") from error
 
     def _take_free(self, http_port: int | None, rtsp_port: int | None) -> Ports:
-        """Choose free ports on `SHARED` and mark them as ours. Raises OSError if a wanted port is taken."""
+        """Choose free ports on `SHARED` and mark them as ours.
+
+        Raises OSError if a wanted port is taken.
+        """
         with contextlib.ExitStack() as probes:
             found = [
                 probes.enter_context(_bound(socket.SOCK_STREAM, SHARED, port or 0)).getsockname()[1]

@@ -13,9 +13,8 @@ from support.ftp import Ftp
 from support.params import send_set, value_of
 from support.world import world
 
-from anafi_mav.services import memory
 from anafi_mav.services.parameter import parameter_service
-from anafi_mav.state_lock import state_folder
+from anafi_mav.state_lock import STATE_WRITER, state_folder
 
 REAL32 = 9
 SLOW = 0.5
@@ -40,7 +39,7 @@ async def test_parameter_echo_waits_until_the_value_is_stored(flavour: str) -> N
         serial = w.drone.identity.serial
         other = await w.connect(sysid=254)
         for name, value in (("ANF_GCS_LOSS_T", 7.0), ("ANF_TKOFF_ALT", 6.0), ("ANF_GCS_LOSS_T", 9.0)):
-            memory._WRITER.submit(time.sleep, SLOW)  # a slow memory card
+            STATE_WRITER.submit(time.sleep, SLOW)  # a slow memory card
             marks = w.client.mark(), other.mark()
             send_set(w.client, name, value, REAL32, flavour)
             for client, mark in zip((w.client, other), marks, strict=True):
@@ -53,7 +52,7 @@ async def test_parameter_echo_waits_until_the_value_is_stored(flavour: str) -> N
 
 async def test_parameter_read_during_storing_waits_too() -> None:
     async with world() as w:
-        memory._WRITER.submit(time.sleep, SLOW)
+        STATE_WRITER.submit(time.sleep, SLOW)
         send_set(w.client, "ANF_GCS_LOSS_T", 7.0, REAL32)
         answers = []
         while 7.0 not in answers:
@@ -66,7 +65,7 @@ async def test_parameter_read_during_storing_waits_too() -> None:
 async def test_parameters_written_together_are_stored_before_their_echo() -> None:
     async with world() as w:
         serial = w.drone.identity.serial
-        memory._WRITER.submit(time.sleep, SLOW)
+        STATE_WRITER.submit(time.sleep, SLOW)
         mark = w.client.mark()
         for value in (7.0, 8.0, 9.0):
             send_set(w.client, "ANF_GCS_LOSS_T", value, REAL32)

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.flavours import both
 from support.mav import NAN, Client
 from support.setpoints import (
+    COPTER_GUIDED,
     NO_ACCELERATION,
     NO_POSITION,
     NO_VELOCITY,
@@ -28,6 +29,7 @@ from support.setpoints import (
 from support.world import ARMED, HOLD, HOME, OFFBOARD, World, world
 
 from anafi_mav import geo
+from anafi_mav.sim.skycontroller import TAKEOFF_LAND
 from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.sim.world.quirks import Quirk
 
@@ -126,6 +128,27 @@ async def test_guided_attitude_with_thrust_takes_off() -> None:
         async with streaming(w.client, attitude(thrust=0.7), every=0.2):
             await lifted(w)
             await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["up"] > 3.0, 15.0)
+        mark = w.client.mark()
+        await said(w.client, "Offboard setpoints stopped: hovering")
+        await w.client.heartbeat(lambda beat: beat.custom_mode == COPTER_GUIDED, since=mark)
+        async with streaming(w.client, local(VELOCITY_ONLY, v=(1.0, 0.0, 0.0))):
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 2.0, 15.0)
+
+
+@both
+async def test_count_before_a_setpoint_takeoff_ends_with_the_takeoff_of_another(flavour: str) -> None:
+    """The pilot takes off while a program's second is counted: its silence lands nothing."""
+    async with world(flavour=flavour, skycontroller=3) as w:
+        mark = w.client.mark()
+        async with streaming(w.client, attitude(thrust=0.7)):
+            await ready(w.client, flavour)
+            await said(w.client, "Takeoff by setpoints of system 255", mark)
+            w.drone.skycontroller.press(TAKEOFF_LAND)
+            await w.drone.wait_log(lambda e: e.kind == "state" and e.args.get("to") == "motor_ramping", 5.0)
+        await said(w.client, "Takeoff by setpoints cancelled", mark)
+        await w.drone.wait_log(lambda e: e.kind == "state" and e.args.get("to") == "hovering", 15.0)
+        await asyncio.sleep(1.5)
+        assert heard(w, "Landing") == []
 
 
 @pytest.mark.parametrize(

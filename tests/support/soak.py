@@ -751,7 +751,7 @@ def _judge_sticks(flight: Flight) -> None:
                 if other.at > s.at
                 for at, ack in flight.acks(other.client)
                 if (ack.command, ack.result) == (other.command, ACCEPTED) and other.command in (LAND, RETURN, PAUSE)
-                if at > other.at
+                if at > other.at and not (other.command == PAUSE and other.values[:1] == (1.0,))  # a continuation
             ]
             spans.append((s.at, min(ends, default=math.inf)))
     late = flight.delay + SLACK

@@ -19,7 +19,7 @@ from anafi_mav.arsdk.messages import flight_plan as modern
 from anafi_mav.arsdk.messages.common import FlightPlanComponent, MavlinkType, PlayError, PlayingState
 from anafi_mav.arsdk.messages.flight_plan import Indicator, SupportedCapabilities
 from anafi_mav.drone.element import Reducer, members, with_item
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
 from anafi_mav.drone.rest import Rest
 from anafi_mav.drone.sent_commands import PLAN_MEMORY, Phase, SentCommand, Slot
 from anafi_mav.drone.settings import Commanding
@@ -217,12 +217,13 @@ class FlightPlan(Commanding[FlightPlanState]):
         self._available()
         command = self._start(uid, item, type, continue_on_disconnect)
         sent = SentCommand(Slot.PLAN, uid, common.Stop(), plan_before=self.state.uid)
+        begun = loop_time()
 
         def judge(message: Any) -> bool | AnafiMavError | None:
             if sent.phase is Phase.REFUSED:
                 return CommandRejected(self._why())
             if sent.awaited and isinstance(message, common.StartingErrorEvent):
-                seconds = min(timeout, DOUBT_TIMEOUT)
+                seconds = max(0.0, min(begun + timeout - loop_time(), DOUBT_TIMEOUT))
                 sent.answer.expire_after(seconds, CommandTimeout(command.NAME, seconds))
             return True if sent.phase is Phase.CONFIRMED else None
 

@@ -222,7 +222,7 @@ class OffboardFlight(PlainTask):
         self._stream = stream.climb(sender, now)
         self._watch()
         if self._stream.state is State.LIFTING:
-            self._attempt = _Attempt(sender, control.run(sender, self._take_off(by, self._stream), is_order=False))
+            self._attempt = _Attempt(sender, control.run(sender, self._take_off(by, guided=guided), is_order=False))
         elif stream.climbs_since != self._stream.climbs_since:
             if guided:
                 control.adopt(self, keeps_below=True)
@@ -253,12 +253,11 @@ class OffboardFlight(PlainTask):
                 self._vehicle.control.release(self)
             self._vehicle.text(Severity.NOTICE, texts.SETPOINT_TAKEOFF_NO_CLIMB)
 
-    async def _take_off(self, by: Right, counted: OffboardStream) -> None:
+    async def _take_off(self, by: Right, *, guided: bool) -> None:
         """Take off after a second of climbing setpoints; the newest is flown from the first hover."""
         vehicle, client = self._vehicle, by.client
-        below = _GUIDED if vehicle.control.mode is FlightMode.GUIDED else None
         try:
-            async with vehicle.control.acquire(self, by=by, below=below) as grant:
+            async with vehicle.control.acquire(self, by=by, below=_GUIDED if guided else None) as grant:
                 fresh = self._stream.candidate(client, self._clock.monotonic()) == client
                 if not (self._stands and fresh and self._takeoff.is_armed_by(client)):
                     raise Refused(texts.SETPOINT_TAKEOFF, texts.SETPOINTS_STOPPED)
@@ -266,8 +265,8 @@ class OffboardFlight(PlainTask):
                 grant.begin()
                 await self._takeoff.launch()
         except AnafiMavError as error:
-            if self._stream.engagement is counted.engagement:  # refused before it has replaced anything
-                vehicle.control.release(self)
+            if self._stream.state is State.LIFTING and self._stream.pilot == client:
+                vehicle.control.release(self)  # refused before it has replaced anything
             vehicle.text(Severity.ERROR, texts.SETPOINT_TAKEOFF_FAILED.fill(error=reason_of(error)))
 
     def begin(self) -> None:
@@ -279,7 +278,7 @@ class OffboardFlight(PlainTask):
         vehicle, state = self._vehicle, self._stream.state
         if state not in (State.LIFTING, State.JOINED) or self._takeoff.under_way:
             return
-        if vehicle.in_air or state is State.JOINED:
+        if vehicle.in_air or (state is State.JOINED and vehicle.on_ground):
             self._stream = self._stream.after(Event.RISEN)
             if vehicle.in_air and not vehicle.returning:
                 self._begin()
@@ -287,9 +286,9 @@ class OffboardFlight(PlainTask):
     def left_ground(self) -> None:
         """The drone takes off.
 
-        A session that stands by on the ground flies only a take-off that is its own.
+        A session that stands by on the ground, or counts, flies only a take-off that is its own.
         """
-        if self.engaged and self._stream.state not in (State.LIFTING, State.JOINED):
+        if self._stream.engagement is not None and self._stream.state not in (State.LIFTING, State.JOINED):
             self._vehicle.control.lose(texts.NOT_ITS_TAKEOFF)
 
     def _objection(self, sender: Hashable, setpoint: Setpoint) -> OperatorText | None:

@@ -83,7 +83,9 @@ class Image:
         self.place = root
         subprocess.run([sys.executable, "-m", "venv", "--without-pip", root / "python"], check=True, timeout=LIMIT)
         (site,) = (root / "python" / "lib").glob("*/site-packages")
-        (site / "installed.pth").write_text(sysconfig.get_path("purelib"))
+        for library in Path(sysconfig.get_path("purelib")).iterdir():
+            if "anafi_mav" not in library.name:  # else pip finds the package installed already
+                (site / library.name).symlink_to(library)
         (programs / "pip").write_text(f'#!/bin/sh\nexec "{programs}/python" -m pip "$@"\n')
         (programs / "pip").chmod(0o755)
 
