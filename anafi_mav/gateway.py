@@ -34,7 +34,7 @@ from anafi_mav.gateway_status import ReportedDrone, StatusReport
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, Sink
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.key_ring import KeyRing, folder_of
-from anafi_mav.mavlink.node import Node
+from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.recording.recorder import Recorder
 from anafi_mav.relay.server import RelayServer
 from anafi_mav.relay.source import DroneSource
@@ -636,6 +636,10 @@ class _FabricSystems:
     def is_on_ground(self, sysid: int) -> bool:
         supervised = self._gateway.supervised(sysid)
         return supervised is not None and supervised.system.active and supervised.system.vehicle.on_ground
+
+    def is_stop_of_flight(self, sysid: int, inbound: Inbound) -> bool:
+        supervised = self._gateway.supervised(sysid)
+        return supervised is not None and supervised.system.is_stop_of_flight(inbound)
 
     def is_started(self) -> bool:
         return bool(self._gateway.systems)

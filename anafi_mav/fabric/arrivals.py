@@ -14,6 +14,10 @@ MAX_CHANGES = 10_000
 """Other reports that may wait: tokens of more programs than a network has."""
 
 
+MAX_URGENT = 256
+"""Pings and pongs that may wait to be published: behind telemetry they would measure its queue."""
+
+
 class FabricSample(NamedTuple):
     """Bytes that another program has published."""
 
@@ -89,13 +93,20 @@ class ArrivalQueue:
         if is_first:
             self._wake()
 
-    def take(self) -> list[Arrival]:
-        """Return everything that waits, oldest first."""
+    def take(self, limit: int = MAX_SAMPLES + MAX_CHANGES) -> list[Arrival]:
+        """Return what waits, oldest first, `limit` reports at most.
+
+        While `is_waiting`, `wake` is not called for the rest: the caller takes it later.
+        """
         with self._lock:
-            found = list(self._waiting)
-            self._waiting.clear()
-            self._samples = 0
+            found = [self._waiting.popleft() for _ in range(min(limit, len(self._waiting)))]
+            self._samples -= sum(isinstance(one, FabricSample) for one in found)
         return found
+
+    @property
+    def is_waiting(self) -> bool:
+        """True while there is more to take."""
+        return bool(self._waiting)
 
     def _drop_oldest(self) -> None:
         for index, waiting in enumerate(self._waiting):
@@ -118,16 +129,18 @@ class SampleQueue:
         self._limit = limit
         self._ready = threading.Condition()
         self._samples: deque[FabricSample] = deque()
+        self._urgent: deque[FabricSample] = deque()
         self._works: deque[Callable[[Any], None]] = deque()
 
-    def add_sample(self, sample: FabricSample) -> None:
-        """Add a sample. Never blocks for long."""
+    def add_sample(self, sample: FabricSample, *, is_urgent: bool = False) -> None:
+        """Add a sample. Never blocks for long. `is_urgent`: a ping or pong, which comes before the others."""
         with self._ready:
-            if len(self._samples) >= self._limit:
-                dropped = self._samples.popleft()
+            samples, limit = (self._urgent, MAX_URGENT) if is_urgent else (self._samples, self._limit)
+            if len(samples) >= limit:
+                dropped = samples.popleft()
                 self._counters["dropped_samples"] += 1
                 self._counters["dropped_sample_bytes"] += len(dropped.payload)
-            self._samples.append(sample)
+            samples.append(sample)
             self._ready.notify()
 
     def add_work(self, work: Callable[[Any], None]) -> None:
@@ -139,14 +152,17 @@ class SampleQueue:
     def clear_samples(self) -> None:
         """Forget the samples that wait."""
         with self._ready:
-            self._counters["dropped_samples"] += len(self._samples)
-            self._samples.clear()
+            for samples in (self._samples, self._urgent):
+                self._counters["dropped_samples"] += len(samples)
+                samples.clear()
 
     def next(self, timeout: float) -> FabricSample | Callable[[Any], None] | None:
         """Return what is next, or None after `timeout` s without any. In the publishing thread."""
         with self._ready:
-            if not self._works and not self._samples:
+            if not (self._works or self._urgent or self._samples):
                 self._ready.wait(timeout)
             if self._works:
                 return self._works.popleft()
+            if self._urgent:
+                return self._urgent.popleft()
             return self._samples.popleft() if self._samples else None

@@ -57,14 +57,14 @@ class SystemClaims:
     def decide(self, *, is_listed: bool, can_claim: Callable[[int], bool]) -> list[ClaimChange]:
         """Return the steps that are due.
 
-        `is_listed`: all tokens that exist are known. `can_claim` returns False for an id whose drone is in flight: once
-        refused, it is not claimed there.
+        `is_listed`: all tokens that exist are known. `can_claim` returns False for an id whose drone is in flight:
+        it is then neither claimed once refused, nor released once held.
         """
         steps = []
         for sysid in self._wanted:
             others = self._others[sysid]
             if sysid in self.held:
-                if others and min(others) < self._session:
+                if others and min(others) < self._session and can_claim(sysid):
                     self.held.discard(sysid)
                     self.refused[sysid] = min(others)
                     steps.append(ClaimChange(ClaimStep.RELEASE, sysid, min(others)))

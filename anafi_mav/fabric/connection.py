@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import importlib
+import logging
 import secrets
 from collections import Counter
 from collections.abc import Callable
@@ -18,11 +19,16 @@ from anafi_mav.mavlink.base import EndpointUrl
 if TYPE_CHECKING:
     from anafi_mav.fabric.zenoh_session import ZenohSession
 
+logger = logging.getLogger(__name__)
+
 MISSING = "the fabric needs eclipse-zenoh: pip install 'anafi-mav[fabric]'"
 
 MAX_QUEUED = 2048
 """Samples that may wait to be published: half a second of 20 drones with 60 messages a second each for three
 stations. Telemetry that waits longer is history."""
+
+MAX_TAKEN = 100
+"""Reports handled in one event-loop iteration: the drones' links are served between them."""
 
 OPEN_LIMIT = 5.0
 """s to open a listening address."""
@@ -88,20 +94,25 @@ class FabricConnection:
             self._zenoh.stop()
             await self._loop.run_in_executor(None, self._zenoh.ended.wait, CLOSE_LIMIT)
 
-    def publish(self, key: str, payload: bytes, attachment: bytes = b"") -> None:
-        """Queue a sample to be published."""
-        self._queue.add_sample(FabricSample(key, payload, attachment))
+    def publish(self, key: str, payload: bytes, attachment: bytes = b"", *, is_urgent: bool = False) -> None:
+        """Queue a sample to be published. `is_urgent`: a ping or pong."""
+        self._queue.add_sample(FabricSample(key, payload, attachment), is_urgent=is_urgent)
 
     def _wake(self) -> None:
         with contextlib.suppress(RuntimeError):  # the loop has been closed
             self._loop.call_soon_threadsafe(self._take)
 
     def _take(self) -> None:
-        for arrival in self._arrivals.take():
+        for arrival in self._arrivals.take(MAX_TAKEN):
             if self._is_closed:
                 return
             if isinstance(arrival, LinkChange):
                 self.is_up, self.problem = arrival.is_up, arrival.problem
                 if not arrival.is_up:
                     self._queue.clear_samples()
-            self._receive(arrival)
+            try:
+                self._receive(arrival)
+            except Exception:  # the others of this iteration count all the same
+                logger.exception("%s: %s not handled", self._url.text, type(arrival).__name__)
+        if self._arrivals.is_waiting:
+            self._loop.call_soon(self._take)

@@ -24,11 +24,13 @@ from anafi_mav.fabric.claims import ClaimStep, SystemClaims
 from anafi_mav.fabric.connection import FabricConnection
 from anafi_mav.fabric.envelope import MAX_SAMPLE, Pong, UpEnvelope, sender_of
 from anafi_mav.fabric.keys import KeyKind, session_of
-from anafi_mav.fabric.sample_age import INPUTS, StationInput, refusal_of
+from anafi_mav.fabric.sample_age import COMMANDS, INPUTS, StationInput, refusal_of
+from anafi_mav.fabric.station_places import StationPlaces
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, Outbox, Sink, shaped_channel
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.frames import ReceivedFrame
+from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.router import targets
 
 logger = logging.getLogger(__name__)
@@ -60,6 +62,9 @@ class FabricSystems(Protocol):
     def is_on_ground(self, sysid: int) -> bool:
         """Return True while the drone is known to stand."""
 
+    def is_stop_of_flight(self, sysid: int, inbound: Inbound) -> bool:
+        """Return True for a command to a system that stops its flight, lands it or leads it home."""
+
     def is_started(self) -> bool:
         """Return True once drones are connected to; before, an id is looked up and not claimed."""
 
@@ -86,7 +91,6 @@ class _Station:
     lane: _Lane
     input: StationInput
     pinged: float = 0.0
-    has_answered: bool = False
     reported: float = -math.inf
     """Time of the last text about a late frame."""
 
@@ -107,6 +111,7 @@ class FabricEndpoint(Endpoint):
         self._is_listed = False
         """True while all tokens that exist are known."""
         self._stations: dict[str, _Station] = {}
+        self._places = StationPlaces(url.options.max_clients)
         self._readers: set[int] = set()
         """Systems whose frames to all somebody reads."""
         self._open_lane: _Lane | None = None
@@ -194,8 +199,16 @@ class FabricEndpoint(Endpoint):
         elif key.kind is KeyKind.STATION:
             if not change.is_alive:
                 self._drop(key.owner)
-            elif key.owner not in self._stations:
-                self._add(key.owner)
+                following = self._places.leave(key.owner)
+                if following is not None:
+                    logger.info("%s: station %s has a place now", self.url, following)
+                    self._add(following)
+            elif not self._places.is_known(key.owner):
+                if self._places.arrive(key.owner):
+                    self._add(key.owner)
+                else:
+                    self.counters["refused_peers"] += 1
+                    logger.warning("%s: station %s waits: all places are taken", self.url, key.owner)
 
     def _claim(self) -> None:
         keys, session = self._connection.keys, self._connection.zenoh
@@ -214,10 +227,6 @@ class FabricEndpoint(Endpoint):
                     session.end(key)
 
     def _add(self, station: str) -> None:
-        if len(self._stations) >= self.parsed.options.max_clients:
-            self.counters["refused_peers"] += 1
-            logger.debug("%s: station %s refused: all places are taken", self.url, station)
-            return
         keys = self._connection.keys
         lane = self._lane(f"{self.url} from {station}", lambda sysid: keys.down(sysid, station))
         lane.channel.ends_with_station = True
@@ -278,16 +287,14 @@ class FabricEndpoint(Endpoint):
             return
         now = self._clock.monotonic()
         if key.kind is KeyKind.PONG:
-            self._pong(station, sample, now)
+            self._pong(station, key.sysid, sample, now)
         elif key.kind is KeyKind.UP:
             self._frames(station, key.sysid, sample, now)
 
-    def _pong(self, station: _Station, sample: FabricSample, now: float) -> None:
+    def _pong(self, station: _Station, sysid: int, sample: FabricSample, now: float) -> None:
         pong = Pong.decode(sample.payload)
-        if pong is None or not station.input.pong(pong, now):
+        if pong is None or not station.input.pong(pong, sysid, now):
             station.lane.channel.counters["bad_envelopes"] += 1
-            return
-        station.has_answered = True
 
     def _frames(self, station: _Station, sysid: int, sample: FabricSample, now: float) -> None:
         channel = station.lane.channel
@@ -298,18 +305,27 @@ class FabricEndpoint(Endpoint):
         if not station.input.is_next(sysid, envelope):
             channel.counters["repeated_samples"] += 1
             return
+        station.input.hear(sysid)
         age = station.input.age(envelope, now)
         accepted = []
         for received in channel.receive(sample.payload):
             if targets(received.message)[0] not in (0, sysid):
                 channel.counters["misdirected_frames"] += 1
-            elif station.input.is_late(received, age, now):
+            elif station.input.is_late(
+                received, age, now, is_stop=age is None and self._is_stop(channel, sysid, received, now)
+            ):
                 self._refuse(station, sysid, received, now)
             else:
                 accepted.append(received)
         if accepted:
             self._sink.received(channel, accepted, frozenset({sysid}))
         station.lane.flush()
+
+    def _is_stop(self, channel: Channel, sysid: int, received: ReceivedFrame, now: float) -> bool:
+        if not isinstance(received.message, COMMANDS):
+            return False
+        inbound = Inbound(received.message, channel, received.sysid, received.compid, now)
+        return self._systems.is_stop_of_flight(sysid, inbound)
 
     def _refuse(self, station: _Station, sysid: int, received: ReceivedFrame, now: float) -> None:
         """Count a late frame, and answer it if it is a command."""
@@ -336,6 +352,14 @@ class FabricEndpoint(Endpoint):
     # What is due by time.
 
     def _tick(self) -> None:
+        try:
+            self._act_by_time()
+        except Exception:
+            logger.exception("%s: a mistake of ours", self.url)
+        finally:
+            self._timer = asyncio.get_running_loop().call_later(FIRST_PINGS, self._tick)
+
+    def _act_by_time(self) -> None:
         now = self._clock.monotonic()
         self._claim()
         self._reported &= self.claims.refused.keys()
@@ -350,11 +374,10 @@ class FabricEndpoint(Endpoint):
                 state = self._systems.state(sysid, self._connection.session_text)
                 if state is not None:
                     self._connection.publish(self._connection.keys.state(sysid), state)
-        self._timer = asyncio.get_running_loop().call_later(FIRST_PINGS, self._tick)
 
     def _ping_if_due(self, name: str, now: float) -> None:
         station = self._stations[name]
-        if now - station.pinged >= (STATE_EVERY if station.has_answered else FIRST_PINGS):
+        if now - station.pinged >= (STATE_EVERY if station.input.has_answered else FIRST_PINGS):
             self._ping(name)
 
     def _ping(self, name: str) -> None:
@@ -363,8 +386,8 @@ class FabricEndpoint(Endpoint):
         now = self._clock.monotonic()
         station = self._stations[name]
         station.pinged = now
-        key = self._connection.keys.ping(min(self.claims.held), name)
-        self._connection.publish(key, station.input.ping(self._connection.session, now).encode())
+        key = self._connection.keys.ping(station.input.ping_system(self.claims.held), name)
+        self._connection.publish(key, station.input.ping(self._connection.session, now).encode(), is_urgent=True)
 
     def _answer(self, query: StateQuery) -> None:
         key, session = self._connection.keys.parse(query.key), self._connection.zenoh

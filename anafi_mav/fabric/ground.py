@@ -215,7 +215,8 @@ class FabricGround:
             ping = Ping.decode(sample.payload)
             if ping is not None:
                 pong = Pong(ping.session, ping.sent, micros(self._clock.monotonic()))
-                self._connection.publish(self._connection.keys.pong(key.sysid, station.name), pong.encode())
+                pong_key = self._connection.keys.pong(key.sysid, station.name)
+                self._connection.publish(pong_key, pong.encode(), is_urgent=True)
         elif key.kind is KeyKind.DOWN:
             for raw in split_frames(sample.payload):
                 station.channel.forward(raw, is_answer=True)

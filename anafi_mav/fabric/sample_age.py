@@ -9,6 +9,7 @@ slept; the older one is then dropped.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -28,6 +29,9 @@ OFFSET_WINDOW = 60.0
 
 DRIFT = 0.01
 """s that clocks may drift within that window."""
+
+EARLY_LIMIT = 0.1
+"""s that a sample may be sent in the future, beside the uncertainty of the offset."""
 
 MAX_PONGS = 64
 """Answered pings that are remembered: one in a second."""
@@ -85,12 +89,16 @@ class ClockOffset:
         self._intervals = deque([*overlapping, newest], maxlen=MAX_PONGS)
 
     def age(self, sent: float, now: float) -> float | None:
-        """Return how long before `now` a station's time was, s; None while its clock is not known."""
+        """Return how long before `now` a station's time was, s; None while its clock is not known.
+
+        A time in the future shows that a clock has jumped, as in a gateway that was suspended.
+        """
         known = [one for one in self._intervals if now - one.at <= OFFSET_WINDOW]
         if not known:
             return None
         best = min(known, key=lambda one: one.high - one.low)
-        return now - (sent + (best.low + best.high) / 2.0)
+        age = now - (sent + (best.low + best.high) / 2.0)
+        return None if age < -((best.high - best.low) / 2.0 + EARLY_LIMIT) else age
 
 
 @dataclass
@@ -104,8 +112,34 @@ class StationInput:
     """Sent and not answered."""
     _newest: dict[int, int] = field(default_factory=dict)
     """Number of the newest sample by system."""
+    _heard: int = 0
+    """System to which the station sent last; 0: none yet."""
+    _pinged: int = 0
+    """System of the last ping; 0: none yet."""
+    _has_answered: bool = False
     _refused: dict[tuple[Any, ...], float] = field(default_factory=dict)
     """When a command was refused for its age, s of the gateway's clock."""
+
+    @property
+    def has_answered(self) -> bool:
+        """True once it has answered a ping."""
+        return self._has_answered
+
+    def hear(self, sysid: int) -> None:
+        """Note a sample of the station to a system, whatever its age."""
+        self._heard = sysid
+
+    def ping_system(self, held: Collection[int]) -> int:
+        """Return the system over whose key the next ping goes; one of `held`.
+
+        A router may give the station only some systems. It has the one to which it sent last; before its first sample,
+        each held id is tried in turn until a ping is answered.
+        """
+        if self._heard in held:
+            self._pinged = self._heard
+        elif not (self._has_answered and self._pinged in held):
+            self._pinged = min((sysid for sysid in held if sysid > self._pinged), default=min(held))
+        return self._pinged
 
     def ping(self, gateway: int, now: float) -> Ping:
         """Return the next ping to the station."""
@@ -113,12 +147,13 @@ class StationInput:
         self._pings.append(ping)
         return ping
 
-    def pong(self, pong: Pong, now: float) -> bool:
-        """Note the answer to a ping; False for one that was not sent, or has been answered."""
+    def pong(self, pong: Pong, sysid: int, now: float) -> bool:
+        """Note the answer to a ping over a system's key; False for one that was not sent, or has been answered."""
         ping = Ping(pong.session, pong.ping_sent)
         if ping not in self._pings:
             return False
         self._pings.remove(ping)
+        self._has_answered, self._pinged = True, sysid
         self.offset.answered(pong.ping_sent / 1e6, pong.answered / 1e6, now)
         return True
 
@@ -133,12 +168,15 @@ class StationInput:
         """Return the age of a sample, s; None while the station's clock is not known."""
         return self.offset.age(envelope.sent / 1e6, now)
 
-    def is_late(self, received: ReceivedFrame, age: float | None, now: float) -> bool:
+    def is_late(self, received: ReceivedFrame, age: float | None, now: float, *, is_stop: bool = False) -> bool:
         """Return True for a frame that is too old to have an effect.
 
+        `is_stop`: it stops the flight. Of an unknown age it is taken: a person must always be able to stop the drone.
         A command that the station sent before it could read the refusal of an equal one is a repetition of that
         attempt, and refused too: otherwise a refused command would be carried out a moment later.
         """
+        if is_stop and age is None:
+            return False
         limit = INPUT_LIMIT if received.id in INPUTS else LIMIT
         is_late = age is None or age > limit
         if not isinstance(received.message, COMMANDS):

@@ -25,7 +25,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.router import EVERY_COMPONENT
 from anafi_mav.services.command.command_service import CommandService
-from anafi_mav.services.command.operator_need import need_of
+from anafi_mav.services.command.operator_need import ACKNOWLEDGEMENTS, need_of
 from anafi_mav.services.command.running_actions import RunningActions
 from anafi_mav.services.commands import Action
 from anafi_mav.services.definition_link import DefinitionLink
@@ -308,6 +308,8 @@ class Component:
     def _deny(self, inbound: Inbound) -> None:
         """Answer a message that the access of its endpoint does not cover; it has no effect."""
         self._answer_refused(inbound, dialect.MAV_RESULT_DENIED)
+        if inbound.message.get_msgId() in ACKNOWLEDGEMENTS:
+            return  # stations send them by themselves
         channel = inbound.channel
         if inbound.now - self._denied_at.get(channel, -math.inf) >= DENIED_EVERY:
             self._denied_at[channel] = inbound.now

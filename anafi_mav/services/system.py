@@ -345,6 +345,11 @@ class System:
             self._muted.discard(channel)
         self._addressed = ([], [])
 
+    def is_stop_of_flight(self, inbound: Inbound) -> bool:
+        """Return True for a command that stops the aircraft, lands it or leads it home."""
+        command = self.owner(inbound.message).commands.action_of(inbound)
+        return command is not None and command.is_stop_of_flight
+
     def owner(self, message: Any) -> Component:
         """Return the component that answers this message to component 0.
 

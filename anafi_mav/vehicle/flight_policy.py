@@ -88,7 +88,7 @@ def operator_refusal_of(control: OperatorControl, request: Request) -> Refused |
     """
     if not isinstance(request.by, Right) or not request.rules.is_flight:
         return None
-    need = Need.FLY if request.rules.is_stream else Need.COMMAND
+    need = Need.FLY if request.rules.needs_operator else Need.COMMAND
     reason = control.objection(request.by.system, need)
     return None if reason is None else NotInControl(request.rules.what, reason)
 

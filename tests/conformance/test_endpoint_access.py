@@ -98,6 +98,15 @@ async def test_refused_request_of_an_observer_is_answered() -> None:
         assert (await pilot.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == ACCEPTED
 
 
+async def test_acknowledgement_of_an_observer_draws_no_text() -> None:
+    async with world(options=["access=observe"]) as w:
+        observer = await w.connect(250, port=OPTIONS_PORT)
+        observer.send(dialect.MAVLink_command_ack_message(dialect.MAV_CMD_REQUEST_MESSAGE, ACCEPTED, 0, 0, 1, 1))
+        assert (await observer.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
+        assert "refused" not in "".join(message.text for _, message in observer.since(0, "STATUSTEXT"))
+        assert w.gateway.counters()["refused_access.COMMAND_ACK"] == 1
+
+
 async def test_heartbeats_of_observers_do_not_replace_a_station() -> None:
     async with world(options=["access=observe"]) as w:
         observer = await w.connect(250, port=OPTIONS_PORT)

@@ -16,12 +16,17 @@ import zenoh
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support import missions
 from support.fabric import FabricStation, RouterProcess, StallingRelay, ground, router
+from support.fault_scenarios import watched
 from support.ftp import Ftp
 from support.media import DAY, add_photo
 from support.params import write
 from support.process import gateway_process
 from support.setpoints import VELOCITY_ONLY, engage, local, streaming
 from support.world import HOME, World, loopback, world
+
+from anafi_mav.fabric.envelope import UpEnvelope
+from anafi_mav.mavlink import dialect as own
+from anafi_mav.mavlink.frames import frame, pack
 
 ACCEPTED, REJECTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_TEMPORARILY_REJECTED
 PARTITION = 5.0
@@ -174,3 +179,37 @@ async def test_station_whose_token_ends_is_lost_at_once() -> None:
         text = await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("No ground station"), since=mark)
         seconds = float(text.text.removeprefix("No ground station for ").partition(" s")[0])
         assert seconds < 9.0
+
+
+async def test_end_of_a_token_without_an_action_is_no_loss() -> None:
+    async with router() as node, world(endpoints=(node.url,)) as w:
+        async with ground(node.url) as port:
+            station = await FabricStation().join(port)
+            for _ in range(3):
+                await station.heartbeat(lambda beat: True)
+        await station.close()
+        await watched(1.0)
+        assert "0 stations" in "".join(w.gateway.lines())
+        w.client.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+        assert (await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
+        assert "Ground station is back" not in [message.text for _, message in w.client.since(0, "STATUSTEXT")]
+
+
+async def test_station_that_answers_no_ping_can_return_and_not_take_off() -> None:
+    async with router() as node, world(endpoints=(node.url,)) as w:
+        await w.take_off()
+        config = zenoh.Config()
+        config.insert_json5("mode", '"client"')
+        config.insert_json5("connect/endpoints", json.dumps([f"tcp/127.0.0.1:{node.port}"]))
+        name = f"{7:016x}-1"
+        with await asyncio.to_thread(zenoh.open, config) as session:
+            samples = session.declare_subscriber(f"anafi/1/down/{name}")
+            token = session.liveliness().declare_token(f"anafi/station/v1/{name}")
+            await asyncio.to_thread(samples.recv)
+            for number, command in enumerate((own.MAV_CMD_NAV_RETURN_TO_LAUNCH, own.MAV_CMD_NAV_TAKEOFF), 1):
+                sent = own.MAVLink_command_long_message(1, 1, command, *[0] * 8)
+                raw = frame(pack(sent), number, 255, 190)
+                session.put(f"anafi/1/up/{name}", raw, attachment=UpEnvelope(7, number, 0).encode())
+            await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.returning, timeout=10.0)
+            assert counted(w, "late_commands") == 1
+            token.undeclare()

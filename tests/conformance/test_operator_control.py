@@ -285,6 +285,12 @@ async def test_sticks_and_setpoints_of_a_secondary_are_not_flown(flavour: str) -
                 if flavour == "px4":
                     assert await result(client, SET_MODE, 1, 6, 0) != ACCEPTED
             assert motion(w, began) == []
+        if flavour == "px4":
+            async with streaming(teacher, NORTH, 0.1):
+                await watched(0.5)
+                began = now()
+                assert await result(named, SET_MODE, 1, 6, 0) == NOT_IN_CONTROL
+                assert motion(w, began) == []
         began = now()
         assert await result(named, dialect.MAV_CMD_CONDITION_YAW, 30.0, 0.0, 0.0, 1.0) == ACCEPTED
         assert motion(w, began)

@@ -46,8 +46,9 @@ class LinkLossService(Service):
 
     def channel_closed(self, channel: Channel) -> None:
         policy, now = self.host.vehicle.gcs_loss, self.host.clock.monotonic()
-        silence = self._watch.closed(channel, now, policy.after, is_certain=channel.ends_with_station)
-        if silence is not None and policy.action is not LossAction.NOTHING:
+        is_certain = channel.ends_with_station and policy.action is not LossAction.NOTHING
+        silence = self._watch.closed(channel, now, policy.after, is_certain=is_certain)
+        if silence is not None:
             self._lost(round(silence, 1))
 
     def _lost(self, seconds: float) -> None:

@@ -69,6 +69,8 @@ class TaskRules:
     """A hovering mode: active below a task and after it."""
     is_stream: bool = False
     """Setpoints of a client: they never leave a pause."""
+    needs_operator: bool = False
+    """It flies by sticks or setpoints: while there is an operator, no other station may begin it."""
     keeps_below: bool = False
     """The hovering mode of before stays chosen, and so does a pause."""
     ends_landing: Extent | None = None

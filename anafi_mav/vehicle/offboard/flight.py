@@ -60,6 +60,7 @@ _IN_GUIDED = TaskRules(
     texts.SETPOINT,
     needs=Needs.NO_DESCENT | Needs.IN_AIR | Needs.NO_PILOT | Needs.LIMITS | Needs.PLAIN_STICKS,
     is_stream=True,
+    needs_operator=True,
 )
 
 _BEFORE_TAKEOFF = (FlyingState.LANDED, FlyingState.MOTOR_RAMPING)
@@ -121,6 +122,7 @@ class OffboardFlight(PlainTask):
             ends_landing=Extent.COMMANDED,
             ends_return=Extent.COMMANDED,
             follows=True,
+            needs_operator=True,
         )
 
     @property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from anafi_mav.fabric.arrivals import MAX_SAMPLES, ArrivalQueue, FabricSample, SampleQueue, TokenChange
+from anafi_mav.fabric.arrivals import MAX_SAMPLES, MAX_URGENT, ArrivalQueue, FabricSample, SampleQueue, TokenChange
 
 
 def sample(number: int) -> FabricSample:
@@ -55,3 +55,28 @@ def test_work_comes_before_samples_and_is_kept() -> None:
     queue.clear_samples()
     assert [queue.next(0.0), queue.next(0.0)] == [work, None]
     assert counters == {"dropped_samples": 1}
+
+
+def test_arrivals_beyond_the_limit_wait_and_wake_nothing() -> None:
+    woken: list[int] = []
+    queue = ArrivalQueue(lambda: woken.append(1), Counter())
+    for number in range(3):
+        queue.put(sample(number))
+    assert queue.take(2) == [sample(0), sample(1)]
+    assert queue.is_waiting
+    queue.put(sample(3))
+    assert len(woken) == 1
+    assert queue.take(2) == [sample(2), sample(3)]
+    assert not queue.is_waiting
+    queue.put(sample(4))
+    assert len(woken) == 2
+
+
+def test_pings_come_before_samples_and_are_bounded() -> None:
+    counters: Counter[str] = Counter()
+    queue = SampleQueue(2, counters)
+    queue.add_sample(sample(1))
+    for number in range(MAX_URGENT + 1):
+        queue.add_sample(sample(number), is_urgent=True)
+    assert [queue.next(0.0) for _ in range(MAX_URGENT + 1)] == [*map(sample, range(1, MAX_URGENT + 1)), sample(1)]
+    assert counters == {"dropped_samples": 1, "dropped_sample_bytes": 1}

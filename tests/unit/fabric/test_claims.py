@@ -40,6 +40,15 @@ def test_simultaneous_claim_is_kept_by_the_lower_session() -> None:
     assert claims.held == set()
 
 
+def test_id_is_not_released_in_flight() -> None:
+    claims = SystemClaims(MINE, [1])
+    decide(claims)
+    claims.token(1, LOW, is_alive=True)
+    assert decide(claims, on_ground=False) == []
+    assert claims.held == {1}
+    assert decide(claims) == [ClaimChange(ClaimStep.RELEASE, 1, LOW)]
+
+
 def test_id_that_becomes_free_is_not_claimed_in_flight() -> None:
     claims = SystemClaims(MINE, [1])
     claims.token(1, HIGH, is_alive=True)

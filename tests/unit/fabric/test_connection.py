@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
 import socket
 import sys
 from collections import Counter
 
 import pytest
 
-from anafi_mav.fabric.connection import FabricConnection
+from anafi_mav.fabric.arrivals import Arrival, FabricSample, TokensListed
+from anafi_mav.fabric.connection import MAX_TAKEN, FabricConnection
 from anafi_mav.mavlink.endpoint import parse_endpoint
 
 
@@ -30,3 +32,22 @@ async def test_connection_at_a_taken_address_is_refused() -> None:
         with pytest.raises(OSError, match="Address already in use"):
             await connection.open()
         await connection.close()
+
+
+async def test_report_that_fails_does_not_lose_the_others() -> None:
+    seen: list[Arrival] = []
+
+    def receive(arrival: Arrival) -> None:
+        if isinstance(arrival, TokensListed):
+            raise ValueError
+        seen.append(arrival)
+
+    connection = FabricConnection(parse_endpoint("zenoh://127.0.0.1:7447"), Counter(), receive)
+    connection._arrivals.put(TokensListed())
+    samples = [FabricSample(str(number), b"", b"") for number in range(MAX_TAKEN + 1)]
+    for sample in samples:
+        connection._arrivals.put(sample)
+    await asyncio.sleep(0)
+    assert seen == samples[: MAX_TAKEN - 1]
+    await asyncio.sleep(0)
+    assert seen == samples

@@ -78,10 +78,10 @@ def test_station_sample_must_be_newer_and_of_its_session() -> None:
 def test_station_age_is_that_of_its_pongs() -> None:
     station = StationInput(SESSION)
     assert station.ping(9, 100.0) == (9, 100_000_000)
-    assert not station.pong(Pong(9, 99_000_000, 0), 100.0)
-    assert not station.pong(Pong(8, 100_000_000, 0), 100.0)
-    assert station.pong(Pong(9, 100_000_000, 50_000_000), 100.0)
-    assert not station.pong(Pong(9, 100_000_000, 0), 100.0)
+    assert not station.pong(Pong(9, 99_000_000, 0), 1, 100.0)
+    assert not station.pong(Pong(8, 100_000_000, 0), 1, 100.0)
+    assert station.pong(Pong(9, 100_000_000, 50_000_000), 1, 100.0)
+    assert not station.pong(Pong(9, 100_000_000, 0), 1, 100.0)
     assert station.age(UpEnvelope(SESSION, 1, 51_000_000), 101.25) == pytest.approx(0.25)
 
 
@@ -130,6 +130,22 @@ def test_repetition_of_a_refused_command_is_refused_until_its_sender_could_know(
     assert not station.is_late(command(0), 0.1, 100.3)
 
 
+def test_stop_of_unknown_age_is_taken_and_an_old_one_is_not() -> None:
+    land = received(dialect.MAVLink_command_long_message(1, 1, dialect.MAV_CMD_NAV_LAND, *[0] * 8))
+    station = StationInput(SESSION)
+    assert not station.is_late(land, None, 100.0, is_stop=True)
+    assert station.is_late(land, 2.1, 100.0, is_stop=True)
+    assert station.is_late(command(), None, 100.0)
+
+
+def test_time_in_the_future_is_of_unknown_age() -> None:
+    offset = ClockOffset()
+    offset.answered(100.0, 50.1, 100.2)  # offset 50.0 ± 0.1
+    assert offset.age(51.1, 101.0) == pytest.approx(-0.1)
+    assert offset.age(51.19, 101.0) == pytest.approx(-0.19)
+    assert offset.age(51.21, 101.0) is None
+
+
 def test_refusal_answers_commands_only() -> None:
     answer = refusal_of(command())
     assert answer is not None
@@ -137,3 +153,19 @@ def test_refusal_answers_commands_only() -> None:
     assert answer.result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
     assert (answer.target_system, answer.target_component) == (255, 190)
     assert refusal_of(HEARTBEAT) is None
+
+
+def test_pings_try_each_system_until_one_is_answered() -> None:
+    station, held = StationInput(SESSION), {2, 5, 9}
+    assert [station.ping_system(held) for _ in range(4)] == [2, 5, 9, 2]
+    station.ping(9, 100.0)
+    assert station.pong(Pong(9, 100_000_000, 50_000_000), 5, 100.0)
+    assert [station.ping_system(held) for _ in range(2)] == [5, 5]
+    assert station.ping_system({2, 9}) == 9
+
+
+def test_pings_go_over_the_system_that_the_station_sent_to() -> None:
+    station, held = StationInput(SESSION), {2, 5, 9}
+    station.hear(9)
+    assert [station.ping_system(held) for _ in range(2)] == [9, 9]
+    assert station.ping_system({2, 5}) == 2

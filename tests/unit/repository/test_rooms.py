@@ -62,6 +62,7 @@ CORES = [
     *("drone/contention.py", "drone/piloting/sticks.py", "drone/sent_commands.py", "drone/video/picture_clock.py"),
     "drone/video/stream_intrinsics.py",
     *("fabric/claims.py", "fabric/envelope.py", "fabric/keys.py", "fabric/sample_age.py", "fabric/settings.py"),
+    "fabric/station_places.py",
     "fabric/system_state.py",
     *("relay/admission.py", "relay/dialogue.py", "relay/digest.py", "relay/feed.py", "relay/uri_host.py"),
     *("sim/autopilot/firmware.py", "sim/autopilot/flight.py", "sim/world/scramble.py"),
