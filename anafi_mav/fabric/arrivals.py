@@ -133,7 +133,10 @@ class SampleQueue:
         self._works: deque[Callable[[Any], None]] = deque()
 
     def add_sample(self, sample: FabricSample, *, is_urgent: bool = False) -> None:
-        """Add a sample. Never blocks for long. `is_urgent`: a ping or pong, which comes before the others."""
+        """Add a sample. Never blocks for long.
+
+        `is_urgent`: a ping or pong, which comes before the others.
+        """
         with self._ready:
             samples, limit = (self._urgent, MAX_URGENT) if is_urgent else (self._samples, self._limit)
             if len(samples) >= limit:

@@ -148,7 +148,10 @@ class StationInput:
         return ping
 
     def pong(self, pong: Pong, sysid: int, now: float) -> bool:
-        """Note the answer to a ping over a system's key; False for one that was not sent, or has been answered."""
+        """Note the answer to a ping over a system's key; False for an unexpected one.
+
+        It was not sent, or has been answered.
+        """
         ping = Ping(pong.session, pong.ping_sent)
         if ping not in self._pings:
             return False

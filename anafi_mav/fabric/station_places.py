@@ -1,4 +1,4 @@
-"""Places for stations: how many there may be at once, and the order of those that wait. No I/O."""
+"""Places for stations: how many at once, and the order of those that wait. No I/O."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ class StationPlaces:
         return False
 
     def leave(self, station: str) -> str | None:
-        """Forget a station; return the one that has waited longest and gets its place, if there is one."""
+        """Forget a station; return the one that gets its place, if there is one.
+
+        It is the one that has waited longest.
+        """
         self._waiting.pop(station, None)
         self._served.discard(station)
         if not self._waiting or len(self._served) >= self._limit:

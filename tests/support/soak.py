@@ -157,7 +157,9 @@ drone reports no end of it."""
 
 BEGINNINGS = ("ground", "hover", "hover", "mission")
 
-DEFECTS: dict[str, str] = {}
+DEFECTS: dict[str, str] = {
+    "mission is continued by another controller, and there is none": "late report of a withdrawn start",
+}
 """Known defects, by what their failures end with."""
 
 WEIGHTS = {
