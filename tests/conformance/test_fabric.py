@@ -206,7 +206,7 @@ async def test_station_that_answers_no_ping_can_return_and_not_take_off() -> Non
             samples = session.declare_subscriber(f"anafi/1/down/{name}")
             token = session.liveliness().declare_token(f"anafi/station/v1/{name}")
             await asyncio.to_thread(samples.recv)
-            for number, command in enumerate((own.MAV_CMD_NAV_RETURN_TO_LAUNCH, own.MAV_CMD_NAV_TAKEOFF), 1):
+            for number, command in enumerate((own.MAV_CMD_NAV_TAKEOFF, own.MAV_CMD_NAV_RETURN_TO_LAUNCH), 1):
                 sent = own.MAVLink_command_long_message(1, 1, command, *[0] * 8)
                 raw = frame(pack(sent), number, 255, 190)
                 session.put(f"anafi/1/up/{name}", raw, attachment=UpEnvelope(7, number, 0).encode())
