@@ -113,7 +113,7 @@ class FabricEndpoint(Endpoint):
         self._stations: dict[str, _Station] = {}
         self._places = StationPlaces(url.options.max_clients)
         self._readers: set[int] = set()
-        """Systems whose frames to all somebody reads."""
+        """Systems whose frames to all have a reader."""
         self._open_lane: _Lane | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._stated = -STATE_EVERY

@@ -340,7 +340,7 @@ class Takeoff(PlainTask):
         vehicle = self._vehicle
         if not vehicle.in_air:
             await vehicle.drone.expect(FlyingStateChanged, lambda m: m.state in AIRBORNE, CLIMB_WAIT)
-        # What it told last is from while it rose.
+        # Its last report is from while it rose.
         present = (await vehicle.drone.expect(AltitudeChanged, timeout=ALTITUDE_WAIT)).altitude
         if not vehicle.in_air or vehicle.returning:
             raise Rejected(vehicle.activity)

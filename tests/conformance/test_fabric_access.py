@@ -112,7 +112,7 @@ async def test_router_lets_each_certificate_do_what_it_may_and_no_more(authority
     assert station.received == {("gateway-north", f"anafi/1/down/{STATION}"), ("gateway-north", "anafi/1/down")}
     assert observer.received == {("gateway-north", "anafi/1/down")}
     assert stranger.received == set()
-    # Nobody takes the system id of a gateway, and an observer is no station.
+    # No program takes the system id of a gateway, and an observer is no station.
     assert north.tokens == {("station", "station/v1")}
     assert station.tokens == {("gateway-north", "1/drone/v1")}
     assert observer.tokens == station.tokens | north.tokens

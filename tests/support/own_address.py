@@ -8,7 +8,7 @@ import socket
 import pytest
 
 ELSEWHERE = "198.51.100.1"
-"""Nobody has it (RFC 5737)."""
+"""No computer has it (RFC 5737)."""
 
 
 def own_address() -> str:

@@ -35,7 +35,6 @@ PRODUCT = {
         ("_commander", "_open"), "at the end of a test nothing may wait for an answer of the drone"
     ),
     "conformance/test_extending.py": {"_CODECS": "an invented message is removed, so that no other test finds it"},
-    "conformance/test_params_kept.py": {"_WRITER": "a slow memory card: the thread that writes files is kept busy"},
     "support/callers.py": dict.fromkeys(
         ("_act", "_return_or_hold", "_on_playing", "_expired", "_let_go"),
         "what acts without a client is called where its timer or task calls it: each would need a flight of its own",
