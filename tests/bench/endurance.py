@@ -144,6 +144,7 @@ class BenchClient(asyncio.DatagramProtocol):
         self.sysid = 251 + number
         self.is_ardupilot = number % 2 == 1
         self.armed: dict[int, bool] = {}
+        self.states: dict[int, str] = {}
         self.commands: dict[tuple[int, int], list[Commanded]] = defaultdict(list)
         """By drone and MAV_CMD."""
         self.texts: list[tuple[float, int, str]] = []
@@ -242,6 +243,7 @@ class BenchClient(asyncio.DatagramProtocol):
         if kind == "HEARTBEAT":
             if m.get_srcComponent() == 1:
                 self.armed[drone] = bool(m.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+                self.states[drone] = f"mode {m.custom_mode:#x}, status {m.system_status}"
         elif kind == "STATUSTEXT":
             self.texts.append((now, drone, m.text))
         elif m.target_system != self.sysid:
@@ -533,11 +535,21 @@ class Endurance:
             if not flying and not self._steps and not self._open():
                 break
         else:
-            self.wrong.append(f"no rest within {REST_LIMIT:g} s: {flying} fly, {self._open()} are open")
+            states = [f"{drone} ({pilot.states.get(drone)}, {self._landings(drone)})" for drone in flying]
+            self.wrong.append(f"no rest within {REST_LIMIT:g} s: armed {states}, open {self._open()}")
         await asyncio.sleep(35.0)  # beyond the idle limit of UDP clients that a lost connection has left
         assert self.gateway is not None
         self.gateway.send_signal(signal.SIGUSR1)
         return await asyncio.wait_for(self.reports.get(), 10.0)
+
+    def _landings(self, drone: int) -> str:
+        """Return the results of the last commands to land, and the last texts of a drone."""
+        pilot = self.clients[0]
+        results = [
+            one.results[0][1] if one.results else None for one in pilot.commands[drone, mavlink.MAV_CMD_NAV_LAND]
+        ]
+        texts = [text for _, system, text in pilot.texts if system == drone]
+        return f"land {results[-5:]} of {len(results)}, {texts[-4:]}"
 
     def _open(self) -> list[str]:
         """Commands without a final result, whose limit has not passed."""
