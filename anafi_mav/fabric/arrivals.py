@@ -73,25 +73,27 @@ class ArrivalQueue:
         `wake` is called in the other thread when the loop has to call `take`.
         """
         self._counters = counters
+        counters["dropped_arrivals"] = 0  # another thread adds to it: it must not change the size meanwhile
         self._wake = wake
         self._lock = threading.Lock()
         self._waiting: deque[Arrival] = deque()
         self._samples = 0
 
-    def put(self, arrival: Arrival) -> None:
-        """Add a report. In any thread."""
+    def put(self, arrival: Arrival) -> bool:
+        """Add a report; return False when there is no room for it. In any thread."""
         with self._lock:
             is_sample = isinstance(arrival, FabricSample)
             if is_sample and self._samples >= MAX_SAMPLES:
                 self._drop_oldest()
             elif not is_sample and len(self._waiting) - self._samples >= MAX_CHANGES:
                 self._counters["dropped_arrivals"] += 1
-                return
+                return False
             self._samples += is_sample
             self._waiting.append(arrival)
             is_first = len(self._waiting) == 1
         if is_first:
             self._wake()
+        return True
 
     def take(self, limit: int = MAX_SAMPLES + MAX_CHANGES) -> list[Arrival]:
         """Return what waits, oldest first, `limit` reports at most.

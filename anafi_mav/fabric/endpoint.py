@@ -117,6 +117,8 @@ class FabricEndpoint(Endpoint):
         self._open_lane: _Lane | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._stated = -STATE_EVERY
+        self._states: dict[int, bytes] = {}
+        """The newest published state of each system, which queries get."""
         self._listed = asyncio.Event()
         """Set once all tokens have been reported."""
         self._reported: set[int] = set()
@@ -373,6 +375,7 @@ class FabricEndpoint(Endpoint):
             for sysid in sorted(self.claims.held):
                 state = self._systems.state(sysid, self._connection.session_text)
                 if state is not None:
+                    self._states[sysid] = state
                     self._connection.publish(self._connection.keys.state(sysid), state)
 
     def _ping_if_due(self, name: str, now: float) -> None:
@@ -391,8 +394,6 @@ class FabricEndpoint(Endpoint):
 
     def _answer(self, query: StateQuery) -> None:
         key, session = self._connection.keys.parse(query.key), self._connection.zenoh
-        if key is not None and key.sysid in self.claims.held:
-            state = self._systems.state(key.sysid, self._connection.session_text)
-            if state is not None:
-                session.reply(query.query, query.key, state)
+        if key is not None and key.sysid in self.claims.held and key.sysid in self._states:
+            session.reply(query.query, query.key, self._states[key.sysid])
         session.finish(query.query)

@@ -24,6 +24,7 @@ from anafi_mav.fabric.arrivals import (
     TokenChange,
     TokensListed,
 )
+from anafi_mav.fabric.envelope import MAX_SAMPLE
 
 logger = logging.getLogger(__name__)
 
@@ -36,6 +37,12 @@ RETRY_PAUSE = 0.5
 LIST_LIMIT = 2.0
 """s for a list of the tokens that exist."""
 
+MAX_QUERIES = 64
+"""Queries that may be open at once: each waits for the event loop and for the thread that publishes."""
+
+MAX_ATTACHMENT = 64
+"""Bytes; an envelope has fewer. What is larger is not copied."""
+
 NO_LINK = "no answer"
 
 
@@ -43,9 +50,12 @@ class ZenohSession:
     """A session from `start` to `stop`. Everything asked of it before it is open is done then."""
 
     def __init__(
-        self, settings: Mapping[str, Any], queue: SampleQueue, report: Callable[[Arrival], None], *, retries: bool
+        self, settings: Mapping[str, Any], queue: SampleQueue, report: Callable[[Arrival], bool], *, retries: bool
     ) -> None:
-        """`report` is called in other threads. `retries`: the first attempt to open may fail."""
+        """`report` is called in other threads, and returns False for what has no room.
+
+        `retries`: the first attempt to open may fail.
+        """
         self.opened = threading.Event()
         """Set when the first attempt to open has ended."""
         self.failure = ""
@@ -57,6 +67,7 @@ class ZenohSession:
         self._report = report
         self._retries = retries
         self._stopping = threading.Event()
+        self._free_queries = threading.BoundedSemaphore(MAX_QUERIES)
         self._declared: dict[tuple[str, str], Any] = {}
         """Subscribers, tokens, publishers and queryables, by kind and key."""
         self._is_up: bool | None = None
@@ -116,10 +127,16 @@ class ZenohSession:
         self._declare("publisher", key, declare)
 
     def answer_queries(self, expression: str) -> None:
-        """Report queries for this key."""
+        """Report queries for this key, `MAX_QUERIES` at once; further ones end without an answer.
+
+        Each that is reported has to be ended by `finish`.
+        """
 
         def report(query: zenoh.Query) -> None:
-            self._report(StateQuery(expression, query))
+            if not self._free_queries.acquire(blocking=False):
+                query.drop()  # type: ignore[no-untyped-call]
+            elif not self._report(StateQuery(expression, query)):
+                self._end_query(query)
 
         self._declare("queries", expression, lambda session: session.declare_queryable(expression, report))
 
@@ -138,9 +155,13 @@ class ZenohSession:
 
     def finish(self, query: Any) -> None:
         """End a query after its answers."""
-        self._queue.add_work(lambda session: query.drop())
+        self._queue.add_work(lambda session: self._end_query(query))
 
     # In the thread.
+
+    def _end_query(self, query: zenoh.Query) -> None:
+        self._free_queries.release()
+        query.drop()  # type: ignore[no-untyped-call]
 
     def _declare(self, kind: str, key: str, declare: Callable[[zenoh.Session], Any]) -> None:
         def work(session: zenoh.Session) -> None:
@@ -233,8 +254,12 @@ class ZenohSession:
     # In zenoh's threads.
 
     def _sample(self, sample: zenoh.Sample) -> None:
-        attachment = b"" if sample.attachment is None else sample.attachment.to_bytes()
-        self._report(FabricSample(str(sample.key_expr), sample.payload.to_bytes(), attachment))
+        attachment = sample.attachment
+        if len(sample.payload) > MAX_SAMPLE or (attachment is not None and len(attachment) > MAX_ATTACHMENT):
+            self._report(FabricSample(str(sample.key_expr), b"", b""))  # an empty one counts as bad
+            return
+        raw = b"" if attachment is None else attachment.to_bytes()
+        self._report(FabricSample(str(sample.key_expr), sample.payload.to_bytes(), raw))
 
     def _token(self, sample: zenoh.Sample) -> None:
         self._report(TokenChange(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT))

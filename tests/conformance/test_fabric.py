@@ -40,6 +40,14 @@ async def flown(**more: Any) -> AsyncIterator[tuple[World, RouterProcess]]:
         yield w, node
 
 
+def opened(node: RouterProcess) -> zenoh.Session:
+    """A session of another program at the router."""
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([f"tcp/127.0.0.1:{node.port}"]))
+    return zenoh.open(config)
+
+
 def counted(w: World, name: str) -> int:
     return w.gateway.counters()[name]
 
@@ -57,10 +65,7 @@ async def test_station_on_the_fabric_flies_a_mission_and_downloads_a_picture() -
 
 async def test_state_of_a_system_is_published_and_answered() -> None:
     async with router() as node, world(endpoints=(node.url,)):
-        config = zenoh.Config()
-        config.insert_json5("mode", '"client"')
-        config.insert_json5("connect/endpoints", json.dumps([f"tcp/127.0.0.1:{node.port}"]))
-        with await asyncio.to_thread(zenoh.open, config) as session:
+        with await asyncio.to_thread(opened, node) as session:
             samples = session.declare_subscriber("anafi/1/state")
             published = await asyncio.to_thread(samples.recv)
             (reply,) = await asyncio.to_thread(lambda: list(session.get("anafi/*/state")))
@@ -198,11 +203,8 @@ async def test_end_of_a_token_without_an_action_is_no_loss() -> None:
 async def test_station_that_answers_no_ping_can_return_and_not_take_off() -> None:
     async with router() as node, world(endpoints=(node.url,)) as w:
         await w.take_off()
-        config = zenoh.Config()
-        config.insert_json5("mode", '"client"')
-        config.insert_json5("connect/endpoints", json.dumps([f"tcp/127.0.0.1:{node.port}"]))
         name = f"{7:016x}-1"
-        with await asyncio.to_thread(zenoh.open, config) as session:
+        with await asyncio.to_thread(opened, node) as session:
             samples = session.declare_subscriber(f"anafi/1/down/{name}")
             token = session.liveliness().declare_token(f"anafi/station/v1/{name}")
             await asyncio.to_thread(samples.recv)
@@ -213,3 +215,36 @@ async def test_station_that_answers_no_ping_can_return_and_not_take_off() -> Non
             await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.returning, timeout=10.0)
             assert counted(w, "late_commands") == 1
             token.undeclare()
+
+
+async def test_oversized_samples_are_counted_and_disturb_no_station() -> None:
+    async with router() as node, world(endpoints=(node.url,)) as w:
+        name = f"{7:016x}-1"
+        with await asyncio.to_thread(opened, node) as session:
+            samples = session.declare_subscriber(f"anafi/1/down/{name}")
+            token = session.liveliness().declare_token(f"anafi/station/v1/{name}")
+            await asyncio.to_thread(samples.recv)
+            session.put(f"anafi/1/up/{name}", bytes(1401), attachment=UpEnvelope(7, 1, 0).encode())
+            session.put(f"anafi/1/up/{name}", b"", attachment=bytes(65))
+            sent = own.MAVLink_command_long_message(1, 1, own.MAV_CMD_NAV_TAKEOFF, *[0] * 8)
+            raw = frame(pack(sent), 2, 255, 190)
+            session.put(f"anafi/1/up/{name}", raw, attachment=UpEnvelope(7, 2, 0).encode())
+            session.put(f"anafi/1/up/{name}/pong", b"")  # the last one that is counted
+            while counted(w, "bad_envelopes") < 3:
+                await asyncio.to_thread(samples.recv)
+            assert counted(w, "late_commands") == 1  # no ping was answered
+            token.undeclare()
+
+
+async def test_flood_of_queries_leaves_room_for_the_next_one() -> None:
+    """Queries beyond those that may be open end without an answer, and none stays open."""
+    async with router() as node, world(endpoints=(node.url,)):
+        with await asyncio.to_thread(opened, node) as session:
+            samples = session.declare_subscriber("anafi/1/state")
+            await asyncio.to_thread(samples.recv)
+            flood = [session.get("anafi/1/state", timeout=20.0) for _ in range(300)]
+            answers = await asyncio.to_thread(lambda: [len(list(replies)) for replies in flood])
+            assert set(answers) <= {0, 1}
+            assert sum(answers) > 0
+            (reply,) = await asyncio.to_thread(lambda: list(session.get("anafi/1/state")))
+            assert json.loads(reply.ok.payload.to_string())["version"] == 1

@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from collections import Counter
 
-from anafi_mav.fabric.arrivals import MAX_SAMPLES, MAX_URGENT, ArrivalQueue, FabricSample, SampleQueue, TokenChange
+from anafi_mav.fabric.arrivals import (
+    MAX_CHANGES,
+    MAX_SAMPLES,
+    MAX_URGENT,
+    ArrivalQueue,
+    FabricSample,
+    SampleQueue,
+    TokenChange,
+)
 
 
 def sample(number: int) -> FabricSample:
@@ -36,6 +44,15 @@ def test_full_arrival_queue_drops_the_oldest_sample_and_no_token() -> None:
     assert counters == {"dropped_arrivals": 2}
     queue.put(sample(0))
     assert queue.take() == [sample(0)]
+
+
+def test_report_without_room_is_refused_and_counted() -> None:
+    counters: Counter[str] = Counter()
+    queue = ArrivalQueue(lambda: None, counters)
+    assert all(queue.put(TokenChange("a", True)) for _ in range(MAX_CHANGES))
+    assert not queue.put(TokenChange("b", True))
+    assert counters == {"dropped_arrivals": 1}
+    assert queue.put(sample(1))
 
 
 def test_full_sample_queue_drops_the_oldest_and_counts_it() -> None:
