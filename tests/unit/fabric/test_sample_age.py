@@ -54,7 +54,7 @@ def test_ping_counts_for_a_minute() -> None:
 def test_clock_that_jumped_is_measured_again() -> None:
     offset = ClockOffset()
     offset.answered(100.0, 50.0, 100.0)
-    # The station slept for 20 s, in which its clock stood still.
+    # The station was suspended for 20 s, in which its clock did not run.
     offset.answered(130.0, 60.05, 130.1)
     assert offset.age(60.05, 130.05) == pytest.approx(0.0, abs=0.051)
 
