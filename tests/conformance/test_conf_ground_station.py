@@ -112,13 +112,13 @@ async def test_conf_112_long_texts_and_severities(flavour: str) -> None:
         zones = [circle(place, 30.0), circle(around(place, (9.0, 9.0))[0], 5.0, inclusion=False)]
         return_point = Item(dialect.MAV_CMD_NAV_FENCE_RETURN_POINT, *place, 5.0)
         assert (await upload(w.client, [*zones, return_point], dialect.MAV_MISSION_TYPE_FENCE)).type == 0
-        await w.client.heartbeat(lambda beat: True)
-        [(severity, fence)] = heard(w.client, mark)
+        assert await text(w.client, "Drone geofence set: 30 m", mark) == dialect.MAV_SEVERITY_NOTICE
+        [(severity, fence), _] = heard(w.client, mark)
         assert len(fence) > 50
         assert fence == "Fence: 1 inclusion circle, 1 exclusion circle; return point unused"
         assert severity == dialect.MAV_SEVERITY_INFO
-        chunks = [m for _, m in w.client.since(mark, "STATUSTEXT")]
-        assert {m.id for m in chunks} != {0}
+        chunks = [m for _, m in w.client.since(mark, "STATUSTEXT") if m.id]
+        assert len(chunks) == 2
         assert all(len(m.text) == 50 for m in chunks[:-1])
         for event, begins, severity in (
             (ardrone3.WindStateChanged(ardrone3.WarningLevel.WARNING), "Wind: warning", 4),
