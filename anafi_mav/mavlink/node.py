@@ -170,6 +170,10 @@ class Node:
         """
         self._router.add_host(sysid, compid, host)
 
+    def add_absent_host(self, sysid: int, host: Receiver) -> None:
+        """Deliver messages for this system to `host` while it has no other host, and none elsewhere."""
+        self._router.add_absent_host(sysid, host)
+
     def remove_hosts(self, sysid: int) -> None:
         """Stop delivering messages for this system, and route them to other systems with its id."""
         self._router.remove_hosts(sysid)
