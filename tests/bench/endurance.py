@@ -812,6 +812,9 @@ def main() -> int:
         Path(folder).mkdir(parents=True, exist_ok=True)
 
         async def whole() -> bool:
+            task = asyncio.current_task()
+            assert task is not None
+            asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
             run = Endurance(seed, given.minutes, given.drones, Path(folder), given.keep is not None)
             good = await run.run()
             for text, count in Counter(run.wrong).most_common(30):
