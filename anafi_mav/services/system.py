@@ -19,6 +19,7 @@ from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.access import COMMANDS
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.services.camera.camera_service import CameraService
@@ -34,7 +35,7 @@ from anafi_mav.services.command.guided_service import GuidedService
 from anafi_mav.services.command.modes_service import ModesService
 from anafi_mav.services.command.orbit_service import OrbitService
 from anafi_mav.services.command.running_actions import RunningActions
-from anafi_mav.services.component import BY_AUTOPILOT, COMMANDS, Component, joined
+from anafi_mav.services.component import BY_AUTOPILOT, Component, joined
 from anafi_mav.services.dropped_inputs import DroppedInputs, InputStream
 from anafi_mav.services.event.event_service import EventService
 from anafi_mav.services.ftp.log_service import LogService
@@ -556,7 +557,7 @@ class System:
         self._on_command = on_command
 
     def _receive_absent(self, inbound: Inbound) -> None:
-        """Answer a command while the drone is not connected: it has failed, and its sender gets a text.
+        """Answer a command, while the drone is not connected, with FAILED and a text.
 
         A sender without an answer could not know whether its Land is repeated, flown later or lost. Queries are not
         answered: stations send them by themselves, and would take each answer for a sign of the drone.
