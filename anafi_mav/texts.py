@@ -749,5 +749,6 @@ SYSTEM_ID_TAKEN = Template("System id {sysid}: another gateway has it on fabric"
 
 CONNECTION_REFUSED = Template("Connection refused by drone (status {status})", status=-99)
 OTHER_CONTROLLER = OperatorText("Drone connected to another controller")
+COMMAND_WITHOUT_DRONE = OperatorText("Command failed: drone not connected")
 RECONNECTING_IN = Template("Reconnecting in {seconds:.0f} s, or on a command", seconds=999)
 RECONNECTING_BY = Template("Reconnecting: command of system {system}", system=255)

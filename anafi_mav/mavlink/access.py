@@ -106,7 +106,7 @@ MAINTENANCE_COMMANDS = frozenset(
     }
 )
 
-_COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)
+COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)
 
 _FTP_OPCODE = 3
 """Byte of the payload of FILE_TRANSFER_PROTOCOL that holds the opcode (MAVLink ftp.md)."""
@@ -139,7 +139,7 @@ def needed_access(message: Any) -> Access:
     if message is None:
         return Access.CONTROL
     id = message.get_msgId()
-    if id in _COMMANDS:
+    if id in COMMANDS:
         if message.command in OBSERVED_COMMANDS:
             return Access.OBSERVE
         return Access.ALL if message.command in MAINTENANCE_COMMANDS else Access.CONTROL

@@ -20,7 +20,7 @@ from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.endpoint_options import EndpointConfig
 from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.access import Access, needed_access
+from anafi_mav.mavlink.access import COMMANDS, Access, needed_access
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, reason
 from anafi_mav.mavlink.channel import Channel, total
 from anafi_mav.mavlink.endpoint import EndpointFactory, make_endpoint, parse_endpoint
@@ -50,6 +50,8 @@ class Inbound(msgspec.Struct, frozen=True):
     """When it arrived, by the clock's monotonic time."""
     is_permitted: bool = True
     """False when it needs more than the access of its channel: it must have no effect."""
+    is_late: bool = False
+    """True for a command that may have been sent while the host stalled: nothing but a stop may come of it."""
 
 
 Receiver = Callable[[Inbound], None]
@@ -170,6 +172,10 @@ class Node:
         """
         self._router.add_host(sysid, compid, host)
 
+    def add_absent_host(self, sysid: int, host: Receiver) -> None:
+        """Deliver messages for this system to `host` while it has no other host, and none elsewhere."""
+        self._router.add_absent_host(sysid, host)
+
     def remove_hosts(self, sysid: int) -> None:
         """Stop delivering messages for this system, and route them to other systems with its id."""
         self._router.remove_hosts(sysid)
@@ -270,7 +276,8 @@ class Node:
                 continue
             if old:
                 self._closed_counters["stale"] += 1
-                continue
+                if received.id not in COMMANDS:
+                    continue
             if received.id == dialect.MAVLINK_MSG_ID_SETUP_SIGNING:
                 # Before the log and the hosts: it holds a key.
                 if self._on_setup_signing is not None:
@@ -278,7 +285,7 @@ class Node:
                     self._guarded(self._on_setup_signing, inbound)
                 continue
             message_logger.debug("%s: %s", channel.name, received.message)
-            inbound = Inbound(received.message, channel, received.sysid, received.compid, now, permitted)
+            inbound = Inbound(received.message, channel, received.sysid, received.compid, now, permitted, old)
             for host in route.hosts:
                 self._guarded(host, inbound)
 

@@ -52,6 +52,8 @@ class Router(Generic[KeyT, HostT]):
         self._channels: dict[KeyT, set[tuple[int, int]]] = {}
         self._hosts: dict[int, dict[int, HostT]] = {}
         """Our hosts by system and component, in that order."""
+        self._absent_hosts: dict[int, HostT] = {}
+        """Our hosts of systems without another host."""
         self.own_sources: set[tuple[int, int]] = set()
         """Systems and components in whose name we have sent: frames from them are echoes, and not learned from."""
         self._recent: OrderedDict[bytes, float] = OrderedDict()
@@ -75,6 +77,13 @@ class Router(Generic[KeyT, HostT]):
     def remove_hosts(self, sysid: int) -> None:
         """This system is not ours at present, e.g. because its drone is disconnected."""
         self._hosts.pop(sysid, None)
+
+    def add_absent_host(self, sysid: int, host: HostT) -> None:
+        """Route messages for this system to `host` while it has no other host.
+
+        A component of it that is heard on a channel, of another gateway for example, gets its messages itself.
+        """
+        self._absent_hosts[sysid] = host
 
     def hosts(self, system: int, component: int, reached: Container[int] | None = None) -> tuple[HostT, ...]:
         """Return our hosts that a target addresses, of the systems in `reached` (None: of all).
@@ -131,6 +140,8 @@ class Router(Generic[KeyT, HostT]):
         if reached is not None and target != 0 and target not in reached:
             self.counters["refused_systems"] += 1
             destinations = []
+        elif received.message is not None and target not in self._hosts:
+            hosts = hosts or self._absent_host(target, component)
         forward = tuple([other for other in destinations if other != channel])
         if forward:
             if self._is_repeated(received.identity, now):
@@ -138,6 +149,10 @@ class Router(Generic[KeyT, HostT]):
                 forward = ()
             self.counters["forwarded"] += len(forward)
         return Route(hosts, forward)
+
+    def _absent_host(self, target: int, component: int) -> tuple[HostT, ...]:
+        host = self._absent_hosts.get(target)
+        return () if host is None or self.heard_on(target, component or None) else (host,)
 
     def _destinations(self, target: int, component: int, id: int) -> list[KeyT]:
         if id == dialect.MAVLINK_MSG_ID_SETUP_SIGNING:

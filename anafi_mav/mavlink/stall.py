@@ -2,8 +2,7 @@
 
 A stopped or overloaded process finds in its sockets what arrived while it could not read: setpoints of a program that
 has ended since, commands whose client waits no longer. They carry no time of their own, and must not be carried out
-as
-if they were new.
+as if they were new. A command is still handed to its host: a stop is carried out, and others are refused.
 """
 
 from __future__ import annotations

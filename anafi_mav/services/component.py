@@ -20,14 +20,14 @@ from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.access import Access
+from anafi_mav.mavlink.access import COMMANDS, Access
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.router import EVERY_COMPONENT
 from anafi_mav.services.command.command_service import CommandService
 from anafi_mav.services.command.operator_need import ACKNOWLEDGEMENTS, need_of
 from anafi_mav.services.command.running_actions import RunningActions
-from anafi_mav.services.commands import Action
+from anafi_mav.services.commands import Action, Effect
 from anafi_mav.services.definition_link import DefinitionLink
 from anafi_mav.services.dropped_inputs import InputStream
 from anafi_mav.services.flavours import Flavour, flavour_of
@@ -51,7 +51,6 @@ logger = logging.getLogger(__name__)
 DENIED_EVERY = 5.0
 """s before a channel gets the text about its access again: setpoints arrive many times a second."""
 
-COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)
 
 BY_MESSAGE = (
     dialect.MAV_CMD_REQUEST_MESSAGE,
@@ -261,6 +260,9 @@ class Component:
                 self._deny(inbound)
             elif (reason := self._objection(inbound)) is not None:
                 self._refuse(inbound, reason)
+            elif inbound.is_late and not self._may_be_late(inbound):
+                self._answer_refused(inbound, dialect.MAV_RESULT_TEMPORARILY_REJECTED, texts.COMMAND_LATE)
+                self.text(Severity.WARNING, texts.COMMAND_LATE, inbound.channel)
             else:
                 handler(inbound)
         except AnafiMavError as error:  # the drone's link may just have died
@@ -280,6 +282,14 @@ class Component:
         if operators.is_free or inbound.sysid == operators.operator:
             return None
         return operators.objection(inbound.sysid, need_of(inbound, self.commands.action_of))
+
+    def _may_be_late(self, inbound: Inbound) -> bool:
+        """Return True for a query, Hold, Land and Return.
+
+        A person must always be able to stop the drone. A disarming is none of these: by force it cuts the motors.
+        """
+        command = self.commands.action_of(inbound)
+        return command is None or command.effect in (Effect.HOLD, Effect.LAND, Effect.RETURN)
 
     def input_objection(self, inbound: Inbound) -> OperatorText | None:
         """Return the reason for which a stick, setpoint or target is refused, and count it.

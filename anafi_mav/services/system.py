@@ -1,7 +1,8 @@
 """One MAVLink system: the components of one drone on every channel while its link is up.
 
 Messages come in from the node by their addressing, answers go back to the asking channel alone, streams go to
-every channel at its own rate. While the drone's link is down the system does not exist: no heartbeat, no answer.
+every channel at its own rate. While the drone's link is down the system sends no heartbeat and no telemetry, and
+commands are answered with FAILED.
 """
 
 from __future__ import annotations
@@ -13,13 +14,14 @@ from collections.abc import Callable, Coroutine, Hashable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from anafi_mav import texts
 from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.access import COMMANDS
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound, Node
-from anafi_mav.mavlink.router import EVERY_COMPONENT
 from anafi_mav.services.camera.camera_service import CameraService
 from anafi_mav.services.camera.capture_service import CaptureService
 from anafi_mav.services.camera.panorama_service import PanoramaService
@@ -33,7 +35,7 @@ from anafi_mav.services.command.guided_service import GuidedService
 from anafi_mav.services.command.modes_service import ModesService
 from anafi_mav.services.command.orbit_service import OrbitService
 from anafi_mav.services.command.running_actions import RunningActions
-from anafi_mav.services.component import BY_AUTOPILOT, COMMANDS, Component, joined
+from anafi_mav.services.component import BY_AUTOPILOT, Component, joined
 from anafi_mav.services.dropped_inputs import DroppedInputs, InputStream
 from anafi_mav.services.event.event_service import EventService
 from anafi_mav.services.ftp.log_service import LogService
@@ -247,6 +249,9 @@ class System:
         ]
         self._subscribed: dict[type[Message], tuple[EventHandler, ...]] = {}
         """The handlers of each kind of event, in the order in which they are called."""
+        self._on_command: Callable[[Inbound], None] | None = None
+        """Called with each command while the drone is not connected."""
+        node.add_absent_host(sysid, self._receive_absent)
 
     @property
     def position(self) -> SystemPosition | None:
@@ -545,19 +550,29 @@ class System:
     # What clients send.
 
     def listen(self, on_command: Callable[[Inbound], None] | None) -> None:
-        """Call `on_command` with each command to the system while the system does not exist.
+        """Call `on_command` with each command to the system while the drone is not connected.
 
         Queries are excluded. None ends this. Commands to any of its components count, but not those to all systems.
         """
-        assert not self.active
+        self._on_command = on_command
 
-        def receive(inbound: Inbound) -> None:
-            if on_command is not None and inbound.is_permitted and self._commands_us(inbound.message):
-                on_command(inbound)
+    def _receive_absent(self, inbound: Inbound) -> None:
+        """Answer a command, while the drone is not connected, with FAILED and a text.
 
-        self._node.remove_hosts(self.sysid)
-        if on_command is not None:
-            self._node.add_host(self.sysid, EVERY_COMPONENT, receive)
+        A sender without an answer could not know whether its Land is repeated, flown later or lost. Queries are not
+        answered: stations send them by themselves, and would take each answer for a sign of the drone.
+        """
+        message = inbound.message
+        if not self._commands_us(message):
+            return
+        if inbound.is_permitted and self._on_command is not None:
+            self._on_command(inbound)
+        for text in self._texts.messages(Severity.WARNING, texts.COMMAND_WITHOUT_DRONE):
+            self._node.send(text, sysid=self.sysid, compid=AUTOPILOT, to=inbound.channel)
+        if message.get_msgId() in COMMANDS:
+            compid = message.target_component or self.owner(message).compid
+            answer = _answer(inbound, dialect.MAV_RESULT_FAILED)
+            self._node.send(answer, sysid=self.sysid, compid=compid, to=inbound.channel)
 
     def _commands_us(self, message: Any) -> bool:
         """Return True for a command to this system by its id that is no query."""
@@ -570,7 +585,7 @@ class System:
         """Answer a command to one of the components in `ABSENT` alone: it is unsupported."""
         message = inbound.message
         if message.get_msgId() in COMMANDS and message.target_system == self.sysid and message.target_component:
-            answer = _unsupported(inbound)
+            answer = _answer(inbound, dialect.MAV_RESULT_UNSUPPORTED)
             self._node.send(answer, sysid=self.sysid, compid=message.target_component, to=inbound.channel)
 
     def channel_closed(self, channel: Channel) -> None:
@@ -581,10 +596,7 @@ class System:
             service.channel_closed(channel)
 
 
-def _unsupported(inbound: Inbound) -> dialect.MAVLink_command_ack_message:
+def _answer(inbound: Inbound, result: int) -> dialect.MAVLink_command_ack_message:
     return dialect.MAVLink_command_ack_message(
-        inbound.message.command,
-        dialect.MAV_RESULT_UNSUPPORTED,
-        target_system=inbound.sysid,
-        target_component=inbound.compid,
+        inbound.message.command, result, target_system=inbound.sysid, target_component=inbound.compid
     )

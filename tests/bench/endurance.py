@@ -3,6 +3,7 @@
     .venv/bin/python tests/bench/endurance.py                   # 30 minutes, 20 drones, 4 clients
     .venv/bin/python tests/bench/endurance.py --minutes 5       # in a sixth of the time: not the goal's figures
     .venv/bin/python tests/bench/endurance.py --seed 4711       # the same plan of steps again
+    .venv/bin/python tests/bench/endurance.py --keep FOLDER     # with the logs of clients, simulators and gateway
 
 Simulated drones, clients and gateway are separate processes; the drones are in two, each of which is killed and started
 again now and then. Their links are interrupted for up to 10 s, and clients drop their connection without a goodbye. The
@@ -18,8 +19,12 @@ After a rest both simulators are started again.
 | tasks, files and sockets at the end | as after a sixth |
 | final results of each command (IN_PROGRESS before it is allowed) | one |
 | a command that FAILED while its drone was silent | with a text of that drone |
-| a command without a result | sent when the link was lost, with a text of that drone |
+| a command without a result | none; queries that were sent while the drone was not connected excepted |
 | the gateway's process and its stderr | runs, no traceback |
+
+A command that changes something is answered in a silence, too: with FAILED and a text, or its sender could not know
+whether it is flown later. A query has no answer then: stations send queries by themselves, and an answer would look to
+them like a sign of the drone.
 
 Exit status 1 when one of these is exceeded. A run in which this computer lost datagrams for a client is void.
 """
@@ -43,7 +48,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import Any, TextIO
 
 import yaml
 from common import ROOT, loopback, machine
@@ -68,10 +73,14 @@ DROP_EVERY = 60.0
 
 ANSWER_LIMIT = 150.0
 """s for a final result: a landing from the greatest height is one."""
+QUERY_LIMIT = 10.0
+"""s for the result of a query, which is answered at once or never."""
 FILE_LIMIT = 5.0
 """s for an answer to a request of the file or mission protocol, before it is sent again."""
 REST_LIMIT = 240.0
 """s for the drones to land and for what is left of the steps to end."""
+LAND_AGAIN = 10.0
+"""s without a final result after which a rest sends Land again. A drone must land whatever became of the first one."""
 TEXT_WITHIN = 5.0
 """s before or after a FAILED in which its text has arrived."""
 SILENT_AFTER = 3.0
@@ -81,6 +90,9 @@ SILENT_FOR, RECONNECTED_AFTER = 2.0, 12.0
 MEMORY_LIMIT = 1.05
 PHASES = (1 / 6, 1 / 6, 2 / 3)
 """Shares of the time, each of which ends with a rest."""
+
+QUERIES = {mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_CMD_USER_1}
+"""Commands of the steps that change nothing."""
 
 HOME = (48.8789, 2.3677, 35.0)
 NAN = float("nan")
@@ -94,6 +106,7 @@ KINDS = {
     mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL,
 }
 """Messages that are decoded: decoding all of them would take the core that the gateway needs."""
+LOGGED = {"HEARTBEAT", "STATUSTEXT", "COMMAND_LONG", "COMMAND_INT", "COMMAND_ACK"}
 
 
 # -- the gateway's process
@@ -134,12 +147,22 @@ class Commanded:
     command: int
     results: list[tuple[float, int]] = field(default_factory=list)
     """(time, MAV_RESULT), without IN_PROGRESS."""
+    is_abandoned: bool = False
+    """A lost connection of the client left it without an answer."""
+    repeated: int = 0
+    """How often it was sent again because no final result had arrived."""
+
+    def is_open(self, now: float) -> bool:
+        """Whether its final result is awaited."""
+        limit = QUERY_LIMIT if self.command in QUERIES else ANSWER_LIMIT
+        return not self.results and not self.is_abandoned and now - self.at < limit
 
 
 class BenchClient(asyncio.DatagramProtocol):
     """One MAVLink client of all drones, over TCP or UDP."""
 
-    def __init__(self, host: str, number: int) -> None:
+    def __init__(self, host: str, number: int, log: TextIO | None) -> None:
+        self._log = log
         self.number, self.host, self.port = number, host, PORTS[number]
         self.sysid = 251 + number
         self.is_ardupilot = number % 2 == 1
@@ -150,8 +173,6 @@ class BenchClient(asyncio.DatagramProtocol):
         self.texts: list[tuple[float, int, str]] = []
         self.unexpected: list[str] = []
         """Final results without a command."""
-        self.abandoned: set[int] = set()
-        """Identities of commands that a lost connection of this client left without an answer."""
         self.lost_datagrams = 0
         self.waiting: dict[tuple[str, int], asyncio.Queue[Any]] = {}
         """Answers of a protocol of a drone, while a step waits for them."""
@@ -178,8 +199,8 @@ class BenchClient(asyncio.DatagramProtocol):
     async def drop(self, rest: float) -> None:
         """Lose the connection without a goodbye, and connect again after a while."""
         self.close()
-        for open_ones in self.commands.values():
-            self.abandoned |= {id(one) for one in open_ones if not one.results}
+        for one in [one for sent in self.commands.values() for one in sent]:
+            one.is_abandoned = one.is_abandoned or not one.results
         await asyncio.sleep(rest)
         await self.connect()
 
@@ -206,11 +227,19 @@ class BenchClient(asyncio.DatagramProtocol):
     def send(self, message: Any) -> None:
         if not self._tasks:  # the connection is lost: what a step still sends goes nowhere
             return
+        self._note("out", message)
         data = message.pack(self._out)
         if URLS[self.number] == "tcpin":
             self._transport.write(data)
         else:
             self._transport.sendto(data)
+
+    def _note(self, way: str, m: Any) -> None:
+        if self._log is not None and m.get_type() in LOGGED:
+            entry = {"t": round(time.monotonic(), 3), "client": self.number, "way": way, **m.to_dict()}
+            if way == "in":
+                entry["from"] = f"{m.get_srcSystem()}/{m.get_srcComponent()}"
+            print(json.dumps(entry, default=str), file=self._log, flush=True)
 
     async def _beat(self) -> None:
         while True:
@@ -242,20 +271,25 @@ class BenchClient(asyncio.DatagramProtocol):
         kind, drone = m.get_type(), m.get_srcSystem()
         if kind == "HEARTBEAT":
             if m.get_srcComponent() == 1:
+                if self.states.get(drone) != f"mode {m.custom_mode:#x}, status {m.system_status}":
+                    self._note("in", m)
                 self.armed[drone] = bool(m.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
                 self.states[drone] = f"mode {m.custom_mode:#x}, status {m.system_status}"
         elif kind == "STATUSTEXT":
+            self._note("in", m)
             self.texts.append((now, drone, m.text))
         elif m.target_system != self.sysid:
             return
         elif kind == "COMMAND_ACK":
+            self._note("in", m)
             if m.result == mavlink.MAV_RESULT_IN_PROGRESS:
                 return
-            for one in self.commands[drone, m.command]:
-                if not one.results and id(one) not in self.abandoned:
+            sent = self.commands[drone, m.command]
+            for one in reversed(sent):
+                if not one.results and not one.is_abandoned:
                     one.results.append((now, m.result))
                     return
-            if any(id(one) in self.abandoned for one in self.commands[drone, m.command]):
+            if any(one.is_abandoned for one in sent):
                 return
             self.unexpected.append(f"drone {drone}: {m.command} is answered once more, with {m.result}")
         else:
@@ -267,7 +301,8 @@ class BenchClient(asyncio.DatagramProtocol):
 
     def is_open(self, drone: int, command: int) -> bool:
         """Whether a command of the same kind to the drone waits for its result."""
-        return any(not one.results and id(one) not in self.abandoned for one in self.commands[drone, command])
+        now = time.monotonic()
+        return any(one.is_open(now) for one in self.commands[drone, command])
 
     def command(self, drone: int, command: int, *params: float, component: int = 1) -> None:
         if not self._tasks or self.is_open(drone, command):
@@ -276,10 +311,22 @@ class BenchClient(asyncio.DatagramProtocol):
         values = [*params, *[0.0] * (7 - len(params))]
         self.send(mavlink.MAVLink_command_long_message(drone, component, command, 0, *values))
 
+    def land(self, drone: int) -> None:
+        """Send Land; one without a final result again after a while, as the command protocol has it."""
+        now, land = time.monotonic(), mavlink.MAV_CMD_NAV_LAND
+        for one in self.commands[drone, land]:
+            if not one.is_open(now):
+                continue
+            if now - one.at > LAND_AGAIN * (one.repeated + 1):
+                one.repeated += 1
+                self.send(mavlink.MAVLink_command_long_message(drone, 1, land, min(one.repeated, 255), *[0.0] * 7))
+            return
+        self.command(drone, land)
+
     def place_command(
         self, drone: int, command: int, params: tuple[float, ...], place: tuple[float, float, float]
     ) -> None:
-        if self.is_open(drone, command):
+        if not self._tasks or self.is_open(drone, command):
             return
         self.commands[drone, command].append(Commanded(time.monotonic(), drone, command))
         where = (round(place[0] * 1e7), round(place[1] * 1e7), place[2])
@@ -380,12 +427,14 @@ def near(chance: random.Random, height: float) -> tuple[float, float, float]:
 class Endurance:
     """One run."""
 
-    def __init__(self, seed: int, minutes: float, drones: int, folder: Path) -> None:
+    def __init__(self, seed: int, minutes: float, drones: int, folder: Path, keeps_logs: bool = False) -> None:
         self.chance = random.Random(seed)
         self.minutes, self.drones, self.folder = minutes, drones, folder
+        self.keeps_logs, self._starts = keeps_logs, 0
         self.host = loopback()
+        self.log = (folder / "clients.jsonl").open("w") if keeps_logs else None
         self.network = loopback().rpartition(".")[0]
-        self.clients = [BenchClient(self.host, number) for number in range(len(PORTS))]
+        self.clients = [BenchClient(self.host, number, self.log) for number in range(len(PORTS))]
         self.running = asyncio.Event()
         self.cuts: list[tuple[float, float, int]] = []
         """(begin, end, drone) in monotonic time, crashes included."""
@@ -424,13 +473,20 @@ class Endurance:
         scenarios = {self.address(drone): str(scenario) for drone in self.group(index)}
         fleet.write_text(json.dumps({"drones": spec, "scenarios": scenarios}))
         self.simulators[index] = process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "anafi_mav", "sim", "--fleet", str(fleet)),
+            *(sys.executable, "-m", "anafi_mav", "sim", "--fleet", str(fleet)), *self._sim_log(index),
             stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
         )  # fmt: skip
         assert process.stdout is not None
         while not (line := await process.stdout.readline()).startswith(b"ready"):
             if not line:
                 raise SystemExit("a simulator ended before it was ready")
+
+    def _sim_log(self, index: int) -> tuple[str, ...]:
+        """Return the option for the simulator's log, each start with a file of its own, in a run that is kept."""
+        if not self.keeps_logs:
+            return ()
+        self._starts += 1
+        return "--log", str(self.folder / f"sim{index}-{self._starts}-{time.monotonic():.0f}.jsonl")
 
     async def crash(self, index: int) -> None:
         """Kill a group of drones as a power cut does, and start it again."""
@@ -531,7 +587,7 @@ class Endurance:
             await asyncio.sleep(2.0)  # other processes work
             flying = [drone for drone in range(1, self.drones + 1) if pilot.armed.get(drone, True)]
             for drone in flying:
-                pilot.command(drone, mavlink.MAV_CMD_NAV_LAND)
+                pilot.land(drone)
             if not flying and not self._steps and not self._open():
                 break
         else:
@@ -559,7 +615,7 @@ class Endurance:
             for client in self.clients
             for sent in client.commands.values()
             for one in sent
-            if not one.results and id(one) not in client.abandoned and now - one.at < ANSWER_LIMIT
+            if one.is_open(now)
         ]
 
     async def run(self) -> bool:
@@ -591,7 +647,7 @@ class Endurance:
         await asyncio.gather(*(self.start_simulator(index) for index in range(GROUPS)))
         with errors.open("wb") as complaints:
             self.gateway = await asyncio.create_subprocess_exec(
-                *(sys.executable, __file__, "gateway", "run", "-c", str(config)),
+                *(sys.executable, __file__, "gateway", "run", "-c", str(config), *(["-v"] if self.keeps_logs else [])),
                 stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE, stderr=complaints,
                 env={**os.environ, "ENDURANCE_REPORT": str(into), "PYTHONPATH": str(ROOT)}, pass_fds=(into,),
             )  # fmt: skip
@@ -651,18 +707,20 @@ class Endurance:
                 before, after = Counter(early[what]), Counter(end[what])
                 self.wrong.append(f"{what}: more {dict(after - before)}, fewer {dict(before - after)}")
         results: Counter[int] = Counter()
-        total = absent = 0
+        total = absent = left = 0
         for client in self.clients:
             self.wrong += client.unexpected[:10]
             for one in [one for sent in client.commands.values() for one in sent]:
                 total += 1
-                if not one.results:
-                    if self._absent(client, one):
+                left += one.is_abandoned
+                if one.repeated or not (one.results or one.is_abandoned):
+                    if one.command in QUERIES and self._is_absent(one):
                         absent += 1
-                    elif id(one) not in client.abandoned:
-                        self.wrong.append(
-                            f"no result: {one.command} of client {client.number} to drone {one.drone}{self._when(one)}"
-                        )
+                    else:
+                        again = f", sent {one.repeated} times more" if one.repeated else ""
+                        what = f"{one.command} of client {client.number} to drone {one.drone}{self._when(one)}"
+                        self.wrong.append(f"no result: {what}{again}")
+                if not one.results:
                     continue
                 at, result = one.results[0]
                 results[result] += 1
@@ -672,13 +730,11 @@ class Endurance:
                     )
             if lost := client.count_lost():
                 self.wrong.append(f"void: this computer lost {lost} datagrams for client {client.number}")
-        left = sum(len(client.abandoned) for client in self.clients)
         names = {getattr(enums, name): name[11:] for name in dir(enums) if name.startswith("MAV_RESULT_")}
         named = {names[key]: count for key, count in results.most_common()}
         print(
-            f"{total} commands, {left} of them left by clients that lost their connection, {absent} sent to an absent "
-            f"drone; results {named}; "
-            f"{len(self.cuts)} cuts"
+            f"{total} commands, {left} of them left by clients that lost their connection, "
+            f"{absent} queries to an absent drone; results {named}; {len(self.cuts)} cuts"
         )
         print(f"steps: {dict(sorted(self.tally.items()))}")
         if "Traceback" in errors:
@@ -691,15 +747,10 @@ class Endurance:
         """Whether the drone was silent between a command and its result."""
         return any(drone == one.drone and begin < at and one.at < end + SILENT_AFTER for begin, end, drone in self.cuts)
 
-    def _absent(self, client: BenchClient, one: Commanded) -> bool:
-        """Whether a command was sent to a drone whose link was lost, of which a text had notified the client.
-
-        The system of such a drone does not exist until the next handshake: nothing of it is answered.
-        """
+    def _is_absent(self, one: Commanded) -> bool:
+        """Whether a command was sent to a drone that was not connected."""
         return any(
-            drone == one.drone
-            and begin + SILENT_FOR <= one.at <= end + RECONNECTED_AFTER
-            and any(system == drone and begin <= when <= one.at + TEXT_WITHIN for when, system, _ in client.texts)
+            drone == one.drone and begin + SILENT_FOR <= one.at <= end + RECONNECTED_AFTER
             for begin, end, drone in self.cuts
         )
 
@@ -753,13 +804,18 @@ def main() -> int:
     options.add_argument("--minutes", type=float, default=30.0)
     options.add_argument("--drones", type=int, default=20)
     options.add_argument("--seed", type=int, default=None)
+    options.add_argument("--keep", type=Path, help="write the logs of clients, simulators and gateway to this folder")
     given = options.parse_args()
     seed = random.SystemRandom().randrange(10**6, 10**9) if given.seed is None else given.seed
     print(f"{machine()}; seed {seed}, {given.minutes:g} min, {given.drones} drones, {len(PORTS)} clients", flush=True)
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() if given.keep is None else contextlib.nullcontext(given.keep) as folder:
+        Path(folder).mkdir(parents=True, exist_ok=True)
 
         async def whole() -> bool:
-            run = Endurance(seed, given.minutes, given.drones, Path(folder))
+            task = asyncio.current_task()
+            assert task is not None
+            asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
+            run = Endurance(seed, given.minutes, given.drones, Path(folder), given.keep is not None)
             good = await run.run()
             for text, count in Counter(run.wrong).most_common(30):
                 print(f"WRONG: {count} × {text}")

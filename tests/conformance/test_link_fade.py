@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import ACCEPTED, FAILED, GOTO, RTL, goto, results
+from support.fault_scenarios import ACCEPTED, FAILED, GOTO, LAND_CMD, RTL, goto, results, until
 from support.world import HOME, RETURN, World, world
 
 from anafi_mav import geo
@@ -74,6 +74,33 @@ async def test_command_in_silence_fails_and_is_not_repeated() -> None:
         await w.client.heartbeat(lambda beat: True, timeout=5.0)
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > back + 2.0, 10.0)
         assert "moveTo" not in commands(w, 0.0)
+
+
+async def test_land_to_a_lost_drone_fails_with_a_text_and_can_be_sent_again() -> None:
+    """In the simulator's log: the Land of the silence is not flown later, the one after it is."""
+    async with world(speed=1.0) as w:
+        await w.take_off()
+        w.drone.faults.mute = True
+        await w.client.silence("HEARTBEAT", 3.0)
+        mark = w.client.mark()
+        for component in (1, 0):
+            w.client.send_command(LAND_CMD, target=(1, component))
+        w.client.send_command(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+        w.client.send_command(dialect.MAV_CMD_SET_CAMERA_ZOOM, 1, 2, target=(1, 100))
+        zoom = dialect.MAV_CMD_SET_CAMERA_ZOOM
+        assert await until(w.client, mark, 3) == [(LAND_CMD, FAILED), (LAND_CMD, FAILED), (zoom, FAILED)]
+        acks = [m.get_srcComponent() for _, m in w.client.since(mark, "COMMAND_ACK")]
+        assert acks == [1, 1, 100]
+        said = [m.text for _, m in w.client.since(mark, "STATUSTEXT")]
+        assert said == 3 * ["Command failed: drone not connected"]
+        assert w.client.since(mark, "AUTOPILOT_VERSION") == []
+        w.drone.faults.mute = False
+        back = now()
+        await w.client.heartbeat(lambda beat: True, timeout=10.0)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > back + 2.0, 10.0)
+        assert "Landing" not in commands(w, 0.0)
+        assert (await w.client.command(LAND_CMD)).result == ACCEPTED
+        assert "Landing" in commands(w, back)
 
 
 async def test_commanded_return_goes_on_through_a_silence() -> None:

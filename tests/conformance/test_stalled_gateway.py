@@ -12,7 +12,19 @@ from typing import Any, cast
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import ACCEPTED, GOTO, PX4_OFFBOARD, goto, heard
+from support.fault_scenarios import (
+    ACCEPTED,
+    GOTO,
+    LAND_CMD,
+    PX4_HOLD,
+    PX4_OFFBOARD,
+    REJECTED,
+    SET_MODE,
+    goto,
+    heard,
+    results,
+    until,
+)
 from support.missions import CORNERS, put, start
 from support.plans import around
 from support.process import gateway_process
@@ -175,6 +187,30 @@ async def test_commands_sent_to_a_stalled_gateway_are_dropped(tmp_path: Path) ->
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > back + 2.0, 10.0)
         assert deflected(w, back) == []
         assert heard(w, "moveTo") == []
+        # The goto's sender knows that it is not flown.
+        assert results(w.client, mark) == [(GOTO, REJECTED)]
+        texts = [m.text for _, m in w.client.since(mark, "STATUSTEXT")]
+        assert "Command refused: too old on arrival" in texts
+
+
+@pytest.mark.parametrize(
+    ("command", "params", "heard_as"), [(LAND_CMD, (), "Landing"), (SET_MODE, PX4_HOLD, "CancelMoveTo")]
+)
+async def test_stop_sent_to_a_stalled_gateway_is_carried_out(
+    tmp_path: Path, command: int, params: tuple[float, ...], heard_as: str
+) -> None:
+    """A person must be able to stop the drone, and cannot know that the gateway does not run."""
+    async with apart(tmp_path, None) as (w, gateway):
+        await set_out(w, "goto")
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 1.0, 20.0)
+        mark = w.client.mark()
+        gateway.send_signal(signal.SIGSTOP)
+        w.client.send_command(command, *params)
+        await asyncio.sleep(1.5)  # a stall is a second or more
+        assert results(w.client, mark) == []
+        gateway.send_signal(signal.SIGCONT)
+        assert await until(w.client, mark, 1) == [(command, ACCEPTED)]
+        assert len(heard(w, heard_as)) == 1
 
 
 @pytest.mark.parametrize("way", ["goto", "mission", "offboard", "orbit"])

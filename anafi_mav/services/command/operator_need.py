@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.access import Access, needed_access
+from anafi_mav.mavlink.access import COMMANDS, Access, needed_access
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import EFFECT_OF_MODE, Command, is_stop_of_flight
 from anafi_mav.services.flavours import flavour_of
@@ -57,8 +57,6 @@ GIMBAL_COMMANDS = frozenset(
 
 ACKNOWLEDGEMENTS = frozenset({dialect.MAVLINK_MSG_ID_COMMAND_ACK})
 
-_COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)
-
 
 def need_of(inbound: Inbound, action_of: Callable[[Inbound], Command | None]) -> Need:
     """Return the role that a message needs.
@@ -68,7 +66,7 @@ def need_of(inbound: Inbound, action_of: Callable[[Inbound], Command | None]) ->
     """
     message = inbound.message
     id = message.get_msgId()
-    if id in _COMMANDS:
+    if id in COMMANDS:
         command = action_of(inbound)
         free = command is None or command.id in GIMBAL_COMMANDS or command.is_stop_of_flight
         return Need.NOTHING if free else Need.COMMAND

@@ -146,6 +146,20 @@ def test_a_disowned_system_is_nobodys(router: Router[str, str]) -> None:
     assert (route.hosts, route.forward) == ((), ())
 
 
+def test_absent_host_receives_what_has_no_other_destination(router: Router[str, str]) -> None:
+    router.add_absent_host(OURS, "absent")
+    assert router.route("a", command(OURS, 1, seq=1), 0.0).hosts == ("autopilot",)
+    router.remove_hosts(OURS)
+    for component in (1, 100, 0):
+        assert router.route("a", command(OURS, component, seq=2), 0.0).hosts == ("absent",)
+    assert router.route("a", command(0, 0, seq=3), 0.0).hosts == ()
+    assert router.route("a", command(OURS, 1, seq=4), 0.0, {FOREIGN}).hosts == ()
+    router.route("b", heartbeat(source=(OURS, 191)), 0.0)  # a companion computer
+    route = router.route("a", command(OURS, 191, seq=5), 0.0)
+    assert (route.hosts, route.forward) == ((), ("b",))
+    assert router.route("a", command(OURS, 1, seq=6), 0.0).hosts == ("absent",)
+
+
 def test_setup_signing_is_never_passed_on(router: Router[str, str]) -> None:
     router.route("b", heartbeat(source=(FOREIGN, 1)), 0.0)
     for target, hosts in ((FOREIGN, ()), (0, ("autopilot",)), (OURS, ("autopilot",))):
