@@ -142,7 +142,7 @@ class FlightPlan(Commanding[FlightPlanState]):
 
     @property
     def plays_withdrawn(self) -> bool:
-        """True when the plan that plays is one whose start was withdrawn, as far as the drone's reports go."""
+        """True when the drone has reported that it plays a plan whose start was withdrawn."""
         return self._commander.sent.withdrawn_in_effect(Slot.PLAN) is not None
 
     @property

@@ -567,9 +567,10 @@ class MissionMachine:
         yield FlyItem(attempt, head.item)
 
     def confirmed(self, attempt: MissionAttempt, line: int | None = None) -> list[Effect]:
-        """The command that starts the file was confirmed; `line` is the one that the drone executed last.
+        """The command that starts the file was confirmed.
 
-        It counts when PLAYING was attributed to an older start until now, and the lines since it with it.
+        `line` is the one that the drone executed last. It counts when PLAYING was attributed to an older start until
+        now, and the lines executed since were, too.
         """
         return self._confirmed(attempt, line) if self.phase.attempt is attempt else []
 
