@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import json
 import math
 import sys
@@ -29,6 +30,7 @@ from anafi_mav.mavlink import dialect as own
 from anafi_mav.mavlink.frames import frame, pack
 
 ACCEPTED, REJECTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_TEMPORARILY_REJECTED
+GOTO, LAND, HOLD = dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_NAV_LAND, 0x03040000
 PARTITION = 5.0
 
 
@@ -92,13 +94,13 @@ async def test_setpoints_of_a_partition_move_nothing_after_it() -> None:
                     await station.wait("LOCAL_POSITION_NED", lambda m: m.x > 1.0)
                     relay.stall()
                     mark = station.mark()
-                    station.send_command(dialect.MAV_CMD_NAV_LAND)
+                    station.send_command(GOTO, -1, 1, 0, frame=6, x=HOME[0] + 0.001, y=HOME[1], z=10.0)
                     count = len(sent)
                     await asyncio.sleep(PARTITION)
                 await asyncio.sleep(0.5)  # the last setpoint is now too old, too
                 began, before = len([*w.drone.log]), w.drone.pose
                 relay.resume()
-                ack = await station.wait("COMMAND_ACK", lambda m: m.command == dialect.MAV_CMD_NAV_LAND, since=mark)
+                ack = await station.wait("COMMAND_ACK", lambda m: m.command == GOTO, since=mark)
                 assert ack.result == REJECTED
                 assert (await station.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
                 await asyncio.sleep(1.0)
@@ -110,6 +112,30 @@ async def test_setpoints_of_a_partition_move_nothing_after_it() -> None:
                 assert not [args for args in sticks if any(args[axis] for axis in ("roll", "pitch", "yaw", "gaz"))]
                 assert counted(w, "late_inputs") >= len(sent) - count > 50
                 assert counted(w, "late_commands") == 1
+        finally:
+            await relay.close()
+
+
+async def test_stop_of_a_partition_is_carried_out_after_it() -> None:
+    async with router() as node, world(endpoints=(node.url,)) as w:
+        relay = StallingRelay(node.port)
+        try:
+            async with ground(f"zenoh://127.0.0.1:{await relay.start()}", "tcpin") as port:
+                station = w.take(await FabricStation().join(port, tcp=True))
+                await w.take_off()
+                relay.stall()
+                mark = station.mark()
+                station.send(dialect.MAVLink_set_mode_message(1, 1, 0x04040000))  # Mission
+                station.send_command(GOTO, -1, 1, 0, frame=6, x=HOME[0] + 0.001, y=HOME[1], z=10.0)
+                station.send_command(LAND)
+                await asyncio.sleep(2.5)
+                relay.resume()
+                for command, result in ((GOTO, REJECTED), (LAND, ACCEPTED)):
+                    ack = await station.wait("COMMAND_ACK", lambda m, c=command: m.command == c, since=mark)
+                    assert ack.result == result
+                await station.heartbeat(lambda beat: beat.custom_mode == w.modes.land, since=mark)
+                await station.wait("STATUSTEXT", lambda m: m.text == "Command refused: too old on arrival", since=mark)
+                assert counted(w, "late_commands") == 2
         finally:
             await relay.close()
 
@@ -200,20 +226,32 @@ async def test_end_of_a_token_without_an_action_is_no_loss() -> None:
         assert "Ground station is back" not in [message.text for _, message in w.client.since(0, "STATUSTEXT")]
 
 
-async def test_station_that_answers_no_ping_can_return_and_not_take_off() -> None:
-    async with router() as node, world(endpoints=(node.url,)) as w:
+async def test_station_that_answers_no_ping_can_stop_the_flight_and_begin_nothing() -> None:
+    async with router() as node, world(endpoints=(node.url,), allow_kill=True) as w:
         await w.take_off()
         name = f"{7:016x}-1"
         with await asyncio.to_thread(opened, node) as session:
             samples = session.declare_subscriber(f"anafi/1/down/{name}")
             token = session.liveliness().declare_token(f"anafi/station/v1/{name}")
             await asyncio.to_thread(samples.recv)
-            for number, command in enumerate((own.MAV_CMD_NAV_TAKEOFF, own.MAV_CMD_NAV_RETURN_TO_LAUNCH), 1):
-                sent = own.MAVLink_command_long_message(1, 1, command, *[0] * 8)
+            numbers = itertools.count(1)
+
+            def put(sent: own.MAVLink_message) -> None:
+                number = next(numbers)
                 raw = frame(pack(sent), number, 255, 190)
                 session.put(f"anafi/1/up/{name}", raw, attachment=UpEnvelope(7, number, 0).encode())
+
+            put(own.MAVLink_command_long_message(1, 1, own.MAV_CMD_NAV_TAKEOFF, *[0] * 8))
+            put(own.MAVLink_set_mode_message(1, 1, 0x04040000))  # Mission
+            put(own.MAVLink_command_long_message(1, 1, own.MAV_CMD_DO_FLIGHTTERMINATION, 0, 1, *[0] * 6))
+            put(own.MAVLink_command_long_message(1, 1, own.MAV_CMD_NAV_RETURN_TO_LAUNCH, *[0] * 8))
             await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.returning, timeout=10.0)
-            assert counted(w, "late_commands") == 1
+            assert counted(w, "late_commands") == 3
+            mark = w.client.mark()
+            put(own.MAVLink_set_mode_message(1, 1, HOLD))
+            await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, since=mark, timeout=10.0)
+            assert counted(w, "late_commands") == 3
+            assert w.drone.pose.up > 3.0
             token.undeclare()
 
 
