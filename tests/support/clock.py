@@ -14,13 +14,15 @@ of ours blocks a loop in other ways for ruff.
 
 As soon as somebody else is there, a child process, work in a thread or a timer of the kernel's, the clock runs like
 theirs; with a thread only while the loop waits: a thread has no timers, and a busy machine must not look like a host
-that stalled.
+that stalled. Beside child processes that only react (`only_reacts`), like a router, it runs like everybody's while the
+loop waits, but for what the loop waits longer than it wanted to.
 """
 
 from __future__ import annotations
 
 import asyncio
 import gc
+import math
 import os
 import selectors
 import socket
@@ -111,6 +113,8 @@ class Selector(selectors.DefaultSelector):
         """Who else can bring something about, as the test has said."""
         self.processes: list[asyncio.SubprocessTransport] = []
         """Those whose end the loop has not been told of: a thread may have collected it already."""
+        self.reactive: list[asyncio.SubprocessTransport] = []
+        """Those among them that only react to what they receive, as the test has said."""
         self.turns = Turns()
         self._barrier = Barrier()
 
@@ -127,8 +131,14 @@ class Selector(selectors.DefaultSelector):
             _ahead = now() - _real()
             _began = None
         if not alone:
+            before = now()
             ready = super().select(timeout)
-            if self._only_threads():
+            if self._only_reactive():
+                # The machine may have let this process wait: for the loop it slept as long as it wanted to, at most.
+                real, limit = _real(), math.inf if timeout is None else before + max(timeout, 0.0)
+                _ahead = min(real + _ahead, limit) - real
+                _began = real + _ahead, time.thread_time(), threading.get_ident()
+            elif self._only_threads():
                 _began = now(), time.thread_time(), threading.get_ident()
             return ready
         here = now()
@@ -147,6 +157,10 @@ class Selector(selectors.DefaultSelector):
     def _only_threads(self) -> bool:
         """Whether the loop waits for threads of this process alone, which have no clock of their own."""
         return bool(self.in_threads) and not (self.others or self.processes) and childless()
+
+    def _only_reactive(self) -> bool:
+        """Whether the loop's processes all only react: how long the machine lets this one wait is then of no matter."""
+        return bool(self.processes) and not self.others and all(one in self.reactive for one in self.processes)
 
     def _look(self) -> Any:
         """What is ready by itself."""
@@ -198,6 +212,14 @@ def everybodys() -> Iterator[None]:
         yield
     finally:
         selector.others -= 1
+
+
+def only_reacts(process: asyncio.subprocess.Process) -> None:
+    """A process of the test's has no clock that matters: beside such ones alone the loop's clock waits for the loop.
+
+    On a busy machine the loop then neither oversleeps nor computes for long, so that no message ages by that.
+    """
+    _selector().reactive.append(process._transport)  # type: ignore[attr-defined]
 
 
 @contextmanager
