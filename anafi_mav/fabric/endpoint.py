@@ -231,7 +231,7 @@ class FabricEndpoint(Endpoint):
     def _add(self, station: str) -> None:
         keys = self._connection.keys
         lane = self._lane(f"{self.url} from {station}", lambda sysid: keys.down(sysid, station))
-        lane.channel.ends_with_station = True
+        lane.channel.ends_with_station = lane.channel.has_ages = True
         self._stations[station] = _Station(lane, StationInput(session_of(station)))
         self._ping(station)
         self._sink.opened(lane.channel)
