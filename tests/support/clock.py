@@ -219,7 +219,8 @@ def only_reacts(process: asyncio.subprocess.Process) -> None:
 
     On a busy machine the loop then neither oversleeps nor computes for long, so that no message ages by that.
     """
-    _selector().reactive.append(process._transport)  # type: ignore[attr-defined]
+    selector = _selector()
+    selector.reactive += [one for one in selector.processes if one.get_pid() == process.pid]
 
 
 @contextmanager
