@@ -141,7 +141,11 @@ class Selector(selectors.DefaultSelector):
                 _computing = threading.get_ident()
             return ready
         here = now()
-        ready = self._look()
+        ready = super().select(0.0)
+        if not ready and timeout:
+            # What waits behind callbacks that are ready need not be seen before them.
+            self._barrier.wait()
+            ready = super().select(0.0)
         if not ready and timeout is not None:
             here += max(timeout, 0.0)
         _ahead, _newest = here - _real(), max(_newest, here)
@@ -160,14 +164,6 @@ class Selector(selectors.DefaultSelector):
     def _only_reactive(self) -> bool:
         """Whether the loop's processes all only react: how long the machine lets this one wait is then of no matter."""
         return bool(self.processes) and not self.others and all(one in self.reactive for one in self.processes)
-
-    def _look(self) -> Any:
-        """What is ready by itself."""
-        ready = super().select(0.0)
-        if not ready:
-            self._barrier.wait()
-            ready = super().select(0.0)
-        return ready
 
     def close(self) -> None:
         self._barrier.close()
