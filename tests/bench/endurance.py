@@ -26,7 +26,8 @@ A command that changes something is answered in a silence, too: with FAILED and 
 whether it is flown later. A query has no answer then: stations send queries by themselves, and an answer would look to
 them like a sign of the drone.
 
-Exit status 1 when one of these is exceeded. A run in which this computer lost datagrams for a client is void.
+Exit status 1 when one of these is exceeded. A run in which this computer lost datagrams between a client and the
+gateway is void.
 """
 
 from __future__ import annotations
@@ -138,6 +139,13 @@ def gateway(arguments: list[str]) -> None:
 # -- clients
 
 
+def lost_datagrams(host: str, port: int) -> int:
+    """Return how many datagrams the kernel did not keep for a UDP socket that did not read them in time."""
+    local = f"{int.from_bytes(socket.inet_aton(host), sys.byteorder):08X}:{port:04X}"
+    rows = [line.split() for line in Path("/proc/net/udp").read_text().splitlines()[1:]]
+    return sum(int(row[12]) for row in rows if row[1] == local)
+
+
 @dataclass
 class Commanded:
     """A command of a client and its answers."""
@@ -220,9 +228,8 @@ class BenchClient(asyncio.DatagramProtocol):
         return self.lost_datagrams + (0 if URLS[self.number] == "tcpin" else self._lost())
 
     def _lost(self) -> int:
-        inode = os.fstat(self._transport.get_extra_info("socket").fileno()).st_ino
-        rows = [line.split() for line in Path("/proc/net/udp").read_text().splitlines()[1:]]
-        return sum(int(row[12]) for row in rows if int(row[9]) == inode)
+        address, port = self._transport.get_extra_info("sockname")
+        return lost_datagrams(address, port)
 
     def send(self, message: Any) -> None:
         if not self._tasks:  # the connection is lost: what a step still sends goes nowhere
@@ -728,6 +735,8 @@ class Endurance:
                     self.wrong.append(
                         f"FAILED without text: {one.command} of client {client.number}, drone {one.drone}"
                     )
+            if URLS[client.number] == "udpin" and (lost := lost_datagrams(self.host, client.port)):
+                self.wrong.append(f"void: this computer lost {lost} datagrams of client {client.number}")
             if lost := client.count_lost():
                 self.wrong.append(f"void: this computer lost {lost} datagrams for client {client.number}")
         names = {getattr(enums, name): name[11:] for name in dir(enums) if name.startswith("MAV_RESULT_")}
