@@ -176,6 +176,9 @@ class BenchClient(asyncio.DatagramProtocol):
         self.is_ardupilot = number % 2 == 1
         self.armed: dict[int, bool] = {}
         self.states: dict[int, str] = {}
+        self._beaten: dict[int, float] = {}
+        self.gaps: dict[int, list[tuple[float, float]]] = defaultdict(list)
+        """Times between two heartbeats of a drone that are further apart than while it is connected."""
         self.commands: dict[tuple[int, int], list[Commanded]] = defaultdict(list)
         """By drone and MAV_CMD."""
         self.texts: list[tuple[float, int, str]] = []
@@ -278,6 +281,9 @@ class BenchClient(asyncio.DatagramProtocol):
         kind, drone = m.get_type(), m.get_srcSystem()
         if kind == "HEARTBEAT":
             if m.get_srcComponent() == 1:
+                if now - self._beaten.get(drone, now) > SILENT_FOR:
+                    self.gaps[drone].append((self._beaten[drone], now))
+                self._beaten[drone] = now
                 if self.states.get(drone) != f"mode {m.custom_mode:#x}, status {m.system_status}":
                     self._note("in", m)
                 self.armed[drone] = bool(m.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
@@ -721,7 +727,7 @@ class Endurance:
                 total += 1
                 left += one.is_abandoned
                 if one.repeated or not (one.results or one.is_abandoned):
-                    if one.command in QUERIES and self._is_absent(one):
+                    if one.command in QUERIES and self._is_absent(client, one):
                         absent += 1
                     else:
                         again = f", sent {one.repeated} times more" if one.repeated else ""
@@ -756,9 +762,9 @@ class Endurance:
         """Whether the drone was silent between a command and its result."""
         return any(drone == one.drone and begin < at and one.at < end + SILENT_AFTER for begin, end, drone in self.cuts)
 
-    def _is_absent(self, one: Commanded) -> bool:
-        """Whether a command was sent to a drone that was not connected."""
-        return any(
+    def _is_absent(self, client: BenchClient, one: Commanded) -> bool:
+        """Whether a command was sent to a drone that was not connected, by its cuts or by its heartbeats."""
+        return any(begin <= one.at <= end for begin, end in client.gaps[one.drone]) or any(
             drone == one.drone and begin + SILENT_FOR <= one.at <= end + RECONNECTED_AFTER
             for begin, end, drone in self.cuts
         )
