@@ -35,6 +35,10 @@ PLAN_MEMORY = 20.0
 """s in which a flight plan may begin; as Olympe (common.Mavlink.Start): the drone reads the whole file before it
 reports anything."""
 
+STOP_REPORT = 1.5
+"""s after PLAYING within which the drone reports the end of a plan that it has been commanded to stop before. An event
+is late by 1 s at most (the simulator's quirk `scramble`), and three retransmissions of 150 ms may be lost."""
+
 TAKEN_OFF = frozenset({FlyingState.TAKINGOFF, FlyingState.HOVERING, FlyingState.FLYING})
 RISING = TAKEN_OFF | {FlyingState.MOTOR_RAMPING}
 
@@ -148,6 +152,8 @@ class SentCommand(msgspec.Struct, eq=False):
     """The wait of its verb, an `expectation.Expectation`."""
     phase: Phase = Phase.QUEUED
     delivered: bool = False
+    is_in_effect: bool = False
+    """An event has reported its effect, and none the end of it; also of a withdrawn one."""
     may_begin_until: float = -math.inf
     reported_until: float = -math.inf
 
@@ -161,10 +167,17 @@ class SentCommand(msgspec.Struct, eq=False):
         closed = self.phase in (Phase.WITHDRAWN, Phase.ABANDONED)
         return self.awaited or (closed and now < self.may_begin_until)
 
+    def may_be_reported(self, now: float) -> bool:
+        """Return True when an event may still report its effect, or repeat that."""
+        closed = self.phase in (Phase.WITHDRAWN, Phase.ABANDONED)
+        return self.awaited or self.phase is Phase.CONFIRMED or (closed and now < self.reported_until)
+
     def apply(self, event: Event, now: float = -math.inf) -> None:
         """Change the phase. `now` is needed for WITHDRAWN and ABANDONED."""
         self.delivered = self.delivered or event is Event.DELIVERED
         self.answered = self.answered or event in (Event.EXECUTED, Event.REFUSED, Event.OVER)
+        if event in (Event.EXECUTED, Event.REFUSED, Event.OVER):
+            self.is_in_effect = event is Event.EXECUTED and self.phase not in (Phase.ENDED, Phase.REFUSED)
         phase = TRANSITIONS[self.phase].get(event, self.phase)
         if phase is not self.phase and phase in (Phase.WITHDRAWN, Phase.ABANDONED):
             expiry = EXPIRY.get(self.slot, Expiry())
@@ -227,6 +240,22 @@ class SentCommands:
     def is_executed(self, slot: Slot) -> bool:
         """Return True when the reported effect of a command of this slot has not ended."""
         return any(one.phase is Phase.CONFIRMED for one in self._slots[slot])
+
+    def withdrawn_in_effect(self, slot: Slot) -> SentCommand | None:
+        """Return the withdrawn command of this slot whose reported effect has not ended."""
+        commands = self._slots[slot]
+        return next((one for one in commands if one.phase is Phase.WITHDRAWN and one.is_in_effect), None)
+
+    def confirm_despite(self, older: SentCommand, sent: SentCommand) -> bool:
+        """Take the effect that was attributed to a withdrawn command for that of the newer one.
+
+        Returns False when the end of that effect was reported meanwhile, or the newer one does not wait any longer.
+        """
+        if not (older.is_in_effect and older.phase is Phase.WITHDRAWN and sent.awaited):
+            return False
+        older.apply(Event.OVER)
+        sent.apply(Event.EXECUTED)
+        return True
 
     def rule_out(self) -> None:
         """Note that no withdrawn command starts the motors any more.
@@ -300,8 +329,8 @@ class SentCommands:
     def _attribute_playing(self, uid: str, now: float) -> SentCommand | None:
         """PLAYING names the plan as the upload did; some firmware may name it otherwise.
 
-        - Of two starts of one plan it is the newer's. Were it the older's, STOPPED follows it; the reverse error would
-          withdraw a plan that flies.
+        - Of several starts of one plan it is the oldest's that is withdrawn and may still begin: the drone executes
+          them in their order. When no end of it follows, it was the newer's (`confirm_despite`).
         - A name that is not known is that of the plan that is awaited.
         - A withdrawn start begins late when it took the drone so long to read the plan that the command against it
           arrived before its beginning.
@@ -310,22 +339,26 @@ class SentCommands:
         sent = self._plan_named(uid)
         if sent is None and plans and plans[-1].awaited and not (uid and uid == plans[-1].plan_before):
             sent = plans[-1]
+        elif sent is not None and sent.phase is not Phase.CONFIRMED:
+            withdrawn = (one for one in plans if one.target == uid and one.phase is Phase.WITHDRAWN)
+            sent = next((one for one in withdrawn if one.may_be_reported(now)), sent)
+        if sent is not None and not sent.may_be_reported(now):
+            sent = None
         for one in plans:
-            if one is not sent and one.phase is Phase.CONFIRMED:
+            if one is not sent and one.is_in_effect:
                 one.apply(Event.OVER)  # the drone plays one plan at a time
-        if sent is None or not (sent.awaited or sent.phase is Phase.CONFIRMED or now < sent.reported_until):
-            return None
-        sent.apply(Event.EXECUTED)
+        if sent is not None:
+            sent.apply(Event.EXECUTED)
         return sent
 
     def _attribute_stopped(self, uid: str) -> SentCommand | None:
         """PAUSED and STOPPED name the plan or nothing.
 
         - One that names another plan of this program than the one that plays is an older one.
-        - Without a plan that plays it answers the command against a withdrawn start.
+        - Without a plan that plays it answers the command against a withdrawn start. That start may still begin.
         """
         plans, named = self._slots[Slot.PLAN], self._plan_named(uid)
-        playing = next((one for one in plans if one.phase is Phase.CONFIRMED), None)
+        playing = next((one for one in plans if one.is_in_effect), None)
         if playing is not None:
             if named is not None and named.target != playing.target:
                 return named

@@ -1,6 +1,6 @@
 """Simulator of any number of drones in one process.
 
-All share one array of motion and one task that advances the world.
+One task advances the world of all.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from anafi_mav.sim.log import Log, LogFile
 from anafi_mav.sim.scenario import Scenario
 from anafi_mav.sim.world.airframe import Airframe
 from anafi_mav.sim.world.model import model_of
-from anafi_mav.sim.world.motion import STEP, Motion
+from anafi_mav.sim.world.motion import STEP
 
 TURN, FAST_TURN = STEP, 0.005
 """s of the machine's clock between two turns of the world; the second when telemetry is wanted that fast. At `speed` 1
@@ -62,23 +62,23 @@ class Simulator:
             raise ConfigError("drones", "expected at least one")
         self._period = TURN if all(spec.telemetry_rate <= 0.5 / TURN for spec in specs) else FAST_TURN
         self.speed = speed
-        self._motion = Motion([model_of(spec.model).airframe for spec in specs])
         self._file = None if log is None else LogFile(log)
         self._task: asyncio.Task[None] | None = None
         self.lost_time = 0.0
         """Simulated seconds that were skipped because the process did not get to run."""
         chance = random.Random(seed)
         capacity = max(MIN_CAPACITY, LOG_CAPACITY // len(specs)) if remember else 0
+        self._airframes = [Airframe(model_of(spec.model).airframe) for spec in specs]
         self.drones = [
             SimulatedDrone(
                 spec,
-                Airframe(self._motion, index),
+                airframe,
                 Log(spec.address, capacity, self._file),
                 _clock,
                 random.Random(chance.getrandbits(64)),
                 phase=index / len(specs),
             )
-            for index, spec in enumerate(specs)
+            for index, (spec, airframe) in enumerate(zip(specs, self._airframes, strict=True))
         ]
         self._scenarios = scenarios or {}
         for scenario in self._scenarios.values():
@@ -170,14 +170,13 @@ class Simulator:
             self._turn(now, 1)
 
     def _turn(self, now: float, steps: int) -> None:
-        motion, scenarios = self._motion, self._scenarios
-        for _ in range(steps):
-            motion.step()
+        scenarios = self._scenarios
         elapsed = steps * STEP
         passed = elapsed / self._speed
-        turns = zip(self.drones, motion.poses(), motion.arrived(), motion.still(), strict=True)
-        for drone, pose, arrived, still in turns:
-            drone.tick(now, elapsed, passed, pose, arrived, still)
+        for drone, airframe in zip(self.drones, self._airframes, strict=True):
+            for _ in range(steps):
+                airframe.step()
+            drone.tick(now, elapsed, passed, airframe.pose, airframe.has_arrived, airframe.is_still)
             if scenarios and (scenario := scenarios.get(drone.address)) is not None:
                 scenario.tick(drone)
         if self._file is not None:

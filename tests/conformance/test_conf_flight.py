@@ -88,6 +88,37 @@ async def test_takeoff_before_arming_that_the_drone_ends_is_reported() -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_climb_that_another_controller_ends_is_reported_as_aborted(flavour: str) -> None:
+    """The drone hovers where it is, and the vehicle is usable at once."""
+    async with world(flavour=flavour) as w:
+        if flavour == "ardupilot":
+            assert (await w.client.command(SET_MODE, 1, w.modes.hold)).result == ACCEPTED
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        mark = w.client.mark()
+        assert (await w.client.command(TAKE_OFF, x=0.0, y=0.0, z=20.0)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "command" and e.name.endswith("moveBy"), 20.0)
+        await w.drone.wait_log(lambda e: w.drone.pose.up > 4.0, 20.0)
+        w.drone.firmware.receive(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0), asyncio.get_running_loop().time())
+        text = "Climb to 20 m aborted: the move was interrupted"
+        aborted = await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Climb to "), since=mark)
+        assert (aborted.text, aborted.severity) == (text, dialect.MAV_SEVERITY_ERROR)
+        await w.client.heartbeat(lambda beat: beat.base_mode & ARMED)
+        assert w.drone.pose.up < 10.0
+
+
+async def test_climb_without_a_reported_height_is_reported_as_aborted() -> None:
+    async with world() as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        w.drone.faults.untold = frozenset({ardrone3.AltitudeChanged.NAME})
+        mark = w.client.mark()
+        assert (await w.client.command(TAKE_OFF, x=0.0, y=0.0, z=20.0)).result == ACCEPTED
+        aborted = await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Climb to "), since=mark)
+        assert aborted.severity == dialect.MAV_SEVERITY_ERROR
+        assert w.commands("ardrone3.Piloting.moveBy") == []
+        assert w.drone.pose.up < 2.0
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
 async def test_armed_state_without_takeoff_expires(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         mark, began = w.client.mark(), time.monotonic()

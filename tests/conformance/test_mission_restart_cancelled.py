@@ -6,7 +6,7 @@ import math
 
 import pytest
 from support.flavours import both
-from support.missions import MISSION_MODE, PAUSED, first, on_the_way, put, state, takeoff, way, whole
+from support.missions import ACTIVE, MISSION_MODE, PAUSED, first, on_the_way, put, state, takeoff, way, whole
 from support.world import World, world
 
 from anafi_mav import mav_enums
@@ -125,3 +125,109 @@ async def test_withdrawn_start_reported_late_under_another_name_is_suspended(fla
         pauses = len(commanded(w, "Mavlink.Pause"))
         w.drone.inject(common.MavlinkFilePlayingStateChanged(PlayingState.PLAYING, "renamed", MavlinkType.FLIGHT_PLAN))
         await w.drone.wait_log(lambda e: len(commanded(w, "Mavlink.Pause")) > pauses, 5.0)
+
+
+class SilentPlan:
+    """A mission whose restart was cancelled and that was started again, while the drone reports nothing of its plan."""
+
+    def __init__(self, w: World, mark: int, uid: str) -> None:
+        self.w = w
+        self.mark = mark
+        """Before the second start."""
+        self.uid = uid
+
+    def report(self, *states: PlayingState) -> None:
+        for one in states:
+            self.w.drone.inject(common.MavlinkFilePlayingStateChanged(one, self.uid, MavlinkType.FLIGHT_PLAN))
+
+    def states(self) -> list[int]:
+        return [whole(m).mission_state for _, m in self.w.client.since(self.mark, "MISSION_CURRENT")]
+
+    def results(self) -> list[int]:
+        start = mav_enums.MAV_CMD_MISSION_START
+        acks = [m for _, m in self.w.client.since(self.mark, "COMMAND_ACK") if m.command == start]
+        return [m.result for m in acks if m.result != mav_enums.MAV_RESULT_IN_PROGRESS]
+
+    def resumed(self) -> list[str]:
+        texts = [m.text for _, m in self.w.client.since(self.mark, "STATUSTEXT")]
+        return [text for text in texts if "resumed by another controller" in text]
+
+
+async def started_twice(w: World) -> SilentPlan:
+    """Fly to a corner, restart, cancel that when the drone has begun, and start it again, without a report of it."""
+    await on_the_way(w, 2)
+    mark, stops, starts = w.client.mark(), len(commanded(w, "Mavlink.Stop")), len(commanded(w, "Mavlink.Start"))
+    w.client.send_command(SET_CURRENT, float(first(w)), 0.0)
+    await w.drone.wait_log(lambda e: len(commanded(w, "Mavlink.Stop")) > stops, 20.0)
+    w.drone.faults.untold = frozenset({common.MavlinkFilePlayingStateChanged.NAME})
+    await w.drone.wait_log(lambda e: len(commanded(w, "Mavlink.Start")) > starts, 20.0)
+    w.client.send(newer.MAVLink_command_cancel_message(1, 1, SET_CURRENT))
+    await w.client.wait(
+        "COMMAND_ACK", lambda m: m.command == SET_CURRENT and m.result == mav_enums.MAV_RESULT_CANCELLED, since=mark
+    )
+    await state(w, PAUSED, since=mark)
+    w.client.send(newer.MAVLink_mission_set_current_message(1, 1, first(w)))
+    await state(w, PAUSED, seq=0, since=mark)
+    mark = w.client.mark()
+    w.client.send_command(mav_enums.MAV_CMD_MISSION_START, 0.0, 0.0)
+    await w.drone.wait_log(lambda e: len(commanded(w, "Mavlink.Start")) > starts + 1, 20.0)
+    w.drone.faults.untold = frozenset()
+    files = [e.args["filepath"] for e in w.drone.log if e.kind == "command" and e.name.endswith("Mavlink.Start")]
+    assert files[-1] == files[-2]
+    return SilentPlan(w, mark, files[-1])
+
+
+@both
+async def test_reports_of_a_cancelled_start_are_not_those_of_the_next(flavour: str) -> None:
+    """The drone reports the cancelled start, its end and the second start once that one was received."""
+    async with world(flavour=flavour, web=True) as w:
+        plan = await started_twice(w)
+        plan.report(PlayingState.PLAYING, PlayingState.STOPPED)
+        for _ in range(2):  # one a second: longer than a start in doubt waits
+            await w.client.heartbeat(lambda beat: True, since=w.client.mark())
+        assert plan.results() == []
+        assert ACTIVE not in plan.states()
+        plan.report(PlayingState.PLAYING)
+        await state(w, ACTIVE, since=plan.mark)
+        for _ in range(2):
+            await w.client.heartbeat(lambda beat: True, since=w.client.mark())
+        assert plan.results() == [mav_enums.MAV_RESULT_ACCEPTED]
+        shown = [one == ACTIVE for one in plan.states()]
+        assert shown == sorted(shown), "once it is flown, it is not shown as paused"
+        assert plan.resumed() == []
+
+
+@both
+@pytest.mark.parametrize("end", [PlayingState.STOPPED, None], ids=["repeated-stop", "silence"])
+async def test_start_behind_a_cancelled_one_that_never_began_is_shown_as_flown(
+    flavour: str, end: PlayingState | None
+) -> None:
+    """The only PLAYING is the second start's; the drone may have repeated before that it flies no plan."""
+    async with world(flavour=flavour, web=True) as w:
+        plan = await started_twice(w)
+        plan.report(*[] if end is None else [end], PlayingState.PLAYING)
+        await state(w, ACTIVE, since=plan.mark)
+        for _ in range(4):  # one a second: longer than any wait for a report
+            beat = await w.client.heartbeat(lambda beat: True, since=w.client.mark())
+        assert plan.results() == [mav_enums.MAV_RESULT_ACCEPTED]
+        assert plan.states()[-1] == ACTIVE
+        assert beat.custom_mode == MISSION_MODE[flavour]
+        assert plan.resumed() == []
+        assert [e.args["state"] for e in w.drone.log if e.name == "plan"][-1] == "playing"
+
+
+@both
+async def test_hold_while_a_start_is_in_doubt_stops_the_drone(flavour: str) -> None:
+    async with world(flavour=flavour, web=True) as w:
+        plan = await started_twice(w)
+        plan.report(PlayingState.PLAYING)
+        hold = (1.0, 4.0, 3.0) if flavour == "px4" else (1.0, 17.0)
+        ack = await w.client.command(mav_enums.MAV_CMD_DO_SET_MODE, *hold)
+        assert ack.result == mav_enums.MAV_RESULT_ACCEPTED
+        assert [e.args["state"] for e in w.drone.log if e.name == "plan"][-1] != "playing"
+        for _ in range(4):  # one a second: longer than any wait for a report
+            beat = await w.client.heartbeat(lambda beat: True, since=w.client.mark())
+        assert beat.custom_mode != MISSION_MODE[flavour]
+        assert plan.states()[-1] == PAUSED
+        assert [e.args["state"] for e in w.drone.log if e.name == "plan"][-1] != "playing"
+        assert mav_enums.MAV_RESULT_ACCEPTED not in plan.results()

@@ -5,16 +5,15 @@ before a timer is due, and nothing is on its way between their sockets (the loop
 before `send` returns), then nothing can happen until that timer: the clock is set to it, and the loop goes on at once.
 A minute of flight takes as long as its computations do, on any machine, with the timers in the order they are due.
 
-While callbacks run the clock goes at a hundredth of the processor time that they take: no two moments are the same, and
-a busy machine that lets them wait changes nothing. A hypervisor that takes the processor away for a second, without
-a sign of it, makes them ten milliseconds late.
+While callbacks run the clock goes on by a microsecond with each look at it: no two moments are the same, computing
+takes no time, and a busy machine that lets callbacks wait changes nothing.
 How long one turn of callbacks computed at most, which every timer has to wait for in earnest, can be asked for
 (`turns`): it is processor time of this thread. What latencies that makes is for tests/bench/ to say, and that nothing
 of ours blocks a loop in other ways for ruff.
 
 As soon as somebody else is there, a child process, work in a thread or a timer of the kernel's, the clock runs like
-theirs; with a thread only while the loop waits: a thread has no timers, and a busy machine must not look like a host
-that stalled.
+theirs; with a thread only while the loop waits, and never past the timer that it waits for: a thread has no timers, and
+a busy machine must not look like a host that stalled.
 """
 
 from __future__ import annotations
@@ -30,8 +29,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-SHARE = 0.01
-"""Of the processor time that callbacks take."""
+STEP = 1e-6
+"""s between two looks at the clock while callbacks run."""
 
 DELIVERY_LIMIT = 60.0
 """s of real time for a datagram to ourselves: only a broken machine needs longer."""
@@ -40,18 +39,17 @@ _real = time.monotonic
 _ahead = 0.0
 """s that the clock is ahead of `time.monotonic` when nothing of this process runs; negative when it is behind."""
 _newest = 0.0
-_began: tuple[float, float, int] | None = None
-"""Of the callbacks that are running alone: the time then, the processor time of their thread then, and its id."""
+_computing: int | None = None
+"""Identity of the thread whose loop runs callbacks, while nobody else can bring anything about."""
 
 
 def now() -> float:
     """What `time.monotonic` is in tests; never steps back."""
     global _newest
-    if _began is not None and _began[2] == threading.get_ident() and asyncio._get_running_loop() is not None:
-        here = _began[0] + SHARE * (time.thread_time() - _began[1])
+    if _computing == threading.get_ident() and asyncio._get_running_loop() is not None:
+        _newest += STEP
     else:
-        here = _real() + _ahead
-    _newest = max(_newest, here)
+        _newest = max(_newest, _real() + _ahead)
     return _newest
 
 
@@ -111,32 +109,40 @@ class Selector(selectors.DefaultSelector):
         """Who else can bring something about, as the test has said."""
         self.processes: list[asyncio.SubprocessTransport] = []
         """Those whose end the loop has not been told of: a thread may have collected it already."""
-        self.turns = Turns()
+        self.turns: Turns | None = None
+        """Measured while somebody asks for them: the processor time of a thread is dear to ask for."""
         self._barrier = Barrier()
 
     def select(self, timeout: float | None = None) -> Any:
+        if self.turns is None:
+            return self._select(timeout)
         self.turns.end()
         ready = self._select(timeout)
         self.turns.begin()
         return ready
 
     def _select(self, timeout: float | None) -> Any:
-        global _ahead, _began
+        global _ahead, _newest, _computing
         alone = timeout is not None and self._alone()
-        if _began is not None:
+        if _computing is not None:
             _ahead = now() - _real()
-            _began = None
+            _computing = None
         if not alone:
+            began = now()
             ready = super().select(timeout)
             if self._only_threads():
-                _began = now(), time.thread_time(), threading.get_ident()
+                here = _real() + _ahead
+                if timeout is not None:
+                    here = min(here, began + max(timeout, 0.0))
+                _ahead, _newest = here - _real(), max(_newest, here)
+                _computing = threading.get_ident()
             return ready
         here = now()
         ready = self._look()
         if not ready and timeout is not None:
             here += max(timeout, 0.0)
-        _ahead = here - _real()
-        _began = here, time.thread_time(), threading.get_ident()
+        _ahead, _newest = here - _real(), max(_newest, here)
+        _computing = threading.get_ident()
         return ready
 
     def _alone(self) -> bool:
@@ -208,12 +214,13 @@ def turns() -> Iterator[Turns]:
     through what all tests before have left. The product's own heap is in the figures of tests/bench/heartbeat.py.
     """
     selector = _selector()
-    selector.turns = Turns()
+    selector.turns = asked = Turns()
     gc.disable()
     try:
-        yield selector.turns
-        selector.turns.end()
+        yield asked
+        asked.end()
     finally:
+        selector.turns = None
         gc.enable()
 
 

@@ -13,7 +13,7 @@ from anafi_mav.sim.autopilot.firmware import Firmware, Identity
 from anafi_mav.sim.world.airframe import Airframe
 from anafi_mav.sim.world.faults import Faults
 from anafi_mav.sim.world.model import MODELS
-from anafi_mav.sim.world.motion import STEP, Motion, Pose
+from anafi_mav.sim.world.motion import STEP, Pose
 from anafi_mav.sim.world.place import WorldOrigin
 
 HOME = (48.8789, 2.3677, 35.0)
@@ -26,8 +26,7 @@ class Bench:
 
     def __init__(self, model_name: str = "4k") -> None:
         model = MODELS[model_name]
-        self.motion = Motion([model.airframe])
-        self.body = Airframe(self.motion, 0)
+        self.body = Airframe(model.airframe)
         self.events: list[Message] = []
         self.notes: list[dict[str, Any]] = []
         self.faults = Faults()
@@ -58,10 +57,9 @@ class Bench:
 
     def turn(self) -> None:
         """One step of the motion."""
-        self.motion.step()
+        self.body.step()
         self.now += STEP
-        arrived, still = self.motion.arrived()[0], self.motion.still()[0]
-        self.firmware.tick(self.now, STEP, self.motion.poses()[0], arrived, still)
+        self.firmware.tick(self.now, STEP, self.body.pose, self.body.has_arrived, self.body.is_still)
 
     def run(self, seconds: float) -> None:
         for _ in range(round(seconds / STEP)):

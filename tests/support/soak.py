@@ -157,11 +157,6 @@ drone reports no end of it."""
 
 BEGINNINGS = ("ground", "hover", "hover", "mission")
 
-DEFECTS: dict[str, str] = {
-    "mission is continued by another controller, and there is none": "late report of a withdrawn start",
-}
-"""Known defects, by what their failures end with."""
-
 WEIGHTS = {
     "arm": 2,
     "takeoff": 3,
@@ -967,11 +962,6 @@ async def land(flight: Flight) -> None:
         )
     except AssertionError:
         flight.wrong.append(f"Land answered {ack.result} leaves the vehicle armed on the ground")
-
-
-def known(text: str) -> str | None:
-    """The name of the known defect that a failure shows; None for any other."""
-    return next((name for end, name in DEFECTS.items() if end in text), None)
 
 
 async def rounds_flown(seed: int) -> list[str]:

@@ -6,6 +6,7 @@ drone says which by what it reports (feature flight_plan).
 
 from __future__ import annotations
 
+import asyncio
 import re
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
@@ -21,7 +22,7 @@ from anafi_mav.arsdk.messages.flight_plan import Indicator, SupportedCapabilitie
 from anafi_mav.drone.element import Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
 from anafi_mav.drone.rest import Rest
-from anafi_mav.drone.sent_commands import PLAN_MEMORY, Phase, SentCommand, Slot
+from anafi_mav.drone.sent_commands import PLAN_MEMORY, STOP_REPORT, Phase, SentCommand, Slot
 from anafi_mav.drone.settings import Commanding
 from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported, RemoteProtocolError
@@ -140,6 +141,11 @@ class FlightPlan(Commanding[FlightPlanState]):
             self._commander.send_stop_if_connected(common.Stop())
 
     @property
+    def plays_withdrawn(self) -> bool:
+        """True when the drone has reported that it plays a plan whose start was withdrawn."""
+        return self._commander.sent.withdrawn_in_effect(Slot.PLAN) is not None
+
+    @property
     def version(self) -> int:
         """Version of the file format that this drone flies: 1, or 2 on the Ai.
 
@@ -222,6 +228,8 @@ class FlightPlan(Commanding[FlightPlanState]):
         def judge(message: Any) -> bool | AnafiMavError | None:
             if sent.phase is Phase.REFUSED:
                 return CommandRejected(self._why())
+            if sent.awaited and (older := self._commander.sent.withdrawn_in_effect(Slot.PLAN)) is not None:
+                self._confirm_later(sent, older)
             if sent.awaited and isinstance(message, common.StartingErrorEvent):
                 seconds = max(0.0, min(begun + timeout - loop_time(), DOUBT_TIMEOUT))
                 sent.answer.expire_after(seconds, CommandTimeout(command.NAME, seconds))
@@ -234,6 +242,20 @@ class FlightPlan(Commanding[FlightPlanState]):
             if self.state.unavailable:
                 raise CommandRejected(self._why()) from None
             raise
+
+    def _confirm_later(self, sent: SentCommand, older: SentCommand) -> None:
+        """Let a start wait for the end of an older, withdrawn one, to which PLAYING was attributed.
+
+        Without that end the drone never flew the older one, and the plan that plays is the newer's.
+        """
+
+        def decide() -> None:
+            if sent.phase is Phase.QUEUED:
+                self._confirm_later(sent, older)
+            elif self._commander.sent.confirm_despite(older, sent):
+                sent.answer.succeed(True)
+
+        asyncio.get_running_loop().call_later(STOP_REPORT, decide)
 
     def _start(self, uid: str, item: int, type: MavlinkType | None, goes_on: bool | None) -> Message:
         kind = type

@@ -348,7 +348,7 @@ def _position_twist_up(stage: Stage, speed: float, **values: float) -> list[Leg]
     target, bearing, _ = _towards(stage)
     yaw = stage.heading + wrap_pi(bearing - stage.heading)
     above = Leg(target.north, target.east, stage.pose.up, yaw, speed=max(speed, CLIMB), tilt=_DOWN)
-    there = stage._replace(pose=replace(stage.pose, north=target.north, east=target.east), heading=yaw)
+    there = stage._replace(pose=stage.pose._replace(north=target.north, east=target.east), heading=yaw)
     return [above, *_twist_up(there, speed, **values)]
 
 

@@ -300,7 +300,7 @@ class MissionFlight(PlainTask):
                 effects = await self._acquire(attempt, by, resumes=work.resumes)
             case StartFile():
                 await self._start(work.uid, work.line)
-                return machine.confirmed(attempt)
+                return machine.confirmed(attempt, self._vehicle.drone.flight_plan.state.item)
             case FlyItem():
                 await fly_step(self._vehicle, attempt.mission.items[work.item])
                 return machine.item_flown(attempt)
@@ -412,7 +412,8 @@ class MissionFlight(PlainTask):
     def _on_playing(self, message: events.MavlinkFilePlayingStateChanged, now: float) -> None:
         match message.state:
             case PlayingState.PLAYING:
-                self._handle(self.machine.playing(message.filepath))
+                withdrawn = self._vehicle.drone.flight_plan.plays_withdrawn
+                self._handle(self.machine.playing(message.filepath, is_withdrawn=withdrawn))
                 self._require_control()
             case PlayingState.PAUSED | PlayingState.STOPPED:
                 stopped = message.state == PlayingState.STOPPED

@@ -566,15 +566,22 @@ class MissionMachine:
             yield Announce(head.item, resumes=False, stepped=True)
         yield FlyItem(attempt, head.item)
 
-    def confirmed(self, attempt: MissionAttempt) -> list[Effect]:
-        """The command that starts the file was confirmed."""
-        return self._confirmed(attempt) if self.phase.attempt is attempt else []
+    def confirmed(self, attempt: MissionAttempt, line: int | None = None) -> list[Effect]:
+        """The command that starts the file was confirmed.
+
+        `line` is the one that the drone executed last. It counts when PLAYING was attributed to an older start until
+        now, and the lines executed since were, too.
+        """
+        return self._confirmed(attempt, line) if self.phase.attempt is attempt else []
 
     @_on(E.CONFIRMED)
-    def _confirmed(self, attempt: MissionAttempt) -> _Steps:
+    def _confirmed(self, attempt: MissionAttempt, line: int | None) -> _Steps:
+        is_first_report = self.state is S.STARTING
         self._begin_file()
         prepared = self.phase.prepared
         self._be(S.FLYING_FILE)
+        if is_first_report and line is not None:
+            yield from self._execute(line)
         if attempt.course is None and prepared is not None:
             yield Announce(_head_item(prepared), prepared.resumes, prepared.course.stepped)
 
@@ -637,9 +644,14 @@ class MissionMachine:
 
     # Reports of the drone.
 
-    def playing(self, uid: str) -> list[Effect]:
-        """The drone reports that it flies the plan of this name."""
+    def playing(self, uid: str, *, is_withdrawn: bool = False) -> list[Effect]:
+        """The drone reports that it flies the plan of this name.
+
+        `is_withdrawn`: by a start that was withdrawn. Only a state that waits for the end of that file reacts.
+        """
         phase, known = self.phase, self._paused_file()
+        if is_withdrawn and not (phase.state in (S.CANCELLING, S.TAKING_OVER) and uid == phase.uid):
+            return []
         if phase.state in (S.CANCELLING, S.TAKING_OVER):
             own = uid == phase.uid
         elif phase.state is S.STARTING:

@@ -16,6 +16,7 @@ from anafi_mav.arsdk.messages import flight_plan as modern
 from anafi_mav.arsdk.messages.common import FlightPlanComponent, MavlinkType, PlayingState
 from anafi_mav.drone import Drone
 from anafi_mav.drone.automatic.flight_plan import DOUBT_TIMEOUT
+from anafi_mav.drone.sent_commands import STOP_REPORT
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
 
 V2 = V1.replace(b"\t3\t93\t2.0\t0.0\t0.0\t0.0\t0.0\t0.0\t0.0", b"\t2\t93\t2.0\t-1\t-1\t-1\tnan\tnan\tnan").replace(
@@ -178,6 +179,61 @@ async def test_late_error_of_a_withdrawn_start_leaves_the_newer(device: Scripted
     device.say(common.StartingErrorEvent())
     device.say(common.MavlinkFilePlayingStateChanged(PlayingState.PLAYING, "abc", MavlinkType.FLIGHT_PLAN))
     await newer
+    await drone.close()
+
+
+@pytest.mark.parametrize("ended", [True, False], ids=["older-began", "older-never-began"])
+async def test_playing_behind_a_withdrawn_start_confirms_the_newer_once_no_end_follows(
+    device: ScriptedDevice, ended: bool
+) -> None:
+    drone = device.drone()
+    await drone.connect()
+
+    async def report(state: PlayingState) -> None:
+        heard = asyncio.ensure_future(drone.expect(common.MavlinkFilePlayingStateChanged))
+        await asyncio.sleep(0)
+        device.say(common.MavlinkFilePlayingStateChanged(state, "abc", MavlinkType.FLIGHT_PLAN))
+        await heard
+
+    with pytest.raises(CommandTimeout):
+        await drone.flight_plan.start("abc", timeout=0.2)
+    await device.until(common.Stop)
+    newer = asyncio.ensure_future(drone.flight_plan.start("abc"))
+    await device.until(common.Start, 2)
+    await report(PlayingState.PLAYING)
+    assert not newer.done()
+    assert drone.flight_plan.plays_withdrawn
+    if ended:
+        await report(PlayingState.STOPPED)
+        assert not drone.flight_plan.plays_withdrawn
+        await asyncio.sleep(2.0 * STOP_REPORT)  # nothing happens within this time
+        assert not newer.done()
+        await report(PlayingState.PLAYING)
+    await newer
+    assert not drone.flight_plan.plays_withdrawn
+    drone.flight_plan.suspend()
+    await device.until(common.Pause)
+    await drone.close()
+
+
+async def test_start_cancelled_while_playing_is_in_doubt_stops_the_plan(device: ScriptedDevice) -> None:
+    drone = device.drone()
+    await drone.connect()
+    with pytest.raises(CommandTimeout):
+        await drone.flight_plan.start("abc", timeout=0.2)
+    await device.until(common.Stop)
+    newer = asyncio.ensure_future(drone.flight_plan.start("abc"))
+    await device.until(common.Start, 2)
+    device.script[common.Stop] = lambda _: []
+    heard = asyncio.ensure_future(drone.expect(common.MavlinkFilePlayingStateChanged))
+    await asyncio.sleep(0)
+    device.say(common.MavlinkFilePlayingStateChanged(PlayingState.PLAYING, "abc", MavlinkType.FLIGHT_PLAN))
+    await heard
+    drone.flight_plan.suspend()
+    with pytest.raises(CommandRejected):
+        await newer
+    await device.until(common.Stop, 2)
+    await device.until(common.Pause)
     await drone.close()
 
 

@@ -344,7 +344,7 @@ def test_flag_zero_ignores_roll_and_pitch(bench: Bench) -> None:
 def test_silent_sticks_are_released(bench: Bench) -> None:
     bench.sticks(2.0, pitch=100)
     last = bench.now - 0.05
-    released = bench.run_until(lambda: bench.motion.stick_push[0, 0] == 0.0)
+    released = bench.run_until(lambda: bench.body.stick_push[0] == 0.0)
     assert bench.now - last == pytest.approx(STICK_TIMEOUT, abs=0.02)
     assert released < STICK_TIMEOUT
     bench.rest()
@@ -354,9 +354,9 @@ def test_silent_sticks_are_released(bench: Bench) -> None:
 def test_the_watchdog_runs_on_the_machines_clock(bench: Bench) -> None:
     bench.send(ardrone3.PCMD(1, 0, 100, 0, 0, 0))
     bench.firmware.tick(bench.now + STICK_TIMEOUT - 0.01, 30.0, bench.pose, True, True)  # a simulation that hurries
-    assert bench.motion.stick_push[0, 0] != 0.0
+    assert bench.body.stick_push[0] != 0.0
     bench.firmware.tick(bench.now + STICK_TIMEOUT + 0.01, 0.0, bench.pose, True, True)
-    assert bench.motion.stick_push[0, 0] == 0.0
+    assert bench.body.stick_push[0] == 0.0
 
 
 def test_sticks_beyond_a_hundred_are_a_hundred(bench: Bench) -> None:

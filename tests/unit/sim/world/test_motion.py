@@ -8,7 +8,7 @@ import pytest
 
 from anafi_mav.sim.world.airframe import Airframe
 from anafi_mav.sim.world.model import MODELS
-from anafi_mav.sim.world.motion import STEP, Motion, Pose, Turn
+from anafi_mav.sim.world.motion import STEP, Pose, Turn
 
 RAD = math.pi / 180.0
 AIRFRAME = MODELS["4k"].airframe
@@ -17,22 +17,21 @@ AIRFRAME = MODELS["4k"].airframe
 class Flyer:
     """A drone in the air at 50 m, hovering."""
 
-    def __init__(self, heading_deg: float = 0.0, height: float = 50.0, drones: int = 1) -> None:
-        self.motion = Motion([AIRFRAME] * drones)
-        self.body = Airframe(self.motion, 0)
+    def __init__(self, heading_deg: float = 0.0, height: float = 50.0) -> None:
+        self.body = Airframe(AIRFRAME)
         self.body.place(0.0, 0.0, heading_deg * RAD)
-        self.motion.position[2, 0] = -height
+        self.body.down = -height
         self.body.limits(tilt_rate=300.0 * RAD, ceiling=4000.0)
         self.body.hover()
 
     def run(self, seconds: float) -> Pose:
         for _ in range(round(seconds / STEP)):
-            self.motion.step()
+            self.body.step()
         return self.pose
 
     @property
     def pose(self) -> Pose:
-        return self.motion.poses()[0]
+        return self.body.pose
 
 
 @pytest.mark.parametrize(
@@ -124,14 +123,14 @@ def test_yaw_and_climb_after_a_step_are_closed_form(time: float) -> None:
     assert pose.up - 50.0 == pytest.approx(3.0 * (time - 0.27 + 0.12 * kept), abs=1e-9)
 
 
-def test_poses_at_rest_are_kept_until_one_is_carried() -> None:
-    motion = Motion([AIRFRAME] * 2)
-    motion.step()
-    before = motion.poses()
-    motion.step()
-    assert motion.poses() is before
-    Airframe(motion, 1).place(3.0, 4.0, 0.5)
-    assert motion.poses() == [before[0], Pose(3.0, 4.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0)]
+def test_pose_at_rest_is_kept_until_it_is_carried() -> None:
+    body = Airframe(AIRFRAME)
+    body.step()
+    before = body.pose
+    body.step()
+    assert body.pose is before
+    body.place(3.0, 4.0, 0.5)
+    assert body.pose == Pose(3.0, 4.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0)
 
 
 def test_tilt_rate_stays_below_its_limit() -> None:
@@ -190,7 +189,7 @@ def test_a_move_goes_straight_and_does_not_overshoot() -> None:
         assert abs(pose.north * 40.0 - pose.east * 30.0) / 50.0 < 0.2  # distance from the line
         assert math.hypot(pose.north, pose.east) < 50.3
     assert (pose.north, pose.east, pose.up) == pytest.approx((30.0, 40.0, 60.0), abs=0.1)
-    assert flyer.motion.arrived() == [True]
+    assert flyer.body.has_arrived
 
 
 def test_move_with_turn_first_turns_before_moving() -> None:
@@ -213,13 +212,6 @@ def test_the_ceiling_and_the_fence_hold() -> None:
         highest, farthest = max(highest, pose.up), max(farthest, pose.north)
     assert 59.0 < highest < 60.5
     assert 37.0 < farthest <= 40.0
-
-
-def test_drones_do_not_touch_each_other() -> None:
-    flyer = Flyer(drones=3)
-    flyer.body.sticks(0.1, -0.2, 0.5, 1.0)
-    flyer.run(5.0)
-    assert flyer.motion.poses()[1:] == [Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)] * 2
 
 
 def test_same_commands_same_flight() -> None:

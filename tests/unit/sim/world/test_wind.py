@@ -12,7 +12,7 @@ from anafi_mav.arsdk.messages.ardrone3 import WarningLevel
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim.world.airframe import Airframe
 from anafi_mav.sim.world.model import MODELS
-from anafi_mav.sim.world.motion import STEP, Motion, Pose
+from anafi_mav.sim.world.motion import STEP, Pose
 from anafi_mav.sim.world.wind import CALM, Wind, WindSpec, WindWatch
 
 RAD = math.pi / 180.0
@@ -22,18 +22,17 @@ class Hover:
     """A drone that hovers at 50 m in wind."""
 
     def __init__(self, spec: WindSpec, model: str = "4k") -> None:
-        self.motion = Motion([MODELS[model].airframe])
-        self.body = Airframe(self.motion, 0)
+        self.body = Airframe(MODELS[model].airframe)
         self.wind = Wind(spec, random.Random(4))
-        self.motion.position[2, 0] = -50.0
+        self.body.down = -50.0
         self.body.limits(tilt_rate=300.0 * RAD, ceiling=4000.0)
         self.body.hover()
 
     def run(self, seconds: float) -> Pose:
         for _ in range(round(seconds / STEP)):
             self.body.blow(*self.wind.advance(STEP))
-            self.motion.step()
-        return self.motion.poses()[0]
+            self.body.step()
+        return self.body.pose
 
 
 @pytest.mark.parametrize(
@@ -59,7 +58,7 @@ def test_steady_wind_is_balanced_by_tilt() -> None:
     # into a wind from ahead.
     assert pose.pitch / RAD == pytest.approx(-13.42, abs=0.1)
     assert math.hypot(pose.north, pose.east) < 0.5
-    assert hover.motion.still() == [True]
+    assert hover.body.is_still
 
 
 def test_gusts_do_not_displace_a_hover() -> None:
@@ -90,15 +89,15 @@ def test_move_in_wind_ends_at_its_target() -> None:
     hover.body.move(20.0, 10.0, 50.0, speed=5.0, climb=2.0, yaw_rate=1.0)
     for _ in range(60):
         pose = hover.run(0.5)
-        if hover.motion.arrived() == [True]:
+        if hover.body.has_arrived:
             break
-    assert hover.motion.arrived() == [True]
+    assert hover.body.has_arrived
     assert (pose.north, pose.east) == pytest.approx((20.0, 10.0), abs=0.6)
 
 
 def test_drone_on_the_ground_is_unmoved_by_wind() -> None:
     hover = Hover(WindSpec(15.0, 0.0))
-    hover.motion.position[2, 0] = 0.0
+    hover.body.down = 0.0
     hover.body.off()
     pose = hover.run(10.0)
     assert (pose.north, pose.east, pose.vn, pose.ve) == (0.0, 0.0, 0.0, 0.0)

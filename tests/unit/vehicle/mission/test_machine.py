@@ -251,6 +251,32 @@ def test_withdrawn_start_playing_late_stays_silent() -> None:
     assert names(machine.playing("a")) == "SendText"  # this one is another controller's
 
 
+@pytest.mark.parametrize("state", S)
+def test_playing_of_a_withdrawn_start_changes_nothing_but_the_wait_for_its_end(state: State) -> None:
+    machine = in_state(state)
+    before = (machine.state, machine.rest, machine.progress)
+    for uid in ("a", "b"):
+        assert machine.playing(uid, is_withdrawn=True) == []
+        assert (machine.state, machine.rest, machine.progress) == before
+    assert machine.phase.played is (state is S.CANCELLING)
+
+
+def test_start_confirmed_without_its_playing_counts_the_lines_executed_since() -> None:
+    """PLAYING was attributed to an older start of the same file, and was this one's after all."""
+    machine, attempt = starting()
+    assert machine.playing("a", is_withdrawn=True) == machine.executed(1) == []
+    assert machine.state is S.STARTING
+    assert names(machine.confirmed(attempt, 1)) == "Reached Announce Persist"
+    assert (machine.state, machine.progress.line, machine.progress.current) == (S.FLYING_FILE, 1, 2)
+
+
+def test_start_confirmed_after_its_playing_counts_no_line_again() -> None:
+    machine, attempt = starting()
+    machine.playing("a")
+    machine.confirmed(attempt, 1)
+    assert machine.progress.line == -1
+
+
 def test_withdrawn_start_playing_late_stays_silent_when_the_start_after_it_is_withdrawn_too() -> None:
     machine, _ = starting()
     second = machine.attempt()
