@@ -30,7 +30,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.frames import ReceivedFrame, Verdict
 from anafi_mav.mavlink.listener import Listener
 from anafi_mav.mavlink.router import targets
-from anafi_mav.receive_buffer import limit_reads
+from anafi_mav.receive_buffer import limit_reads, read_waiting
 
 logger = logging.getLogger(__name__)
 
@@ -56,14 +56,17 @@ class _Datagrams(asyncio.DatagramProtocol):
         self._received = received
         self._failed = failed
         self._paused = paused
+        self._transport: asyncio.BaseTransport | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert hasattr(transport, "set_write_buffer_limits")  # asyncio's datagram transports have it, their type not
         transport.set_write_buffer_limits(high=WRITE_AHEAD)
         limit_reads(transport)
+        self._transport = transport
 
     def datagram_received(self, data: bytes, addr: Any) -> None:
         self._received(data, addr)
+        read_waiting(self._transport, self._received, self._failed)
 
     def error_received(self, exc: Exception) -> None:
         self._failed(exc)

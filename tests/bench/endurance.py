@@ -26,7 +26,8 @@ A command that changes something is answered in a silence, too: with FAILED and 
 whether it is flown later. A query has no answer then: stations send queries by themselves, and an answer would look to
 them like a sign of the drone.
 
-Exit status 1 when one of these is exceeded. A run in which this computer lost datagrams for a client is void.
+Exit status 1 when one of these is exceeded. A run in which this computer lost datagrams between a client and the
+gateway is void.
 """
 
 from __future__ import annotations
@@ -138,6 +139,13 @@ def gateway(arguments: list[str]) -> None:
 # -- clients
 
 
+def lost_datagrams(host: str, port: int) -> int:
+    """Return how many datagrams the kernel did not keep for a UDP socket that did not read them in time."""
+    local = f"{int.from_bytes(socket.inet_aton(host), sys.byteorder):08X}:{port:04X}"
+    rows = [line.split() for line in Path("/proc/net/udp").read_text().splitlines()[1:]]
+    return sum(int(row[12]) for row in rows if row[1] == local)
+
+
 @dataclass
 class Commanded:
     """A command of a client and its answers."""
@@ -168,6 +176,9 @@ class BenchClient(asyncio.DatagramProtocol):
         self.is_ardupilot = number % 2 == 1
         self.armed: dict[int, bool] = {}
         self.states: dict[int, str] = {}
+        self._beaten: dict[int, float] = {}
+        self.gaps: dict[int, list[tuple[float, float]]] = defaultdict(list)
+        """Times between two heartbeats of a drone that are further apart than while it is connected."""
         self.commands: dict[tuple[int, int], list[Commanded]] = defaultdict(list)
         """By drone and MAV_CMD."""
         self.texts: list[tuple[float, int, str]] = []
@@ -220,9 +231,8 @@ class BenchClient(asyncio.DatagramProtocol):
         return self.lost_datagrams + (0 if URLS[self.number] == "tcpin" else self._lost())
 
     def _lost(self) -> int:
-        inode = os.fstat(self._transport.get_extra_info("socket").fileno()).st_ino
-        rows = [line.split() for line in Path("/proc/net/udp").read_text().splitlines()[1:]]
-        return sum(int(row[12]) for row in rows if int(row[9]) == inode)
+        address, port = self._transport.get_extra_info("sockname")
+        return lost_datagrams(address, port)
 
     def send(self, message: Any) -> None:
         if not self._tasks:  # the connection is lost: what a step still sends goes nowhere
@@ -271,6 +281,9 @@ class BenchClient(asyncio.DatagramProtocol):
         kind, drone = m.get_type(), m.get_srcSystem()
         if kind == "HEARTBEAT":
             if m.get_srcComponent() == 1:
+                if now - self._beaten.get(drone, now) > SILENT_FOR:
+                    self.gaps[drone].append((self._beaten[drone], now))
+                self._beaten[drone] = now
                 if self.states.get(drone) != f"mode {m.custom_mode:#x}, status {m.system_status}":
                     self._note("in", m)
                 self.armed[drone] = bool(m.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
@@ -714,7 +727,7 @@ class Endurance:
                 total += 1
                 left += one.is_abandoned
                 if one.repeated or not (one.results or one.is_abandoned):
-                    if one.command in QUERIES and self._is_absent(one):
+                    if one.command in QUERIES and self._is_absent(client, one):
                         absent += 1
                     else:
                         again = f", sent {one.repeated} times more" if one.repeated else ""
@@ -728,6 +741,8 @@ class Endurance:
                     self.wrong.append(
                         f"FAILED without text: {one.command} of client {client.number}, drone {one.drone}"
                     )
+            if URLS[client.number] == "udpin" and (lost := lost_datagrams(self.host, client.port)):
+                self.wrong.append(f"void: this computer lost {lost} datagrams of client {client.number}")
             if lost := client.count_lost():
                 self.wrong.append(f"void: this computer lost {lost} datagrams for client {client.number}")
         names = {getattr(enums, name): name[11:] for name in dir(enums) if name.startswith("MAV_RESULT_")}
@@ -747,9 +762,9 @@ class Endurance:
         """Whether the drone was silent between a command and its result."""
         return any(drone == one.drone and begin < at and one.at < end + SILENT_AFTER for begin, end, drone in self.cuts)
 
-    def _is_absent(self, one: Commanded) -> bool:
-        """Whether a command was sent to a drone that was not connected."""
-        return any(
+    def _is_absent(self, client: BenchClient, one: Commanded) -> bool:
+        """Whether a command was sent to a drone that was not connected, by its cuts or by its heartbeats."""
+        return any(begin <= one.at <= end for begin, end in client.gaps[one.drone]) or any(
             drone == one.drone and begin + SILENT_FOR <= one.at <= end + RECONNECTED_AFTER
             for begin, end, drone in self.cuts
         )

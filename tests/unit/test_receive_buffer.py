@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import socket
+from typing import Any
 
-from anafi_mav.receive_buffer import SIZE, limit_reads
+from anafi_mav.receive_buffer import MOST, SIZE, limit_reads, read_waiting
 
 
 class _Peer(asyncio.DatagramProtocol):
@@ -50,3 +51,74 @@ async def test_read_of_a_stream_is_at_most_the_limit() -> None:
     transport.close()
     theirs.close()
     assert max(sizes) <= SIZE
+
+
+class _Reader(asyncio.DatagramProtocol):
+    def __init__(self) -> None:
+        self.batches: list[list[bytes]] = []
+        """The datagrams of each iteration."""
+        self.failures: list[Exception] = []
+        self.ends_after = -1
+        self.answer = b""
+
+    def connection_made(self, transport: Any) -> None:
+        self.transport = transport
+
+    def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
+        self.batches.append([data])
+        if self.answer:
+            self.transport.sendto(self.answer)
+        read_waiting(self.transport, self._more, self.failures.append)
+
+    def _more(self, data: bytes, address: tuple[str, int]) -> None:
+        self.batches[-1].append(data)
+        if len(self.batches[-1]) == self.ends_after:
+            self.transport.close()
+
+
+async def _sent(reader: _Reader, count: int) -> list[bytes]:
+    """Send datagrams to the reader before the event loop runs again."""
+    data = [bytes([number]) for number in range(count)]
+    transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
+        lambda: reader, local_addr=("127.0.0.1", 0)
+    )
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for one in data:
+            sender.sendto(one, transport.get_extra_info("sockname"))
+    return data
+
+
+async def test_waiting_datagrams_are_read_in_order_with_their_turns_limited() -> None:
+    reader = _Reader()
+    data = await _sent(reader, 2 * MOST + 1)
+    while sum(map(len, reader.batches)) < len(data):  # noqa: ASYNC110
+        await asyncio.sleep(0)
+    assert reader.batches == [data[:MOST], data[MOST : 2 * MOST], data[2 * MOST :]]
+    assert reader.failures == []
+    reader.transport.close()
+
+
+async def test_transport_that_is_closed_meanwhile_is_read_no_further() -> None:
+    reader = _Reader()
+    reader.ends_after = 3
+    data = await _sent(reader, 10)
+    while not reader.batches:  # noqa: ASYNC110
+        await asyncio.sleep(0)
+    await asyncio.sleep(0)
+    assert reader.batches == [data[:3]]
+
+
+async def test_error_of_a_connected_socket_is_reported() -> None:
+    """No program has the peer's port any more: the second read finds what became of the answer to the first."""
+    reader = _Reader()
+    reader.answer = b"refused"
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer:
+        peer.bind(("127.0.0.1", 0))
+        transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
+            lambda: reader, remote_addr=peer.getsockname()
+        )
+        peer.sendto(b"last", transport.get_extra_info("sockname"))
+    while not reader.batches:  # noqa: ASYNC110
+        await asyncio.sleep(0)
+    transport.close()
+    assert [type(failure) for failure in reader.failures] == [ConnectionRefusedError]

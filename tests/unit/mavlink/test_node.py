@@ -124,6 +124,26 @@ async def test_a_message_with_a_target_goes_there_alone() -> None:
         assert d.got("PING", 30) == []
 
 
+@pytest.mark.parametrize("scheme", ["udpin", "udpout"])
+async def test_datagrams_that_wait_are_read_in_one_iteration(scheme: str) -> None:
+    """On a busy computer a command waits behind what its client sent before: not one iteration for each datagram."""
+    host = loopback()
+    port = udp_port(host)
+    client = await UdpClient(30).open(host, (host, port) if scheme == "udpin" else None)
+    async with bench(f"{scheme}://{host}:{port if scheme == 'udpin' else client.port}") as d:
+        if scheme == "udpout":
+            d.node.send(ATTITUDE, sysid=1, compid=1)
+            await d.until(lambda: client.peer is not None)
+        for number in range(20):
+            client.send(ping(0, 0, number))
+        iterations = 0
+        while not d.got("PING", 30):
+            await asyncio.sleep(0)
+            iterations += 1
+        assert [message.seq for message in d.got("PING", 30)] == list(range(20)), iterations
+    await client.close()
+
+
 async def test_message_for_our_system_is_not_forwarded() -> None:
     async with three(loopback()) as (d, ten, twenty, thirty):
         d.node.add_host(1, 1, d.inbound.append)

@@ -15,6 +15,7 @@ from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.link import handshake
 from anafi_mav.arsdk.link.controller import ControllerSession, connect
 from anafi_mav.arsdk.link.device import MAX_CONNECTIONS, DeviceServer, DeviceSession
+from anafi_mav.arsdk.link.frame import FrameType, encode_frame
 from anafi_mav.arsdk.link.handshake import DeviceInfo
 from anafi_mav.arsdk.link.session import OnMessage
 from anafi_mav.arsdk.messages import ardrone3, common
@@ -270,6 +271,25 @@ async def test_silent_drone_is_lost_and_resumes_when_heard() -> None:
         assert await drone.heard.next() == common.AllStates()
         await session.close()
         await again.close()
+
+
+async def test_datagrams_that_wait_are_not_read_one_in_each_iteration() -> None:
+    """A busy computer has long iterations: an acknowledgement must not wait for one of each datagram before it."""
+    async with flying() as (drone, server):
+        session = await join(server)
+        gives: list[Callable[[bytes], None]] = []
+        drone.sessions[0].air = lambda data, came_in, give: gives.append(give)
+        drone.sessions[0].send(HOVERING)
+        while not gives:  # noqa: ASYNC110
+            await asyncio.sleep(0)
+        for number in range(40):
+            gives[0](encode_frame(session.version, FrameType.NOACK, 5, number, b""))
+        iterations = 0
+        while session.counters["garbage.queue"] < 40:
+            await asyncio.sleep(0)
+            iterations += 1
+        assert iterations <= 20  # more than 40 with one datagram in each
+        await session.close()
 
 
 async def test_others_are_not_heard() -> None:
