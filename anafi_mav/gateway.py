@@ -29,6 +29,7 @@ from anafi_mav.drone.contention import Contention
 from anafi_mav.drone.rest import HTTP_PORT
 from anafi_mav.errors import AnafiMavError, ConfigError, HandshakeRefused
 from anafi_mav.fabric.endpoint import FabricEndpoint
+from anafi_mav.fabric.sample_age import StopKind
 from anafi_mav.fabric.system_state import StatePosition, SystemState
 from anafi_mav.gateway_status import ReportedDrone, StatusReport
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, Sink
@@ -38,6 +39,7 @@ from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.recording.recorder import Recorder
 from anafi_mav.relay.server import RelayServer
 from anafi_mav.relay.source import DroneSource
+from anafi_mav.services.commands import Effect
 from anafi_mav.services.flavours import FLAVOURS
 from anafi_mav.services.gateway_uris import GatewayUris
 from anafi_mav.services.ground_station.signing_setup import SigningSetup
@@ -621,6 +623,15 @@ class Gateway:
                 supervised.system.channel_closed(channel)
 
 
+_STOP_KINDS = {
+    Effect.STOP: StopKind.IN_PLACE,
+    Effect.HOLD: StopKind.IN_PLACE,
+    Effect.LAND: StopKind.IN_PLACE,
+    Effect.RETURN: StopKind.HOME,
+}
+"""A late KILL is none of them: motors are cut for what its sender sees at that moment."""
+
+
 class _FabricSystems:
     """The systems of a gateway, as its fabric endpoints see them."""
 
@@ -637,9 +648,10 @@ class _FabricSystems:
         supervised = self._gateway.supervised(sysid)
         return supervised is not None and supervised.system.active and supervised.system.vehicle.on_ground
 
-    def is_stop_of_flight(self, sysid: int, inbound: Inbound) -> bool:
+    def stop_kind(self, sysid: int, inbound: Inbound) -> StopKind | None:
         supervised = self._gateway.supervised(sysid)
-        return supervised is not None and supervised.system.is_stop_of_flight(inbound)
+        effect = None if supervised is None else supervised.system.stop_of(inbound)
+        return None if effect is None else _STOP_KINDS.get(effect)
 
     def is_started(self) -> bool:
         return bool(self._gateway.systems)

@@ -24,7 +24,7 @@ from anafi_mav.fabric.claims import ClaimStep, SystemClaims
 from anafi_mav.fabric.connection import FabricConnection
 from anafi_mav.fabric.envelope import MAX_SAMPLE, Pong, UpEnvelope, sender_of
 from anafi_mav.fabric.keys import KeyKind, session_of
-from anafi_mav.fabric.sample_age import COMMANDS, INPUTS, StationInput, refusal_of
+from anafi_mav.fabric.sample_age import INPUTS, REFUSED, StationInput, StopKind, refusal_of
 from anafi_mav.fabric.station_places import StationPlaces
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, Outbox, Sink, shaped_channel
@@ -62,8 +62,8 @@ class FabricSystems(Protocol):
     def is_on_ground(self, sysid: int) -> bool:
         """Return True while the drone is known to stand."""
 
-    def is_stop_of_flight(self, sysid: int, inbound: Inbound) -> bool:
-        """Return True for a command to a system that stops its flight, lands it or leads it home."""
+    def stop_kind(self, sysid: int, inbound: Inbound) -> StopKind | None:
+        """Return how a command or SET_MODE to a system stops its flight; None for one that does not."""
 
     def is_started(self) -> bool:
         """Return True once drones are connected to; before, an id is looked up and not claimed."""
@@ -231,7 +231,7 @@ class FabricEndpoint(Endpoint):
     def _add(self, station: str) -> None:
         keys = self._connection.keys
         lane = self._lane(f"{self.url} from {station}", lambda sysid: keys.down(sysid, station))
-        lane.channel.ends_with_station = True
+        lane.channel.ends_with_station = lane.channel.has_ages = True
         self._stations[station] = _Station(lane, StationInput(session_of(station)))
         self._ping(station)
         self._sink.opened(lane.channel)
@@ -313,9 +313,7 @@ class FabricEndpoint(Endpoint):
         for received in channel.receive(sample.payload):
             if targets(received.message)[0] not in (0, sysid):
                 channel.counters["misdirected_frames"] += 1
-            elif station.input.is_late(
-                received, age, now, is_stop=age is None and self._is_stop(channel, sysid, received, now)
-            ):
+            elif station.input.is_late(received, age, now, self._stop_kind(channel, sysid, received, now)):
                 self._refuse(station, sysid, received, now)
             else:
                 accepted.append(received)
@@ -323,27 +321,29 @@ class FabricEndpoint(Endpoint):
             self._sink.received(channel, accepted, frozenset({sysid}))
         station.lane.flush()
 
-    def _is_stop(self, channel: Channel, sysid: int, received: ReceivedFrame, now: float) -> bool:
-        if not isinstance(received.message, COMMANDS):
-            return False
+    def _stop_kind(self, channel: Channel, sysid: int, received: ReceivedFrame, now: float) -> StopKind | None:
+        if not isinstance(received.message, REFUSED):
+            return None
         inbound = Inbound(received.message, channel, received.sysid, received.compid, now)
-        return self._systems.is_stop_of_flight(sysid, inbound)
+        return self._systems.stop_kind(sysid, inbound)
 
     def _refuse(self, station: _Station, sysid: int, received: ReceivedFrame, now: float) -> None:
-        """Count a late frame, and answer it if it is a command."""
+        """Count a late frame; answer a command, and send a text about commands and inputs."""
         channel, answer = station.lane.channel, refusal_of(received)
+        is_command = isinstance(received.message, REFUSED)
         channel.counters["late_frames"] += 1
-        if answer is not None:
+        if is_command:
             channel.counters["late_commands"] += 1
+        if answer is not None:
             compid = targets(received.message)[1] or dialect.MAV_COMP_ID_AUTOPILOT1
             channel.send(answer, sysid, compid, is_answer=True)
-        elif received.id in INPUTS:
+        if received.id in INPUTS:
             channel.counters["late_inputs"] += 1
-        else:
+        elif not is_command:
             return
         if now - station.reported >= REPORT_EVERY:
             station.reported = now
-            text = texts.COMMAND_LATE if answer is not None else texts.INPUT_LATE
+            text = texts.COMMAND_LATE if is_command else texts.INPUT_LATE
             channel.send(
                 dialect.MAVLink_statustext_message(dialect.MAV_SEVERITY_WARNING, text.encode()),
                 sysid,

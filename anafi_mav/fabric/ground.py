@@ -59,7 +59,8 @@ class FabricGround:
         `on_systems` is called with the systems on the fabric whenever they change. Raises `ConfigError`.
         """
         self.counters: Counter[str] = Counter()
-        """unknown_keys, no_system (frames for systems that are not on the fabric), stale, and those of the queues."""
+        """unknown_keys, no_system (frames for systems that are not on the fabric), stale (frames that waited while the
+        host stalled, and are published with that age), and those of the queues."""
         self._clock = clock
         self._on_systems = on_systems
         self._url = fabric
@@ -157,9 +158,9 @@ class FabricGround:
             return
         now = self._clock.monotonic()
         channel.heard_at = now
-        if self._stalls.old:
+        waited = self._stalls.waited
+        if waited:
             self.counters["stale"] += len(frames)
-            return
         by_system: defaultdict[int, list[bytes]] = defaultdict(list)
         for received in frames:
             target = targets(received.message)[0]
@@ -169,7 +170,7 @@ class FabricGround:
             for sysid in systems:
                 by_system[sysid].append(received.raw)
         for sysid, parts in by_system.items():
-            self._publish(station, sysid, parts, micros(now))
+            self._publish(station, sysid, parts, micros(now - waited))
 
     def _publish(self, station: _FabricStation, sysid: int, parts: list[bytes], sent: int) -> None:
         key, sample = self._connection.keys.up(sysid, station.name), b""
@@ -181,7 +182,7 @@ class FabricGround:
             sample += part
 
     def _stalled(self, seconds: float) -> None:
-        logger.warning("the host stalled for %.1f s: what stations sent meanwhile is dropped", seconds)
+        logger.warning("the host stalled for %.1f s: what stations sent meanwhile counts as so old", seconds)
 
     # What the fabric reports.
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Collection
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Any
 
 from anafi_mav.fabric.envelope import Ping, Pong, UpEnvelope, micros
@@ -55,6 +56,19 @@ INPUTS = frozenset(
 
 COMMANDS = (dialect.MAVLink_command_long_message, dialect.MAVLink_command_int_message)
 """Messages that are answered though they are too old."""
+
+REFUSED = (*COMMANDS, dialect.MAVLink_set_mode_message)
+"""Messages whose sender is informed that they are too old. SET_MODE has no answer but a text."""
+
+
+class StopKind(Enum):
+    """Kind of a message that stops the flight, which decides how old it may be.
+
+    A person must always be able to stop the drone: an acknowledgement that says "too late" stops nothing.
+    """
+
+    IN_PLACE = "Hold, Position, pause, Land, disarm: takes effect at any age"
+    HOME = "Return: moves the drone, so it takes effect when its age is unknown, and not when it is known to be old"
 
 
 @dataclass(frozen=True)
@@ -171,18 +185,18 @@ class StationInput:
         """Return the age of a sample, s; None while the station's clock is not known."""
         return self.offset.age(envelope.sent / 1e6, now)
 
-    def is_late(self, received: ReceivedFrame, age: float | None, now: float, *, is_stop: bool = False) -> bool:
+    def is_late(self, received: ReceivedFrame, age: float | None, now: float, stop: StopKind | None = None) -> bool:
         """Return True for a frame that is too old to have an effect.
 
-        `is_stop`: it stops the flight. Of an unknown age it is taken: a person must always be able to stop the drone.
-        A command that the station sent before it could read the refusal of an equal one is a repetition of that
-        attempt, and refused too: otherwise a refused command would be carried out a moment later.
+        `stop`: how it stops the flight, None for what does not. A command that the station sent before it could read
+        the refusal of an equal one is a repetition of that attempt, and refused too: otherwise a refused command would
+        be carried out a moment later.
         """
-        if is_stop and age is None:
+        if stop is StopKind.IN_PLACE or (stop is StopKind.HOME and age is None):
             return False
         limit = INPUT_LIMIT if received.id in INPUTS else LIMIT
         is_late = age is None or age > limit
-        if not isinstance(received.message, COMMANDS):
+        if not isinstance(received.message, REFUSED):
             return is_late
         attempt = _attempt(received)
         if not is_late:

@@ -97,6 +97,8 @@ class Channel:
         """True when only programs of this computer can be its peer."""
         self.ends_with_station = False
         """True when the channel closes as soon as its station is gone, and only then."""
+        self.has_ages = False
+        """True when its endpoint judges the age of each frame: none is dropped because the host stalled."""
         self.parser = Parser()
         self.signing: Signing | None = None
         """The key of the endpoint; None where there is no place for one."""

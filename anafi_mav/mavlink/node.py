@@ -261,7 +261,8 @@ class Node:
 
     def received(self, channel: Channel, frames: list[ReceivedFrame], reached: Collection[int] | None = None) -> None:
         reached = channel.system_ids if reached is None else reached
-        now, old = self._clock.monotonic(), self._stalls is not None and self._stalls.old
+        now = self._clock.monotonic()
+        old = self._stalls is not None and not channel.has_ages and self._stalls.old
         if frames:
             channel.heard_at = now
         for received in frames:

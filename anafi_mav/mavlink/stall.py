@@ -33,6 +33,8 @@ class StallWatch:
         self._on_stall = on_stall
         self._beaten = self._loop.time()
         self._drained = self._beaten
+        self._stalled_since = self._beaten
+        """Time of the last beat before the newest stall."""
         self.delays: deque[float] = deque(maxlen=KEPT)
         """How late the last beats were, s."""
         self._timer: asyncio.TimerHandle | None = None
@@ -54,15 +56,24 @@ class StallWatch:
 
         An event loop reads its sockets before it runs its timers: the first look after a stall finds no beat.
         """
+        return self.waited > 0.0
+
+    @property
+    def waited(self) -> float:
+        """How long what is read from a socket now may have waited there for a stall to end, s."""
         now = self._loop.time()
-        return self._timer is not None and (now - self._beaten >= STALL or now < self._drained)
+        if self._timer is None:
+            return 0.0
+        if now - self._beaten >= STALL:
+            return now - self._beaten
+        return now - self._stalled_since if now < self._drained else 0.0
 
     def _beat(self) -> None:
         now = self._loop.time()
-        late = now - self._beaten
+        before, late = self._beaten, now - self._beaten
         self.delays.append(max(0.0, late - BEAT))
         self._beaten = now
         self._timer = self._loop.call_later(BEAT, self._beat)
         if late >= STALL:
-            self._drained = now + DRAIN
+            self._stalled_since, self._drained = before, now + DRAIN
             self._on_stall(late)

@@ -84,6 +84,7 @@ class Effect(enum.Enum):
     STOP = "ends something and begins nothing: carried out each time it arrives, and never cancelled"
     HOLD = "a STOP that a person means against whatever the drone does: Hold, Pause, Brake, Loiter, Position"
     LAND = "a STOP that another client's Hold may have ended since: it is then not repeated"
+    KILL = "a STOP that cuts the motors in the air, where the configuration allows it"
     RETURN = "asks for the way home: when that is flown already, it is carried out again; never cancelled"
     LAPSING = "a mode that ends without another command: asked for after its end, it begins again, or is refused"
     EACH = "counts each time: after its end it is executed again, unless its confirmation says that it is repeated"
@@ -95,7 +96,7 @@ class Effect(enum.Enum):
     @property
     def stops(self) -> bool:
         """Ends something and begins nothing. It may be carried out twice."""
-        return self in (Effect.STOP, Effect.HOLD, Effect.LAND)
+        return self in (Effect.STOP, Effect.HOLD, Effect.LAND, Effect.KILL)
 
     @property
     def is_repeatable(self) -> bool:
@@ -139,11 +140,12 @@ def effect_of_mode(command: Command) -> Effect:
 
 
 def is_stop_of_flight(effect: Effect, mode: FlightMode | None) -> bool:
-    """Return True for Hold, Land, Return, pause and disarm.
+    """Return True for Hold, Land, Return, pause, disarm and the end of the flight by cut motors.
 
     A person may mean them against whatever flies. Guided stops too, but programs choose it as a matter of routine.
     """
-    return effect in (Effect.HOLD, Effect.LAND, Effect.RETURN) or (effect is Effect.STOP and mode is None)
+    is_always = effect in (Effect.HOLD, Effect.LAND, Effect.RETURN, Effect.KILL)
+    return is_always or (effect is Effect.STOP and mode is None)
 
 
 class Altitude(enum.Enum):

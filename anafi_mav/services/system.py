@@ -33,8 +33,10 @@ from anafi_mav.services.command.compass_service import CompassService
 from anafi_mav.services.command.flight_service import FlightService
 from anafi_mav.services.command.guided_service import GuidedService
 from anafi_mav.services.command.modes_service import ModesService
+from anafi_mav.services.command.operator_need import stop_of
 from anafi_mav.services.command.orbit_service import OrbitService
 from anafi_mav.services.command.running_actions import RunningActions
+from anafi_mav.services.commands import Effect
 from anafi_mav.services.component import BY_AUTOPILOT, Component, joined
 from anafi_mav.services.dropped_inputs import DroppedInputs, InputStream
 from anafi_mav.services.event.event_service import EventService
@@ -350,10 +352,11 @@ class System:
             self._muted.discard(channel)
         self._addressed = ([], [])
 
-    def is_stop_of_flight(self, inbound: Inbound) -> bool:
-        """Return True for a command that stops the aircraft, lands it or leads it home."""
-        command = self.owner(inbound.message).commands.action_of(inbound)
-        return command is not None and command.is_stop_of_flight
+    def stop_of(self, inbound: Inbound) -> Effect | None:
+        """Return the effect of a message that stops the flight; None for any other."""
+        is_command = inbound.message.get_msgId() in COMMANDS
+        component = self.owner(inbound.message) if is_command else self._autopilot
+        return stop_of(inbound, component.commands.action_of)
 
     def owner(self, message: Any) -> Component:
         """Return the component that answers this message to component 0.

@@ -2,6 +2,7 @@
 
     python tests/bench/suite.py --runs 6
     python tests/bench/suite.py --runs 3 --busy 2     # beside that many processes that keep a core busy
+    python tests/bench/suite.py --runs 1 --beside 2   # beside so many that run already, soak.py for example
 
 Each run appends a line of JSON to the tally (tests/bench/suite_runs.jsonl unless `--tally` names another file): date,
 commit, machine, busy processes, wall and processor time, counts, failed and repeated tests. The summary at the end is
@@ -80,7 +81,7 @@ def processor_time() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def run(busy: int, arguments: list[str], folder_of_outputs: Path) -> dict[str, Any]:
+def run(busy: int, beside: int, arguments: list[str], folder_of_outputs: Path) -> dict[str, Any]:
     """One run of pytest; its line of the tally."""
     date = datetime.datetime.now(datetime.timezone.utc)
     began, used = time.monotonic(), processor_time()
@@ -109,11 +110,11 @@ def run(busy: int, arguments: list[str], folder_of_outputs: Path) -> dict[str, A
         "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
         "commit": commit(),
         "machine": machine(),
-        "busy": busy,
+        "busy": busy + beside,
         "arguments": arguments,
         "status": status,
         "wall": round(wall),
-        "cpu": None if busy else round(cpu),
+        "cpu": None if busy + beside else round(cpu),
         "tests": len(cases),
         "skipped": sum(case.find("skipped") is not None for case in cases),
         "failed": failed,
@@ -144,12 +145,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=1, metavar="N")
     parser.add_argument("--busy", type=int, default=0, metavar="N", help="processes that keep a core busy meanwhile")
+    parser.add_argument("--beside", type=int, default=0, metavar="N", help="such processes that run already")
     parser.add_argument("--tally", type=Path, default=TALLY, metavar="FILE")
     parser.add_argument("arguments", nargs="*", help="for pytest, after --")
     options = parser.parse_args()
     rows = []
     for number in range(options.runs):
-        row = run(options.busy, options.arguments, options.tally.parent)
+        row = run(options.busy, options.beside, options.arguments, options.tally.parent)
         rows.append(row)
         with options.tally.open("a", encoding="utf-8") as tally:
             tally.write(json.dumps(row) + os.linesep)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import json
 import math
 import sys
+import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -15,9 +17,11 @@ import pytest
 import zenoh
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support import missions
+from support.clock import everybodys
 from support.fabric import FabricStation, RouterProcess, StallingRelay, ground, router
 from support.fault_scenarios import watched
 from support.ftp import Ftp
+from support.mav import Client
 from support.media import DAY, add_photo
 from support.params import write
 from support.process import gateway_process
@@ -29,6 +33,7 @@ from anafi_mav.mavlink import dialect as own
 from anafi_mav.mavlink.frames import frame, pack
 
 ACCEPTED, REJECTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_TEMPORARILY_REJECTED
+GOTO, LAND, HOLD = dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_NAV_LAND, 0x03040000
 PARTITION = 5.0
 
 
@@ -50,6 +55,16 @@ def opened(node: RouterProcess) -> zenoh.Session:
 
 def counted(w: World, name: str) -> int:
     return w.gateway.counters()[name]
+
+
+async def accepted(station: Client, command: int, *params: float) -> None:
+    """Send a command until it is accepted.
+
+    It is temporarily rejected until a ping has been answered.
+    """
+    while (ack := await station.command(command, *params)).result != ACCEPTED:
+        assert ack.result == REJECTED
+        await station.heartbeat(lambda beat: True)
 
 
 async def test_station_on_the_fabric_flies_a_mission_and_downloads_a_picture() -> None:
@@ -92,13 +107,14 @@ async def test_setpoints_of_a_partition_move_nothing_after_it() -> None:
                     await station.wait("LOCAL_POSITION_NED", lambda m: m.x > 1.0)
                     relay.stall()
                     mark = station.mark()
-                    station.send_command(dialect.MAV_CMD_NAV_LAND)
+                    station.send_command(GOTO, -1, 1, 0, frame=6, x=HOME[0] + 0.001, y=HOME[1], z=10.0)
                     count = len(sent)
-                    await asyncio.sleep(PARTITION)
+                    with everybodys():  # zenoh gives up a link after 10 s of everybody's clock
+                        await asyncio.sleep(PARTITION)
                 await asyncio.sleep(0.5)  # the last setpoint is now too old, too
                 began, before = len([*w.drone.log]), w.drone.pose
                 relay.resume()
-                ack = await station.wait("COMMAND_ACK", lambda m: m.command == dialect.MAV_CMD_NAV_LAND, since=mark)
+                ack = await station.wait("COMMAND_ACK", lambda m: m.command == GOTO, since=mark)
                 assert ack.result == REJECTED
                 assert (await station.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
                 await asyncio.sleep(1.0)
@@ -114,15 +130,54 @@ async def test_setpoints_of_a_partition_move_nothing_after_it() -> None:
             await relay.close()
 
 
+async def test_stop_of_a_partition_is_carried_out_after_it() -> None:
+    async with router() as node, world(endpoints=(node.url,)) as w:
+        relay = StallingRelay(node.port)
+        try:
+            async with ground(f"zenoh://127.0.0.1:{await relay.start()}", "tcpin") as port:
+                station = w.take(await FabricStation().join(port, tcp=True))
+                await w.take_off()
+                relay.stall()
+                mark = station.mark()
+                station.send(dialect.MAVLink_set_mode_message(1, 1, 0x04040000))  # Mission
+                station.send_command(GOTO, -1, 1, 0, frame=6, x=HOME[0] + 0.001, y=HOME[1], z=10.0)
+                station.send_command(LAND)
+                with everybodys():
+                    await asyncio.sleep(2.5)
+                relay.resume()
+                for command, result in ((GOTO, REJECTED), (LAND, ACCEPTED)):
+                    ack = await station.wait("COMMAND_ACK", lambda m, c=command: m.command == c, since=mark)
+                    assert ack.result == result
+                await station.heartbeat(lambda beat: beat.custom_mode == w.modes.land, since=mark)
+                await station.wait("STATUSTEXT", lambda m: m.text == "Command refused: too old on arrival", since=mark)
+                assert counted(w, "late_commands") == 2
+        finally:
+            await relay.close()
+
+
+async def test_stop_that_waits_while_the_host_stalls_is_carried_out() -> None:
+    """Ground process and gateway share the stalled event loop."""
+    async with flown() as (w, _):
+        await w.take_off()
+        with everybodys():
+            await asyncio.sleep(0)  # the clock of callbacks that began before goes slower
+            mark = w.client.mark()
+            w.client.send_command(GOTO, -1, 1, 0, frame=6, x=HOME[0] + 0.001, y=HOME[1], z=10.0)
+            w.client.send_command(LAND)
+            time.sleep(2.2)  # noqa: ASYNC251
+        for command, result in ((GOTO, REJECTED), (LAND, ACCEPTED)):
+            ack = await w.client.wait("COMMAND_ACK", lambda m, c=command: m.command == c, since=mark)
+            assert ack.result == result
+        assert counted(w, "late_commands") == 1
+
+
 async def test_killed_router_that_returns_brings_the_station_back() -> None:
     async with flown() as (w, node):
         await node.kill()
         await w.client.silence("HEARTBEAT", 2.0)
         await node.start()
         await w.client.heartbeat(lambda beat: True, timeout=20.0)
-        # The first heartbeats come before the first ping is answered.
-        await w.client.heartbeat(lambda beat: True)
-        assert (await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
+        await accepted(w.client, dialect.MAV_CMD_REQUEST_MESSAGE, 148)
 
 
 async def test_system_id_of_another_gateway_is_left_to_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -166,8 +221,7 @@ async def test_killed_gateway_that_returns_is_found_by_its_stations(tmp_path: Pa
             await station.silence("HEARTBEAT", 2.0)
             async with gateway_process(file, 10.0):
                 await station.heartbeat(lambda beat: True, timeout=20.0)
-                await station.heartbeat(lambda beat: True)  # a ping has been answered since the first
-                assert (await station.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
+                await accepted(station, dialect.MAV_CMD_REQUEST_MESSAGE, 148)
         finally:
             await station.close()
 
@@ -200,20 +254,32 @@ async def test_end_of_a_token_without_an_action_is_no_loss() -> None:
         assert "Ground station is back" not in [message.text for _, message in w.client.since(0, "STATUSTEXT")]
 
 
-async def test_station_that_answers_no_ping_can_return_and_not_take_off() -> None:
-    async with router() as node, world(endpoints=(node.url,)) as w:
+async def test_station_that_answers_no_ping_can_stop_the_flight_and_begin_nothing() -> None:
+    async with router() as node, world(endpoints=(node.url,), allow_kill=True) as w:
         await w.take_off()
         name = f"{7:016x}-1"
         with await asyncio.to_thread(opened, node) as session:
             samples = session.declare_subscriber(f"anafi/1/down/{name}")
             token = session.liveliness().declare_token(f"anafi/station/v1/{name}")
             await asyncio.to_thread(samples.recv)
-            for number, command in enumerate((own.MAV_CMD_NAV_TAKEOFF, own.MAV_CMD_NAV_RETURN_TO_LAUNCH), 1):
-                sent = own.MAVLink_command_long_message(1, 1, command, *[0] * 8)
+            numbers = itertools.count(1)
+
+            def put(sent: own.MAVLink_message) -> None:
+                number = next(numbers)
                 raw = frame(pack(sent), number, 255, 190)
                 session.put(f"anafi/1/up/{name}", raw, attachment=UpEnvelope(7, number, 0).encode())
+
+            put(own.MAVLink_command_long_message(1, 1, own.MAV_CMD_NAV_TAKEOFF, *[0] * 8))
+            put(own.MAVLink_set_mode_message(1, 1, 0x04040000))  # Mission
+            put(own.MAVLink_command_long_message(1, 1, own.MAV_CMD_DO_FLIGHTTERMINATION, 0, 1, *[0] * 6))
+            put(own.MAVLink_command_long_message(1, 1, own.MAV_CMD_NAV_RETURN_TO_LAUNCH, *[0] * 8))
             await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.returning, timeout=10.0)
-            assert counted(w, "late_commands") == 1
+            assert counted(w, "late_commands") == 3
+            mark = w.client.mark()
+            put(own.MAVLink_set_mode_message(1, 1, HOLD))
+            await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, since=mark, timeout=10.0)
+            assert counted(w, "late_commands") == 3
+            assert w.drone.pose.up > 3.0
             token.undeclare()
 
 

@@ -12,8 +12,9 @@ How long one turn of callbacks computed at most, which every timer has to wait f
 of ours blocks a loop in other ways for ruff.
 
 As soon as somebody else is there, a child process, work in a thread or a timer of the kernel's, the clock runs like
-theirs; with a thread only while the loop waits, and never past the timer that it waits for: a thread has no timers, and
-a busy machine must not look like a host that stalled.
+theirs; with threads, or beside child processes that only react (`only_reacts`), like a router, only while the loop
+waits, and never past the timer that it waits for: they have no timers, and a busy machine must not look like a host
+that stalled.
 """
 
 from __future__ import annotations
@@ -109,6 +110,8 @@ class Selector(selectors.DefaultSelector):
         """Who else can bring something about, as the test has said."""
         self.processes: list[asyncio.SubprocessTransport] = []
         """Those whose end the loop has not been told of: a thread may have collected it already."""
+        self.reactive: list[asyncio.SubprocessTransport] = []
+        """Those among them that only react to what they receive, as the test has said."""
         self.turns: Turns | None = None
         """Measured while somebody asks for them: the processor time of a thread is dear to ask for."""
         self._barrier = Barrier()
@@ -130,7 +133,7 @@ class Selector(selectors.DefaultSelector):
         if not alone:
             began = now()
             ready = super().select(timeout)
-            if self._only_threads():
+            if self._only_threads() or self._only_reactive():
                 here = _real() + _ahead
                 if timeout is not None:
                     here = min(here, began + max(timeout, 0.0))
@@ -138,7 +141,11 @@ class Selector(selectors.DefaultSelector):
                 _computing = threading.get_ident()
             return ready
         here = now()
-        ready = self._look()
+        ready = super().select(0.0)
+        if not ready and timeout:
+            # What waits behind callbacks that are ready need not be seen before them.
+            self._barrier.wait()
+            ready = super().select(0.0)
         if not ready and timeout is not None:
             here += max(timeout, 0.0)
         _ahead, _newest = here - _real(), max(_newest, here)
@@ -154,13 +161,9 @@ class Selector(selectors.DefaultSelector):
         """Whether the loop waits for threads of this process alone, which have no clock of their own."""
         return bool(self.in_threads) and not (self.others or self.processes) and childless()
 
-    def _look(self) -> Any:
-        """What is ready by itself."""
-        ready = super().select(0.0)
-        if not ready:
-            self._barrier.wait()
-            ready = super().select(0.0)
-        return ready
+    def _only_reactive(self) -> bool:
+        """Whether the loop's processes all only react: how long the machine lets this one wait is then of no matter."""
+        return bool(self.processes) and not self.others and all(one in self.reactive for one in self.processes)
 
     def close(self) -> None:
         self._barrier.close()
@@ -204,6 +207,15 @@ def everybodys() -> Iterator[None]:
         yield
     finally:
         selector.others -= 1
+
+
+def only_reacts(process: asyncio.subprocess.Process) -> None:
+    """A process of the test's has no clock that matters: beside such ones alone the loop's clock waits for the loop.
+
+    On a busy machine the loop then neither oversleeps nor computes for long, so that no message ages by that.
+    """
+    selector = _selector()
+    selector.reactive += [one for one in selector.processes if one.get_pid() == process.pid]
 
 
 @contextmanager

@@ -16,6 +16,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from anafi_mav.clock import SystemClock
 from anafi_mav.fabric.ground import FabricGround
 from anafi_mav.mavlink.endpoint import parse_endpoint
+from support.clock import only_reacts
 from support.mav import Client
 
 ROUTER = """
@@ -60,6 +61,7 @@ class RouterProcess:
             sys.executable, "-c", ROUTER, json.dumps(self._settings), *self._file,
             stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
         )  # fmt: skip
+        only_reacts(self._process)
         assert self._process.stdout is not None
         assert await asyncio.wait_for(self._process.stdout.readline(), 60.0) == b"ready\n"
 

@@ -131,7 +131,9 @@ async def terminate(vehicle: Vehicle, command: Command) -> None:
 
 
 def _effect_of_arm(command: Command) -> Effect:
-    return Effect.STOP if command.params[0] == 0.0 else Effect.CHANGE
+    if command.params[0] != 0.0:
+        return Effect.CHANGE
+    return Effect.KILL if command.params[1] == FORCE else Effect.STOP
 
 
 def _effect_of_reposition(command: Command) -> Effect:
@@ -173,6 +175,6 @@ def flight_actions(vehicle: Vehicle) -> dict[int, Action]:
             progress=ProgressPolicy.LATE,
         ),
         dialect.MAV_CMD_DO_FLIGHTTERMINATION: Action(
-            partial(terminate, vehicle), location=False, altitude=Altitude.UNUSED, effect=Effect.STOP
+            partial(terminate, vehicle), location=False, altitude=Altitude.UNUSED, effect=Effect.KILL
         ),
     }

@@ -1,4 +1,4 @@
-"""Role that a message needs while a station is the operator of the aircraft. No I/O.
+"""Role that a message needs while a station is the operator; stops of a flight. No I/O.
 
 Every client reads and stops: Hold, Land, Return, pause and disarm. The gimbal is decided by its manager
 (MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE). Sticks, setpoints and targets are judged by their services, which know the
@@ -12,7 +12,7 @@ from collections.abc import Callable
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.access import COMMANDS, Access, needed_access
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.commands import EFFECT_OF_MODE, Command, is_stop_of_flight
+from anafi_mav.services.commands import EFFECT_OF_MODE, Command, Effect, is_stop_of_flight
 from anafi_mav.services.flavours import flavour_of
 from anafi_mav.vehicle.operator_control import Need
 
@@ -70,10 +70,25 @@ def need_of(inbound: Inbound, action_of: Callable[[Inbound], Command | None]) ->
         command = action_of(inbound)
         free = command is None or command.id in GIMBAL_COMMANDS or command.is_stop_of_flight
         return Need.NOTHING if free else Need.COMMAND
+    if id == dialect.MAVLINK_MSG_ID_SET_MODE:
+        return Need.COMMAND if stop_of(inbound, action_of) is None else Need.NOTHING
     if id in INPUT_MESSAGES or id in GIMBAL_MESSAGES or id in ACKNOWLEDGEMENTS:
         return Need.NOTHING
-    if id == dialect.MAVLINK_MSG_ID_SET_MODE:
-        mode = flavour_of(inbound.channel).mode_of_number(message.custom_mode)
-        is_stop = mode is not None and is_stop_of_flight(EFFECT_OF_MODE[mode], mode)
-        return Need.NOTHING if is_stop else Need.COMMAND
     return Need.NOTHING if needed_access(message) is Access.OBSERVE else Need.COMMAND
+
+
+def stop_of(inbound: Inbound, action_of: Callable[[Inbound], Command | None]) -> Effect | None:
+    """Return the effect of a command or SET_MODE that stops the flight; None for others.
+
+    `action_of` as in `need_of`.
+    """
+    id = inbound.message.get_msgId()
+    if id in COMMANDS:
+        command = action_of(inbound)
+        if command is None or command.id in GIMBAL_COMMANDS or not command.is_stop_of_flight:
+            return None
+        return command.effect
+    if id == dialect.MAVLINK_MSG_ID_SET_MODE:
+        mode = flavour_of(inbound.channel).mode_of_number(inbound.message.custom_mode)
+        return None if mode is None or not is_stop_of_flight(EFFECT_OF_MODE[mode], mode) else EFFECT_OF_MODE[mode]
+    return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from anafi_mav.fabric.envelope import Pong, UpEnvelope
-from anafi_mav.fabric.sample_age import ClockOffset, StationInput, refusal_of
+from anafi_mav.fabric.sample_age import ClockOffset, StationInput, StopKind, refusal_of
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.frames import Parser, ReceivedFrame, frame, pack
 
@@ -130,12 +130,32 @@ def test_repetition_of_a_refused_command_is_refused_until_its_sender_could_know(
     assert not station.is_late(command(0), 0.1, 100.3)
 
 
-def test_stop_of_unknown_age_is_taken_and_an_old_one_is_not() -> None:
-    land = received(dialect.MAVLink_command_long_message(1, 1, dialect.MAV_CMD_NAV_LAND, *[0] * 8))
+LAND = received(dialect.MAVLink_command_long_message(1, 1, dialect.MAV_CMD_NAV_LAND, *[0] * 8))
+RETURN = received(dialect.MAVLink_command_long_message(1, 1, dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, *[0] * 8))
+SET_MODE = received(dialect.MAVLink_set_mode_message(1, 1, 0x03040000))
+
+
+@pytest.mark.parametrize("age", [0.1, 1.9, 2.1, 60.0, None])
+@pytest.mark.parametrize("stop", [LAND, SET_MODE])
+def test_stop_in_place_is_taken_at_any_age(stop: ReceivedFrame, age: float | None) -> None:
+    assert not StationInput(SESSION).is_late(stop, age, 100.0, StopKind.IN_PLACE)
+
+
+@pytest.mark.parametrize(("age", "late"), [(1.9, False), (2.1, True), (None, False)])
+def test_return_is_taken_unless_it_is_known_to_be_old(age: float | None, late: bool) -> None:
+    assert StationInput(SESSION).is_late(RETURN, age, 100.0, StopKind.HOME) is late
+
+
+@pytest.mark.parametrize(("age", "late"), [(1.9, False), (2.1, True), (None, True)])
+def test_set_mode_that_stops_nothing_is_late_as_a_command(age: float | None, late: bool) -> None:
+    assert StationInput(SESSION).is_late(SET_MODE, age, 100.0) is late
+
+
+def test_repetition_of_a_refused_set_mode_is_refused() -> None:
     station = StationInput(SESSION)
-    assert not station.is_late(land, None, 100.0, is_stop=True)
-    assert station.is_late(land, 2.1, 100.0, is_stop=True)
-    assert station.is_late(command(), None, 100.0)
+    assert station.is_late(SET_MODE, 4.0, 100.0)
+    assert station.is_late(SET_MODE, 0.6, 100.1)  # sent at 99.5, before the refusal left
+    assert not station.is_late(SET_MODE, 0.1, 100.3)
 
 
 def test_time_in_the_future_is_of_unknown_age() -> None:
@@ -153,6 +173,7 @@ def test_refusal_answers_commands_only() -> None:
     assert answer.result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
     assert (answer.target_system, answer.target_component) == (255, 190)
     assert refusal_of(HEARTBEAT) is None
+    assert refusal_of(SET_MODE) is None
 
 
 def test_pings_try_each_system_until_one_is_answered() -> None:

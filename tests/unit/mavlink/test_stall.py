@@ -6,7 +6,7 @@ import asyncio
 import threading
 import time
 
-from support.clock import everybodys
+from support.clock import everybodys, only_reacts
 
 from anafi_mav.mavlink.stall import STALL, StallWatch
 
@@ -19,9 +19,13 @@ async def test_stall_marks_data_old_until_sockets_are_drained() -> None:
         await asyncio.sleep(0)  # the clock of callbacks that began before goes slower
         time.sleep(1.2 * STALL)  # noqa: ASYNC251
         assert watch.old  # before any timer has run
+        assert watch.waited >= 1.2 * STALL
         assert stalls == []
+        await asyncio.sleep(0.1)  # a beat
+        assert watch.waited >= 1.2 * STALL  # what arrived during the stall may still be in a socket
         while watch.old:  # noqa: ASYNC110
             await asyncio.sleep(0.05)
+        assert watch.waited == 0.0
         assert stalls[0] >= STALL
     watch.stop()
 
@@ -48,5 +52,22 @@ async def test_slow_callback_beside_a_thread_is_no_stall_of_the_host() -> None:
     await asyncio.sleep(0.2)  # two beats
     written.set()
     await work
+    watch.stop()
+    assert stalls == []
+
+
+async def test_slow_callback_beside_a_process_that_only_reacts_is_no_stall_of_the_host() -> None:
+    """The clock of tests: a busy machine with a router in a process of its own must not look like one either."""
+    stalls: list[float] = []
+    watch = StallWatch(stalls.append)
+    watch.start()
+    process = await asyncio.create_subprocess_exec("cat", stdin=asyncio.subprocess.PIPE)
+    only_reacts(process)
+    await asyncio.sleep(0)
+    time.sleep(1.2 * STALL)  # noqa: ASYNC251
+    assert not watch.old
+    await asyncio.sleep(0.2)  # two beats
+    process.kill()
+    await process.wait()
     watch.stop()
     assert stalls == []

@@ -48,7 +48,7 @@ ROWS: dict[str, tuple[bool, Altitude, object, ProgressPolicy]] = {
     "DO_MOUNT_CONFIGURE": (False, Altitude.UNUSED, Effect.TARGET, ProgressPolicy.LATE),
     "DO_MOUNT_CONTROL": (False, Altitude.UNUSED, Effect.TARGET, ProgressPolicy.LATE),
     "DO_FENCE_ENABLE": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
-    "DO_FLIGHTTERMINATION": (False, Altitude.UNUSED, Effect.STOP, ProgressPolicy.PROMPT),
+    "DO_FLIGHTTERMINATION": (False, Altitude.UNUSED, Effect.KILL, ProgressPolicy.PROMPT),
     "DO_ORBIT": (True, Altitude.AMSL, Effect.CHANGE, ProgressPolicy.PROMPT),
     "DO_PAUSE_CONTINUE": (False, Altitude.UNUSED, BY_PARAMETER, ProgressPolicy.PROMPT),
     "DO_REPOSITION": (True, Altitude.BY_FRAME, BY_PARAMETER, ProgressPolicy.EARLY),
@@ -171,7 +171,9 @@ async def test_payload_rows_of_both_components_equal_the_list() -> None:
     ("name", "params", "place", "flavour", "effect"),
     [
         ("COMPONENT_ARM_DISARM", (0.0, NAN, NAN, NAN), (NAN, NAN, NAN), PX4, Effect.STOP),
+        ("COMPONENT_ARM_DISARM", (0.0, 21196.0, NAN, NAN), (NAN, NAN, NAN), PX4, Effect.KILL),
         ("COMPONENT_ARM_DISARM", (1.0, NAN, NAN, NAN), (NAN, NAN, NAN), PX4, Effect.CHANGE),
+        ("COMPONENT_ARM_DISARM", (1.0, 21196.0, NAN, NAN), (NAN, NAN, NAN), PX4, Effect.CHANGE),
         ("DO_PAUSE_CONTINUE", (0.0, NAN, NAN, NAN), (NAN, NAN, NAN), PX4, Effect.HOLD),
         ("DO_PAUSE_CONTINUE", (1.0, NAN, NAN, NAN), (NAN, NAN, NAN), PX4, Effect.CHANGE),
         ("DO_REPOSITION", (-1.0, 1.0, NAN, NAN), (NAN, NAN, NAN), PX4, Effect.HOLD),

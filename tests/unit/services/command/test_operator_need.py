@@ -15,6 +15,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.frames import unpack
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.services.command.operator_need import GIMBAL_COMMANDS, GIMBAL_MESSAGES, INPUT_MESSAGES, need_of
+from anafi_mav.services.commands import Effect
 from anafi_mav.services.gimbal.gimbal_service import GimbalService
 from anafi_mav.services.system import System
 from anafi_mav.vehicle.operator_control import Need
@@ -163,6 +164,33 @@ async def test_command_that_begins_something_needs_a_role(system: System) -> Non
     for mode in (4, 3):  # Guided, Auto
         assert needed(system, command(dialect.MAV_CMD_DO_SET_MODE, 1, mode), "ardupilot") is COMMAND
         assert needed(system, dialect.MAVLink_set_mode_message(1, 1, mode), "ardupilot") is COMMAND
+
+
+@pytest.mark.parametrize(
+    ("message", "effect"),
+    [
+        (dialect.MAVLink_set_mode_message(1, 1, 0x03040000), Effect.HOLD),
+        (dialect.MAVLink_set_mode_message(1, 1, 0x00030000), Effect.HOLD),
+        (dialect.MAVLink_set_mode_message(1, 1, 0x06040000), Effect.LAND),
+        (dialect.MAVLink_set_mode_message(1, 1, 0x05040000), Effect.RETURN),
+        (dialect.MAVLink_set_mode_message(1, 1, 0x04040000), None),
+        (dialect.MAVLink_set_mode_message(1, 1, 0x7F000000), None),
+        (command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 3), Effect.HOLD),
+        (command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 4), None),
+        (command(dialect.MAV_CMD_DO_PAUSE_CONTINUE, 0), Effect.HOLD),
+        (command(dialect.MAV_CMD_DO_PAUSE_CONTINUE, 1), None),
+        (command(dialect.MAV_CMD_NAV_LAND), Effect.LAND),
+        (command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0), Effect.STOP),
+        (command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0, 21196), Effect.KILL),
+        (command(dialect.MAV_CMD_DO_FLIGHTTERMINATION, 1), Effect.KILL),
+        (command(dialect.MAV_CMD_REQUEST_MESSAGE, 148), None),
+        (command(dialect.MAV_CMD_DO_SET_ROI_NONE), None),
+        (command(dialect.MAV_CMD_VIDEO_STOP_CAPTURE), None),
+        (dialect.MAVLink_manual_control_message(1, 0, 0, 500, 0, 0), None),
+    ],
+)
+async def test_stop_of_flight_is_a_command_or_a_mode(system: System, message: Any, effect: Effect | None) -> None:
+    assert system.stop_of(inbound(message)) is effect
 
 
 async def test_every_other_action_needs_a_role_and_no_query_does(system: System) -> None:
