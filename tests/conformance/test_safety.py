@@ -42,6 +42,7 @@ from support.world import HOLD, HOME, LAND, OFFBOARD, RETURN, World, world
 
 from anafi_mav import geo, mav_enums
 from anafi_mav.arsdk.messages import ardrone3, common, rth
+from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.units import quaternion_from_euler
 
 PITCH_STICK = 3
@@ -545,6 +546,20 @@ async def test_gateway_does_not_climb_during_shutdown() -> None:
         assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=20.0)).result == ACCEPTED
         await w.gateway.close()
         assert [e.args for e in w.commands("ardrone3.Piloting.moveBy") if e.args["dZ"] != 0.0] == []
+
+
+async def test_end_of_the_gateway_lands_a_takeoff_that_the_drone_has_not_received() -> None:
+    """It would rise after the end of the gateway, and hover with no program to land it."""
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        w.drone.faults.up = Impairment(delay=0.8)
+        mark = w.client.mark()
+        w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
+        await being_tried(w.client, mark, TAKEOFF_CMD)
+        assert heard(w, "TakeOff") == []
+        await w.gateway.close()
+        await watched(10.0)
+        assert w.drone.flying_state.name == "LANDED"
 
 
 # Values that nobody foresaw.

@@ -29,6 +29,7 @@ from support.setpoints import (
 from support.world import ARMED, HOLD, HOME, OFFBOARD, World, world
 
 from anafi_mav import geo
+from anafi_mav.arsdk.messages import rth
 from anafi_mav.sim.skycontroller import TAKEOFF_LAND
 from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.sim.world.quirks import Quirk
@@ -278,6 +279,22 @@ async def test_prearm_problem_keeps_setpoints_on_the_ground() -> None:
             program.setpoint = attitude(thrust=0.7)
             await said(w.client, "Setpoint refused: ", mark)
             await asyncio.sleep(1.3)
+        assert heard(w, "TakeOff") == []
+
+
+async def test_setpoints_do_not_take_off_a_vehicle_that_is_disarmed_meanwhile() -> None:
+    """Their second is over, but a home is still being undone when the armed state expires."""
+    async with world(speed=1.0) as w:
+        program = Program(IDLE)
+        async with streaming(w.client, program):
+            await ready(w.client, "px4")
+            await asyncio.sleep(7.0)  # 3 s before the armed state expires
+            w.drone.faults.untold = frozenset({rth.CustomLocation.NAME, rth.PreferredHomeType.NAME})
+            w.client.send_command(dialect.MAV_CMD_DO_SET_HOME, 0, frame=0, x=48.88, y=2.37, z=0.0)
+            await w.drone.wait_log(lambda e: e.kind == "command" and e.name.startswith("rth.set"), 5.0)
+            program.setpoint = attitude(thrust=0.7)
+            await said(w.client, "Disarmed: no takeoff", 0)
+            await asyncio.sleep(6.0)  # the home is undone within this time
         assert heard(w, "TakeOff") == []
 
 

@@ -166,6 +166,21 @@ async def test_landing_that_begins_during_a_stop_is_not_ended_without_the_right(
         assert [e for e in heard(w, "PCMD", since=began) if e.args["gaz"] > 0] == []
 
 
+async def test_return_does_not_end_a_landing_that_begins_before_it_is_flown() -> None:
+    """It waits for the end of what flew; meanwhile another controller lands the drone."""
+    async with world(speed=1.0) as w:
+        await w.take_off(UP)
+        await home_being_undone(w)
+        mark, began = w.client.mark(), now()
+        w.client.send_command(RTL)
+        await watched(0.2)
+        somebody_else(w, ardrone3.Landing())
+        assert (RTL, REJECTED) in await until(w.client, mark, 2)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 30.0)
+        assert [e for e in heard(w, "PCMD", since=began) if e.args["gaz"] > 0] == []
+        assert heard(w, "return_to_home") == []
+
+
 # What waits for the end of what it replaces, and for how long.
 
 
