@@ -112,14 +112,17 @@ def split_frames(sample: bytes) -> Iterator[bytes]:
 
 
 class FrameNumbers:
-    """Counts the frames that are missing between those that arrive, by MAVLink's sequence numbers."""
+    """Counts the frames missing between those that arrive, by MAVLink sequence numbers."""
 
     def __init__(self) -> None:
         self._newest: dict[bytes, int] = {}
         """Of each system and component."""
 
     def missing(self, raw: bytes) -> int:
-        """Return how many frames of its sender are missing before a frame; 256 at once look like none."""
+        """Return how many frames of its sender are missing before a frame.
+
+        256 at once look like none.
+        """
         at = 4 if raw[0] == MAGIC_2 else 2
         number, sender = raw[at], raw[at + 1 : at + 3]
         newest = self._newest.get(sender)
