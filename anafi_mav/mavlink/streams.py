@@ -77,7 +77,7 @@ class _Audience(Generic[ChannelT]):
 class Streams(Generic[ChannelT]):
     """The intervals of one vehicle's messages on every channel.
 
-    A closed channel is removed by itself.
+    A channel is removed when it is closed, or no longer exists.
     """
 
     def __init__(
@@ -153,8 +153,13 @@ class Streams(Generic[ChannelT]):
         self._forget(id)
         return self._stream(channel, id).due(now)
 
-    def channel_closed(self) -> None:
-        """Forget the lists of channels, which keep the closed one alive."""
+    def channel_closed(self, channel: ChannelT) -> None:
+        """Forget a channel, and the lists of channels, which keep it alive.
+
+        Its intervals are a table for each component of each drone. What still refers to the channel, a command of its
+        client for example, must not keep them.
+        """
+        self._channels.pop(channel, None)
         self._audiences.clear()
 
     def _forget(self, id: int) -> None:

@@ -417,6 +417,10 @@ class CommandHistory:
             if other != client and used is group:
                 execution.superseded = True
 
+    def forget_clients(self, is_gone: Callable[[Hashable], bool]) -> None:
+        """Forget the actions of the clients for which `is_gone` returns True."""
+        self._newest = {key: execution for key, execution in self._newest.items() if not is_gone(key[0])}
+
     def forget(self, client: Hashable | None = None, group: ActionGroup = ActionGroup.FLIGHT) -> None:
         """Forget the newest action of one client in a group, or all actions (client None).
 

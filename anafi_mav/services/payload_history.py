@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import defaultdict
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import (
@@ -69,6 +69,10 @@ class PayloadHistory:
         if len(self._newest) > MAX_CLIENTS:
             del self._newest[next(iter(self._newest))]
         return execution
+
+    def forget_clients(self, is_gone: Callable[[Hashable], bool]) -> None:
+        """Forget the actions of the clients for which `is_gone` returns True."""
+        self._newest = {key: execution for key, execution in self._newest.items() if not is_gone(key[0])}
 
     def forget(self) -> None:
         """Forget all actions: the link is lost, and the drone may restart."""

@@ -594,7 +594,13 @@ class System:
     def channel_closed(self, channel: Channel) -> None:
         """A client's channel is gone."""
         self._muted.discard(channel)
-        self._dropped.forget(lambda client: channel_of(client) is channel)
+
+        def is_gone(client: Hashable) -> bool:
+            return channel_of(client) is channel
+
+        self._dropped.forget(is_gone)
+        self.payload_history.forget_clients(is_gone)
+        self.vehicle.holds.forget_clients(is_gone)
         for service in self.services:
             service.channel_closed(channel)
 

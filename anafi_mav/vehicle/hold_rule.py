@@ -9,7 +9,7 @@ Programs send Hold many times, a person means each of them. So a Hold counts onl
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 
 APART = 5.0
 """s without a Hold of the same client before one that counts."""
@@ -47,6 +47,11 @@ class HoldRule:
     def answers(self, client: Hashable, now: float) -> bool:
         """True when a counted Hold of this client, at `now`, cancels the announced return."""
         return APART <= now - self._offered.get(client, -math.inf) <= ANSWER
+
+    def forget_clients(self, is_gone: Callable[[Hashable], bool]) -> None:
+        """Forget the Holds of the clients for which `is_gone` returns True."""
+        self._newest = {client: at for client, at in self._newest.items() if not is_gone(client)}
+        self._offered = {client: at for client, at in self._offered.items() if not is_gone(client)}
 
     def withdraw(self) -> None:
         """Note that no return is announced: earlier texts do not count for the next announcement."""

@@ -8,7 +8,20 @@ from typing import Any
 
 import pytest
 from support.callers import CALLERS, system_of
-from support.fault_scenarios import ACCEPTED, LAND_CMD, PX4_HOLD, REJECTED, RTL, SET_MODE, goto, heard, watched
+from support.fault_scenarios import (
+    ACCEPTED,
+    ARM,
+    LAND_CMD,
+    PX4_HOLD,
+    REJECTED,
+    RTL,
+    SET_MODE,
+    TAKEOFF_CMD,
+    goto,
+    heard,
+    results,
+    watched,
+)
 from support.mav import Client
 from support.world import HOLD, RETURN, World, world
 
@@ -51,6 +64,21 @@ async def in_phase(w: World, phase: ReturnPhase) -> None:
 
 async def text(client: Client, words: str, since: int = 0, timeout: float = 5.0) -> Any:
     return await client.wait("STATUSTEXT", lambda m: words in m.text, since=since, timeout=timeout)
+
+
+@pytest.mark.parametrize("state", ["motor_ramping", "takingoff"])
+async def test_return_during_takeoff_is_flown_from_the_first_hover(state: str) -> None:
+    """The drone ignores a return while it takes off; a person who has commanded it must not be left hovering."""
+    async with world() as w:
+        await w.drone.wait_log(lambda e: e.kind == "pose", 10.0)
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        mark = w.client.mark()
+        w.client.send_command(TAKEOFF_CMD)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == state, 10.0)
+        w.client.send_command(RTL)
+        await w.client.wait("COMMAND_ACK", lambda m: (m.command, m.result) == (RTL, ACCEPTED), since=mark, timeout=10.0)
+        assert w.drone.firmware.homing.active
+        assert [result for command, result in results(w.client, mark) if command == RTL] == [ACCEPTED]
 
 
 async def away(w: World) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 
 from anafi_mav.arsdk.messages import rth
-from anafi_mav.arsdk.messages.ardrone3 import FlyingState
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState, FlyingStateChanged
 from anafi_mav.arsdk.messages.rth import RthState
 from anafi_mav.drone.element import Element
 from anafi_mav.drone.expectation import QUIET, Commander, loop_time
@@ -18,6 +18,9 @@ from anafi_mav.drone.piloting.stick_stream import StickStream
 from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.drone.status.home import Home
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost
+
+_TAKES_OFF = frozenset({FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF, FlyingState.TAKINGOFF})
+_FLIES = frozenset({FlyingState.HOVERING, FlyingState.FLYING})
 
 
 class ReturnHome:
@@ -64,7 +67,11 @@ class ReturnHome:
         move = Move(self._commander.expect((rth.State,), judge))
         self._moves.returning = move
         try:
+            takes_off = self._flight.state.flying in _TAKES_OFF
             self._commander.dispatch(move.answer, rth.ReturnToHome(), timeout)
+            if takes_off and await self._has_taken_off(move):  # it has ignored what it received before
+                self._commander.cancel(move.answer.token)
+                self._commander.dispatch(move.answer, rth.ReturnToHome(), timeout)
             await move.answer.wait()
         except (CommandRejected, LinkLost):
             if self._moves.returning is move:
@@ -73,6 +80,19 @@ class ReturnHome:
             raise
         # After a timeout it stays ours: should the drone begin to return all the same, hover has to stop it.
         return move
+
+    async def _has_taken_off(self, move: Move) -> bool:
+        """Wait until the drone hovers or flies; return False when the return is answered before."""
+        hover = self._commander.expect((FlyingStateChanged,), lambda message: True if message.state in _FLIES else None)
+        try:
+            await asyncio.wait({move.answer.future, hover.future}, return_when=asyncio.FIRST_COMPLETED)
+        except BaseException:
+            self._commander.cancel(move.answer.token)
+            move.answer.close()
+            raise
+        finally:
+            hover.close()
+        return not move.answer.future.done()
 
     async def cancel_return_home(self, timeout: float, *, even_its_own: bool = False) -> None:
         self._commander.require_link()

@@ -16,6 +16,7 @@ from typing import Any
 from anafi_mav.clock import Alarm
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported
 from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.command.command_log import CommandLog, Refusal
 from anafi_mav.services.command.running_actions import RunningAction, RunningActions
@@ -37,7 +38,7 @@ from anafi_mav.services.commands import (
     from_long,
 )
 from anafi_mav.services.flavours import Flavour, flavour_of
-from anafi_mav.services.service import Host, MessageHandler, Query, Service, client_of
+from anafi_mav.services.service import Host, MessageHandler, Query, Service, channel_of, client_of
 from anafi_mav.vehicle.base.refusal import NotInControl, Refused, Unsupported, text_of
 from anafi_mav.vehicle.base.severity import Severity
 
@@ -133,6 +134,9 @@ class CommandService(Service):
         """
         if self._running:
             await asyncio.wait(tuple(self._running), timeout=limit)
+
+    def channel_closed(self, channel: Channel) -> None:
+        self._history.forget_clients(lambda client: channel_of(client) is channel)
 
     def link_down(self) -> None:
         """Send FAILED to each client that waits for an acknowledgement.

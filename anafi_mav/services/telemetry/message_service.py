@@ -151,7 +151,7 @@ class MessageService(Service):
 
     def channel_closed(self, channel: Channel) -> None:
         self._sources.close(channel)
-        self._intervals.channel_closed()
+        self._intervals.channel_closed(channel)
 
     def subscriptions(self) -> Subscriptions:
         return dict.fromkeys(self._events, self._on_update)

@@ -156,5 +156,8 @@ def test_lists_of_channels_asked_about_in_turn_share_intervals() -> None:
     for number in range(20):
         streams.due_on([one], (ATTITUDE,), float(number))
     assert len(streams._audiences) <= 4
-    streams.channel_closed()
+    streams.set(one, ATTITUDE, 0.5)
+    streams.set(other, ATTITUDE, 0.5)
+    streams.channel_closed(one)
     assert streams._audiences == []
+    assert (streams.interval(one, ATTITUDE), streams.interval(other, ATTITUDE)) == (1.0, 0.5)

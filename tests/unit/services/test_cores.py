@@ -290,6 +290,15 @@ def test_replaced_command_of_another_client_is_not_repeated() -> None:
     assert history.retransmission("c", stop, 1.0) is None  # an order to stop is always carried out
 
 
+def test_actions_of_gone_clients_are_forgotten() -> None:
+    history = commands.CommandHistory()
+    history.begin("a", command())
+    history.begin("b", command())
+    history.forget_clients(lambda client: client == "a")
+    assert history.retransmission("a", command(), 1.0) is None
+    assert history.retransmission("b", command(), 1.0) == dialect.MAV_RESULT_IN_PROGRESS
+
+
 def test_repeated_refused_command_keeps_its_refusal_though_another_client_commanded() -> None:
     history = commands.CommandHistory()
     execution = history.begin("a", command())

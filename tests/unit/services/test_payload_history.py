@@ -119,3 +119,12 @@ def test_payload_history_is_bounded() -> None:
     assert history.retransmission(make(Effect.ONCE, id=1), 0.0) == IN_PROGRESS
     history.forget()
     assert history.retransmission(make(Effect.ONCE, id=1), 0.0) is None
+
+
+def test_actions_of_gone_clients_are_forgotten() -> None:
+    history = PayloadHistory()
+    for client in ("a", "b"):
+        history.begin(make(Effect.NUMBERED, client=client))
+    history.forget_clients(lambda client: client == "a")
+    assert history.retransmission(make(Effect.NUMBERED, client="a"), 1.0) is None
+    assert history.retransmission(make(Effect.NUMBERED, client="b"), 1.0) == IN_PROGRESS

@@ -36,6 +36,16 @@ def test_withdrawn_offer_is_not_answered() -> None:
     assert not rule.answers("a", 56.0)
 
 
+def test_holds_of_gone_clients_are_forgotten() -> None:
+    rule = HoldRule()
+    for client in ("a", "b"):
+        rule.arrive(client, 100.0)
+        rule.offer(client, 100.0)
+    rule.forget_clients(lambda client: client == "a")
+    assert [rule.arrive(client, 101.0) for client in ("a", "b")] == [True, False]
+    assert [rule.answers(client, 106.0) for client in ("a", "b")] == [False, True]
+
+
 def test_remembered_clients_are_bounded() -> None:
     rule = HoldRule()
     for number in range(3 * MAX_CLIENTS):
