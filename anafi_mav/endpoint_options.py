@@ -178,7 +178,8 @@ class EndpointOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
     link: Annotated[
         Literal["tcp", "udp", "tls", "quic"],
         Meta(
-            description="Transport of the link to the zenoh router. `tls` and `quic` encrypt. `zenoh` only.",
+            description="Transport of the link to the zenoh router. `tls` and `quic` encrypt. `udp` repeats nothing "
+            "that is lost: a station or a drone may stay unseen, so use it on a wire only. `zenoh` only.",
             extra=expected("tcp, udp, tls or quic"),
         ),
     ] = "tcp"

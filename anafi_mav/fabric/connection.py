@@ -77,6 +77,8 @@ class FabricConnection:
         except ImportError as error:
             raise OSError(MISSING) from error
         options = self._url.options
+        if options.link == "udp":
+            logger.warning("%s: udp repeats nothing that is lost: a drone or station may stay unseen", self._url.text)
         self._zenoh = module.ZenohSession(
             session_settings(self._url), self._queue, self._arrivals.put, retries=not options.listen
         )

@@ -147,7 +147,9 @@ class FabricEndpoint(Endpoint):
             return f"{self.url}: not connected ({self._connection.problem}), retrying"
         count = len(self._stations)
         kept_off = "".join(f", system {sysid} is another gateway's" for sysid in sorted(self.claims.refused))
-        return f"{self.url}: connected, {count} station{'' if count == 1 else 's'}{kept_off}"
+        lost = sum(station.input.lost for station in self._stations.values())
+        lost_on_the_way = f", {lost} of their samples lost" if lost else ""
+        return f"{self.url}: connected, {count} station{'' if count == 1 else 's'}{lost_on_the_way}{kept_off}"
 
     async def problems(self) -> list[str]:
         listed = asyncio.ensure_future(self._listed.wait())
@@ -307,6 +309,7 @@ class FabricEndpoint(Endpoint):
         if not station.input.is_next(sysid, envelope):
             channel.counters["repeated_samples"] += 1
             return
+        channel.counters["lost_samples"] = station.input.lost
         station.input.hear(sysid)
         age = station.input.age(envelope, now)
         accepted = []

@@ -111,6 +111,25 @@ def split_frames(sample: bytes) -> Iterator[bytes]:
         position += length
 
 
+class FrameNumbers:
+    """Counts the frames missing between those that arrive, by MAVLink sequence numbers."""
+
+    def __init__(self) -> None:
+        self._newest: dict[bytes, int] = {}
+        """Of each system and component."""
+
+    def missing(self, raw: bytes) -> int:
+        """Return how many frames of its sender are missing before a frame.
+
+        256 at once look like none.
+        """
+        at = 4 if raw[0] == MAGIC_2 else 2
+        number, sender = raw[at], raw[at + 1 : at + 3]
+        newest = self._newest.get(sender)
+        self._newest[sender] = number
+        return 0 if newest is None else (number - newest - 1) & 0xFF
+
+
 def sender_of(raw: bytes) -> int:
     """Return the system id of a version 2 frame's sender."""
     return raw[5]

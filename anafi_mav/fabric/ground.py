@@ -10,7 +10,7 @@ from anafi_mav.clock import Clock
 from anafi_mav.errors import ConfigError
 from anafi_mav.fabric.arrivals import Arrival, FabricSample, LinkChange, TokenChange
 from anafi_mav.fabric.connection import FabricConnection
-from anafi_mav.fabric.envelope import MAX_SAMPLE, Ping, Pong, UpEnvelope, micros, split_frames
+from anafi_mav.fabric.envelope import MAX_SAMPLE, FrameNumbers, Ping, Pong, UpEnvelope, micros, split_frames
 from anafi_mav.fabric.keys import KeyKind, station_id
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, reason
 from anafi_mav.mavlink.channel import Channel, total
@@ -26,6 +26,9 @@ LOCAL_OPTIONS = {"frames", "datagram_bytes", "max_clients", "idle_limit", "allow
 
 FABRIC_OPTIONS = {"prefix", "link", "listen", "ca", "certificate", "private_key"}
 
+WARN_EVERY = 10.0
+"""s between two warnings about lost frames."""
+
 ALL = "*"
 
 
@@ -35,6 +38,8 @@ class _FabricStation:
     def __init__(self, name: str, channel: Channel) -> None:
         self.name = name
         self.channel = channel
+        self.received = FrameNumbers()
+        """Of the frames from the fabric."""
         self._numbers: defaultdict[int, int] = defaultdict(int)
 
     def next_number(self, sysid: int) -> int:
@@ -60,7 +65,8 @@ class FabricGround:
         """
         self.counters: Counter[str] = Counter()
         """unknown_keys, no_system (frames for systems that are not on the fabric), stale (frames that waited while the
-        host stalled, and are published with that age), and those of the queues."""
+        host stalled, and are published with that age), lost_frames (from gateways to stations), and those of the
+        queues."""
         self._clock = clock
         self._on_systems = on_systems
         self._url = fabric
@@ -81,6 +87,8 @@ class FabricGround:
         self._stations: dict[Channel, _FabricStation] = {}
         self._by_name: dict[str, _FabricStation] = {}
         self._count = 0
+        self._warned = -WARN_EVERY
+        """Time of the last warning about lost frames."""
         self._holders: defaultdict[int, set[str]] = defaultdict(set)
         """Gateways that hold a system id: one, but for a moment."""
 
@@ -193,6 +201,7 @@ class FabricGround:
             self._token(arrival)
         elif isinstance(arrival, LinkChange):
             logger.warning("%s: %s", self._url.text, "connected" if arrival.is_up else arrival.problem)
+            self._forget_frames()
 
     def _token(self, change: TokenChange) -> None:
         key = self._connection.keys.parse(change.key)
@@ -204,6 +213,7 @@ class FabricGround:
             self._holders[key.sysid].add(key.owner)
         else:
             self._holders[key.sysid].discard(key.owner)
+            self._forget_frames()
         if self.sysids != before:
             self._on_systems(self.sysids)
 
@@ -220,4 +230,19 @@ class FabricGround:
                 self._connection.publish(pong_key, pong.encode(), is_urgent=True)
         elif key.kind is KeyKind.DOWN:
             for raw in split_frames(sample.payload):
+                self._count_lost(station.received.missing(raw))
                 station.channel.forward(raw, is_answer=True)
+
+    def _forget_frames(self) -> None:
+        """Count from the next frames on: a gateway begins at 0 again for a station that it lost."""
+        for station in self._stations.values():
+            station.received = FrameNumbers()
+
+    def _count_lost(self, missing: int) -> None:
+        if not missing:
+            return
+        self.counters["lost_frames"] += missing
+        now = self._clock.monotonic()
+        if now - self._warned >= WARN_EVERY:
+            self._warned = now
+            logger.warning("%s: %d frames to stations lost so far", self._url.text, self.counters["lost_frames"])

@@ -122,6 +122,8 @@ class StationInput:
     session: int
     """Of its ground process."""
     offset: ClockOffset = field(default_factory=ClockOffset)
+    lost: int = 0
+    """Samples that were published and had not arrived when a newer one did."""
     _pings: deque[Ping] = field(default_factory=lambda: deque(maxlen=MAX_PONGS))
     """Sent and not answered."""
     _newest: dict[int, int] = field(default_factory=dict)
@@ -175,9 +177,16 @@ class StationInput:
         return True
 
     def is_next(self, sysid: int, envelope: UpEnvelope) -> bool:
-        """Return True for a sample of this session that is newer than all before it."""
-        if envelope.session != self.session or envelope.number <= self._newest.get(sysid, -1):
+        """Return True for a sample of this session that is newer than all before it.
+
+        Numbers left out since the one before add to `lost`. A station's first sample may have any number: it goes on
+        counting when the gateway starts again.
+        """
+        newest = self._newest.get(sysid)
+        if envelope.session != self.session or (newest is not None and envelope.number <= newest):
             return False
+        if newest is not None:
+            self.lost += envelope.number - newest - 1
         self._newest[sysid] = envelope.number
         return True
 

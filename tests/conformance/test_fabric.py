@@ -18,18 +18,22 @@ import zenoh
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support import missions
 from support.clock import everybodys
-from support.fabric import FabricStation, RouterProcess, StallingRelay, ground, router
+from support.fabric import FabricStation, RouterProcess, ground, router
 from support.fault_scenarios import watched
 from support.ftp import Ftp
 from support.mav import Client
 from support.media import DAY, add_photo
 from support.params import write
+from support.poor_link import StallingRelay
 from support.process import gateway_process
 from support.setpoints import VELOCITY_ONLY, engage, local, streaming
 from support.world import HOME, World, loopback, world
 
+from anafi_mav.clock import SystemClock
 from anafi_mav.fabric.envelope import UpEnvelope
+from anafi_mav.fabric.ground import FabricGround
 from anafi_mav.mavlink import dialect as own
+from anafi_mav.mavlink.endpoint import parse_endpoint
 from anafi_mav.mavlink.frames import frame, pack
 
 ACCEPTED, REJECTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_TEMPORARILY_REJECTED
@@ -276,11 +280,33 @@ async def test_station_that_answers_no_ping_can_stop_the_flight_and_begin_nothin
             await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.returning, timeout=10.0)
             assert counted(w, "late_commands") == 3
             mark = w.client.mark()
+            next(numbers)  # one is lost on the way
             put(own.MAVLink_set_mode_message(1, 1, HOLD))
             await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, since=mark, timeout=10.0)
             assert counted(w, "late_commands") == 3
             assert w.drone.pose.up > 3.0
+            assert counted(w, "lost_samples") == 1
+            assert "1 station, 1 of their samples lost" in "".join(w.gateway.lines())
             token.undeclare()
+
+
+async def test_frames_that_do_not_reach_a_station_are_counted() -> None:
+    beat = pack(own.MAVLink_heartbeat_message(2, 12, 81, 0, 4, 3))
+    async with router() as node:
+        fabric = FabricGround(parse_endpoint(node.url), [parse_endpoint("udpin://127.0.0.1:0")], SystemClock())
+        await fabric.start()
+        station = FabricStation()
+        with await asyncio.to_thread(opened, node) as session:
+            tokens = session.liveliness().declare_subscriber("anafi/station/v1/*", history=True)
+            joining = asyncio.ensure_future(station.join(fabric.endpoints[0].local_port or 0))
+            name = str((await asyncio.to_thread(tokens.recv)).key_expr).rpartition("/")[2]
+            for number in (250, 251, 2, 3):
+                session.put(f"anafi/1/down/{name}", frame(beat, number, 1, 1))
+            await joining
+            await station.heartbeat(lambda beat: beat.get_seq() == 3, since=0)
+            assert fabric.all_counters()["lost_frames"] == 6
+        await station.close()
+        await fabric.close()
 
 
 async def test_oversized_samples_are_counted_and_disturb_no_station() -> None:

@@ -214,7 +214,10 @@ def only_reacts(process: asyncio.subprocess.Process) -> None:
 
     On a busy machine the loop then neither oversleeps nor computes for long, so that no message ages by that.
     """
-    selector = _selector()
+    loop = asyncio.get_running_loop()
+    if not isinstance(loop, Loop):
+        return  # everybody's clock
+    selector = loop.waits
     selector.reactive += [one for one in selector.processes if one.get_pid() == process.pid]
 
 

@@ -1,4 +1,4 @@
-"""A zenoh network on loopback: routers as processes of their own, a link that stalls, and stations."""
+"""A zenoh network on loopback: routers as processes of their own, and stations."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import json
 import socket
 import sys
 from collections.abc import AsyncIterator, Mapping
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -42,13 +42,18 @@ def free_port() -> int:
 class RouterProcess:
     """A router that can be killed and started again at the same port."""
 
-    def __init__(self, port: int, settings: Mapping[str, Any], link: str, file: Path | None) -> None:
+    def __init__(self, port: int, settings: Mapping[str, Any], link: str, file: Path | None, also: str) -> None:
         self.port = port
+        self.other_port = free_port() if also else 0
+        """Of a second listener."""
         self._file = [] if file is None else [str(file)]
         self.url = f"zenoh://127.0.0.1:{port}"
         self._settings = {
             "mode": "router",
-            "listen/endpoints": [f"{link}/127.0.0.1:{port}"],
+            "listen/endpoints": [
+                f"{link}/127.0.0.1:{port}",
+                *([f"{also}/127.0.0.1:{self.other_port}"] if also else []),
+            ],
             "scouting/multicast/enabled": False,
             "scouting/gossip/enabled": False,
             **settings,
@@ -74,63 +79,18 @@ class RouterProcess:
 
 @asynccontextmanager
 async def router(
-    settings: Mapping[str, Any] | None = None, link: str = "tcp", file: Path | None = None
+    settings: Mapping[str, Any] | None = None, link: str = "tcp", file: Path | None = None, *, also: str = ""
 ) -> AsyncIterator[RouterProcess]:
-    """A router for the length of a block. `settings` come after those of a configuration `file`."""
-    held = RouterProcess(free_port(), settings or {}, link, file)
+    """A router for the length of a block. `settings` come after those of a configuration `file`.
+
+    `also`: another kind of zenoh's links that it listens for, at `other_port`.
+    """
+    held = RouterProcess(free_port(), settings or {}, link, file, also)
     await held.start()
     try:
         yield held
     finally:
         await held.kill()
-
-
-class StallingRelay:
-    """TCP to TCP. While it is stalled, bytes of both directions wait, as in a network that has lost its way."""
-
-    def __init__(self, port: int) -> None:
-        self._to = port
-        self._moving = asyncio.Event()
-        self._moving.set()
-        self._tasks: set[asyncio.Task[None]] = set()
-        self._server: asyncio.Server | None = None
-
-    async def start(self) -> int:
-        """Listen; return the port."""
-        self._server = await asyncio.start_server(self._connected, "127.0.0.1", 0)
-        port: int = self._server.sockets[0].getsockname()[1]
-        return port
-
-    def stall(self) -> None:
-        """Let nothing pass from now on."""
-        self._moving.clear()
-
-    def resume(self) -> None:
-        """Let everything pass that waits, and go on."""
-        self._moving.set()
-
-    async def close(self) -> None:
-        """End all connections."""
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-        if self._server is not None:
-            self._server.close()
-
-    async def _connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        onward_reader, onward_writer = await asyncio.open_connection("127.0.0.1", self._to)
-        for source, sink in ((reader, onward_writer), (onward_reader, writer)):
-            self._tasks.add(asyncio.get_running_loop().create_task(self._copy(source, sink)))
-
-    async def _copy(self, source: asyncio.StreamReader, sink: asyncio.StreamWriter) -> None:
-        try:
-            with suppress(OSError):
-                while data := await source.read(65536):
-                    await self._moving.wait()
-                    sink.write(data)
-                    await sink.drain()
-        finally:
-            sink.close()
 
 
 @asynccontextmanager

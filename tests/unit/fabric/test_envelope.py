@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from anafi_mav.fabric.envelope import Ping, Pong, UpEnvelope, micros, sender_of, split_frames
+from anafi_mav.fabric.envelope import FrameNumbers, Ping, Pong, UpEnvelope, micros, sender_of, split_frames
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.frames import SIGNATURE, SIGNED, frame, pack, with_flags
 
@@ -54,3 +54,10 @@ def test_rest_behind_a_damaged_frame_is_dropped() -> None:
 @given(st.binary(max_size=600))
 def test_any_bytes_split_into_parts_of_themselves(data: bytes) -> None:
     assert data.startswith(b"".join(split_frames(data)))
+
+
+def test_missing_frames_are_counted_for_each_sender() -> None:
+    beat, numbers = pack(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)), FrameNumbers()
+    sent = [(254, 1, 1), (255, 1, 1), (7, 1, 100), (2, 1, 1), (7, 2, 1), (9, 1, 100), (2, 1, 1)]
+    assert [numbers.missing(frame(beat, *one)) for one in sent] == [0, 0, 0, 2, 0, 1, 255]
+    assert [numbers.missing(raw) for raw in (VERSION_1, VERSION_1[:2] + b"\4" + VERSION_1[3:])] == [253, 3]

@@ -75,6 +75,18 @@ def test_station_sample_must_be_newer_and_of_its_session() -> None:
     assert station.is_next(1, UpEnvelope(SESSION, 6, 0))
 
 
+def test_lost_samples_are_the_numbers_left_out() -> None:
+    station = StationInput(SESSION)
+    assert station.is_next(1, UpEnvelope(SESSION, 40, 0))  # the gateway is younger than the station
+    assert station.is_next(1, UpEnvelope(SESSION, 41, 0))
+    assert station.lost == 0
+    assert station.is_next(1, UpEnvelope(SESSION, 44, 0))
+    assert not station.is_next(1, UpEnvelope(SESSION, 43, 0))
+    assert station.is_next(2, UpEnvelope(SESSION, 1, 0))
+    assert station.is_next(2, UpEnvelope(SESSION, 3, 0))
+    assert station.lost == 3
+
+
 def test_station_age_is_that_of_its_pongs() -> None:
     station = StationInput(SESSION)
     assert station.ping(9, 100.0) == (9, 100_000_000)

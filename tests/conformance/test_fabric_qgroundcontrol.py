@@ -1,0 +1,104 @@
+"""QGroundControl's connect sequence through `anafi-mav ground` gets the answers of a direct endpoint."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import sys
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fabric import FabricStation, free_port, router
+from support.ftp import Ftp
+from support.mav import Client, kind_of
+from support.missions import ROUND
+from support.params import fetch
+from support.plans import FENCE, MISSION, RALLY, content, download, upload
+from support.world import world
+
+PAGES: list[dict[str, Any]] = json.loads((Path(__file__).parents[1] / "support" / "qgroundcontrol.json").read_text())[
+    "pages"
+]
+
+REQUESTED = {
+    "AUTOPILOT_VERSION": 148,
+    "PROTOCOL_VERSION": 300,
+    "AVAILABLE_MODES": 435,
+    "CURRENT_MODE": 436,
+    "HOME_POSITION": 242,
+    "COMPONENT_METADATA": 397,
+    "COMPONENT_INFORMATION": 395,
+    "CAMERA_INFORMATION": 259,
+    "VIDEO_STREAM_INFORMATION": 269,
+    "GIMBAL_MANAGER_INFORMATION": 280,
+    "no message": 99999,
+}
+
+FILES = ("/general.json.xz", "/parameter.json.xz", "/events.json.xz")
+
+
+async def answers(client: Client) -> dict[str, Any]:
+    """Connect as QGroundControl does, open its pages, and return what was answered."""
+    found: dict[str, Any] = {}
+    for name, id in REQUESTED.items():
+        mark = client.mark()
+        result = (await client.command(dialect.MAV_CMD_REQUEST_MESSAGE, id)).result
+        found[name] = (result, None)
+        if result == dialect.MAV_RESULT_ACCEPTED:
+            message = await client.wait(name, since=mark)
+            found[name] = (result, {k: repr(v) for k, v in message.to_dict().items() if "time" not in k})
+    listed = await fetch(client)
+    found["parameters"] = {name: (m.param_index, m.param_type, bytes(m.get_payload())) for name, m in listed.items()}
+    for kind in (MISSION, FENCE, RALLY):
+        found[f"plan {kind}"] = [repr(content(item)) for item in await download(client, kind)]
+    for path in FILES:
+        found[path] = await Ftp(client).download(path)
+    for page in PAGES:
+        if page["flavour"] != "px4":
+            continue
+        mark = client.mark()
+        for name in (*page["names"], "CAL_MAG7_ROT"):  # the last one does not exist
+            client.send(dialect.MAVLink_param_request_read_message(1, 1, name.encode(), -1))
+        await client.wait("PARAM_ERROR", lambda m: m.param_id == "CAL_MAG7_ROT", since=mark)
+        kinds = ("PARAM_VALUE", "PARAM_ERROR")
+        sent = [message for _, message in client.received[mark:] if kind_of(message) in kinds]
+        found[f"page {page['page']}"] = sorted(bytes(message.get_payload()) for message in sent)
+    return found
+
+
+@contextlib.asynccontextmanager
+async def ground_process(fabric: str) -> AsyncIterator[int]:
+    """`anafi-mav ground` for the length of a block: the port for stations."""
+    port = free_port()
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "anafi_mav", "ground", "--zenoh", fabric, "--endpoint", f"tcpin://127.0.0.1:{port}",
+        stdout=asyncio.subprocess.PIPE,
+    )  # fmt: skip
+    try:
+        assert process.stdout is not None
+        while not (line := await asyncio.wait_for(process.stdout.readline(), 60.0)).startswith(b"ready"):
+            assert line, "the ground process ended before it was ready"
+        yield port
+    finally:
+        process.terminate()
+        assert await process.wait() == 0
+
+
+async def test_connect_over_the_fabric_is_answered_as_over_a_direct_endpoint() -> None:
+    async with router() as node, world(endpoints=(node.url,), web=True) as w, ground_process(node.url) as port:
+        assert (await upload(w.client, ROUND, MISSION)).type == dialect.MAV_MISSION_ACCEPTED
+        station = w.take(await FabricStation().join(port, tcp=True))
+        # A command is rejected until a ping has been answered.
+        while (await station.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result != dialect.MAV_RESULT_ACCEPTED:
+            await station.heartbeat(lambda beat: True)
+        late = w.gateway.counters()["late_frames"]
+        direct, over_fabric = await answers(w.client), await answers(station)
+        assert over_fabric.keys() == direct.keys()
+        for what, answer in direct.items():
+            assert over_fabric[what] == answer, what
+        assert len(direct["parameters"]) > 100
+        assert len(direct[f"plan {MISSION}"]) == len(ROUND)
+        assert w.gateway.counters()["late_frames"] == late
