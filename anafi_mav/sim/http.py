@@ -267,7 +267,10 @@ class WebServer:
     async def _upload(self, request: web.Request) -> web.Response:
         if request.content_length is not None and request.content_length > MAX_BODY:
             return _refuse(413, f"expected at most {MAX_BODY} bytes, got {request.content_length}")
-        data = await request.read()  # answers 413 by itself when more comes than was announced
+        try:
+            data = await request.read()  # answers 413 by itself when more comes than was announced
+        except ConnectionError as error:
+            return _refuse(400, f"expected the whole flight plan: {error}")  # for the log: its client is gone
         if not data.strip():
             return _refuse(400, "expected a flight plan, got an empty body")
         try:

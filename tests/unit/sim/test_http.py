@@ -248,6 +248,20 @@ async def test_a_body_of_unknown_length_has_the_same_limit(site: Site) -> None:
     assert site.plans.list() == ()
 
 
+async def test_upload_that_its_client_gives_up_is_no_error(site: Site, caplog: pytest.LogCaptureFixture) -> None:
+    _, writer = await asyncio.open_connection("127.0.0.1", site.server.port)
+    writer.write(
+        b"PUT " + f"{API}/upload/flightplan".encode() + b" HTTP/1.1\r\nHost: x\r\nContent-Length: 99\r\n\r\nQGC"
+    )
+    await writer.drain()
+    assert (await site.ask("GET", f"{API}/media/medias"))[0] == 200  # by now it reads the upload, too
+    writer.transport.abort()
+    assert (await site.ask("GET", f"{API}/media/medias"))[0] == 200
+    await site.server.close()  # waits for its handlers
+    assert not site.plans.list()
+    assert caplog.records == []
+
+
 async def test_the_wrong_method(site: Site) -> None:
     assert (await site.ask("POST", f"{API}/upload/flightplan", data=PLAN))[0] == 405
     assert (await site.ask("PUT", f"{API}/media/medias", data=b"x"))[0] == 405
