@@ -193,6 +193,19 @@ async def test_land_during_an_unreported_takeoff() -> None:
         assert w.drone.flying_state.name == "LANDED"
 
 
+async def test_disarm_of_a_drone_that_has_taken_off_meanwhile_is_refused() -> None:
+    """For the gateway it still stands: it is landed, and is not reported as disarmed before."""
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        muted = now_mute(w, "ardrone3.Piloting.TakeOff", 1.5)
+        mark = w.client.mark()
+        w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
+        await muted
+        w.client.send_command(ARM, 0.0)
+        assert set(await until(w.client, mark, 2)) == {(TAKEOFF_CMD, CANCELLED), (ARM, REJECTED)}
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
+
+
 async def test_goto_during_an_unreported_return() -> None:
     async with world(speed=1.0) as w:
         await w.take_off()
