@@ -108,6 +108,9 @@ MAINTENANCE_COMMANDS = frozenset(
 
 COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)
 
+STOPPING = (*COMMANDS, dialect.MAVLINK_MSG_ID_SET_MODE)
+"""Messages that can stop a flight."""
+
 _FTP_OPCODE = 3
 """Byte of the payload of FILE_TRANSFER_PROTOCOL that holds the opcode (MAVLink ftp.md)."""
 

@@ -20,7 +20,7 @@ from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.endpoint_options import EndpointConfig
 from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.access import COMMANDS, Access, needed_access
+from anafi_mav.mavlink.access import STOPPING, Access, needed_access
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, reason
 from anafi_mav.mavlink.channel import Channel, total
 from anafi_mav.mavlink.endpoint import EndpointFactory, make_endpoint, parse_endpoint
@@ -51,7 +51,7 @@ class Inbound(msgspec.Struct, frozen=True):
     is_permitted: bool = True
     """False when it needs more than the access of its channel: it must have no effect."""
     is_late: bool = False
-    """True for a command that may have been sent while the host stalled: nothing but a stop may come of it."""
+    """True for a command or mode that may have been sent while the host stalled: only a stop has an effect."""
 
 
 Receiver = Callable[[Inbound], None]
@@ -277,7 +277,7 @@ class Node:
                 continue
             if old:
                 self._closed_counters["stale"] += 1
-                if received.id not in COMMANDS:
+                if received.id not in STOPPING:
                     continue
             if received.id == dialect.MAVLINK_MSG_ID_SETUP_SIGNING:
                 # Before the log and the hosts: it holds a key.
@@ -324,7 +324,10 @@ class Node:
         return False
 
     def _stalled(self, seconds: float) -> None:
-        logger.warning("the host stalled for %.1f s: what clients sent meanwhile is dropped", seconds)
+        logger.warning(
+            "the host stalled for %.1f s: of what clients sent meanwhile only stops have an effect",
+            seconds,
+        )
 
     def _guarded(self, callback: Callable[..., None], *arguments: object) -> None:
         """Call back. A mistake in a service must not close the socket that brought the message."""

@@ -25,7 +25,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.router import EVERY_COMPONENT
 from anafi_mav.services.command.command_service import CommandService
-from anafi_mav.services.command.operator_need import ACKNOWLEDGEMENTS, need_of
+from anafi_mav.services.command.operator_need import ACKNOWLEDGEMENTS, need_of, stop_of
 from anafi_mav.services.command.running_actions import RunningActions
 from anafi_mav.services.commands import Action, Effect
 from anafi_mav.services.definition_link import DefinitionLink
@@ -284,12 +284,14 @@ class Component:
         return operators.objection(inbound.sysid, need_of(inbound, self.commands.action_of))
 
     def _may_be_late(self, inbound: Inbound) -> bool:
-        """Return True for a query, Hold, Land and Return.
+        """Return True for a query and a stop of the flight, but not for cut motors.
 
-        A person must always be able to stop the drone. A disarming is none of these: by force it cuts the motors.
+        A person must always be able to stop the drone. Motors are cut for what is seen at that moment.
         """
-        command = self.commands.action_of(inbound)
-        return command is None or command.effect in (Effect.HOLD, Effect.LAND, Effect.RETURN)
+        effect = stop_of(inbound, self.commands.action_of)
+        if effect is not None:
+            return effect is not Effect.KILL
+        return inbound.message.get_msgId() in COMMANDS and self.commands.action_of(inbound) is None
 
     def input_objection(self, inbound: Inbound) -> OperatorText | None:
         """Return the reason for which a stick, setpoint or target is refused, and count it.

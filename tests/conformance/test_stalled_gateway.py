@@ -213,6 +213,18 @@ async def test_stop_sent_to_a_stalled_gateway_is_carried_out(
         assert len(heard(w, heard_as)) == 1
 
 
+async def test_mode_sent_to_a_stalled_gateway_stops_the_drone(tmp_path: Path) -> None:
+    """As dronekit sends it: SET_MODE, which has no answer."""
+    async with apart(tmp_path, None) as (w, gateway):
+        await set_out(w, "goto")
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 1.0, 20.0)
+        gateway.send_signal(signal.SIGSTOP)
+        w.client.send(dialect.MAVLink_set_mode_message(1, 1, w.modes.hold))
+        await asyncio.sleep(1.5)
+        gateway.send_signal(signal.SIGCONT)
+        await w.drone.wait_log(lambda e: e.kind == "command" and e.name.endswith("CancelMoveTo"), 10.0)
+
+
 @pytest.mark.parametrize("way", ["goto", "mission", "offboard", "orbit"])
 async def test_ended_gateway_leaves_a_hovering_drone(tmp_path: Path, way: str) -> None:
     """SIGTERM, with a program that goes on sending: the drone stands, and nothing of before moves it."""
