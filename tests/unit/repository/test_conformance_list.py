@@ -12,6 +12,9 @@ from support.conformance_items import ITEMS
 TESTS = Path(__file__).parents[2]
 TABLE = TESTS.parent / "docs" / "conformance.md"
 
+FOLDERS = ("conformance", "clients")
+"""Of the tests that the table is made from. A unit test may have the same file name."""
+
 ROW = re.compile(r"\| (\d+) \| .* \| ([^|]+) \| ([^|]+) \| ([^|]*) \|")
 
 
@@ -43,5 +46,5 @@ def test_an_item_is_shown(number: int) -> None:
     places = re.findall(r"`([^`]+)`", files)
     assert places
     for place in places:
-        (path,) = TESTS.rglob(place)
+        (path,) = (path for folder in FOLDERS for path in (TESTS / folder).rglob(place))
         assert number in named_in(path)
