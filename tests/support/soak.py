@@ -74,6 +74,9 @@ SAME_HEIGHT = 0.1
 RESEND = 3.6
 """s after a final acknowledgement within which an equal command is a retransmission."""
 
+RESEND_REFUSED = 0.9
+"""The same after a refusal, whose reason may end: a mission is there now (`services.commands.REFUSAL_WINDOW`)."""
+
 ARM, TAKEOFF, LAND, RETURN = (
     dialect.MAV_CMD_COMPONENT_ARM_DISARM,
     dialect.MAV_CMD_NAV_TAKEOFF,
@@ -721,7 +724,8 @@ def _judge_retransmissions(flight: Flight) -> None:
             before = [result for at, result in finals if original.at <= at < again.at]
             after = [result for at, result in finals if at >= again.at][:1]
             others = _interventions(flight, index, original.at, again.at + 1.0)
-            recent = again.at - original.at < RESEND
+            is_done = before in ([ACCEPTED], [newer.MAV_RESULT_CANCELLED])
+            recent = again.at - original.at < (RESEND if is_done else RESEND_REFUSED)
             if len(before) == 1 and recent and not others and after != before:
                 name = dialect.enums["MAV_CMD"][command].name
                 flight.wrong.append(f"client {index} {name}: result {before}, of its retransmission {after}")
