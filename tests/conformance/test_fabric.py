@@ -164,7 +164,7 @@ async def test_stop_that_waits_while_the_host_stalls_is_carried_out() -> None:
     async with flown() as (w, _):
         await w.take_off()
         with everybodys():
-            await asyncio.sleep(0)  # the clock of callbacks that began before goes slower
+            await asyncio.sleep(0)  # the next callbacks run on the clock of everybody
             mark = w.client.mark()
             w.client.send_command(GOTO, -1, 1, 0, frame=6, x=HOME[0] + 0.001, y=HOME[1], z=10.0)
             w.client.send_command(LAND)

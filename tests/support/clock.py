@@ -41,7 +41,7 @@ _ahead = 0.0
 """s that the clock is ahead of `time.monotonic` when nothing of this process runs; negative when it is behind."""
 _newest = 0.0
 _computing: int | None = None
-"""Identity of the thread whose loop runs callbacks, while nobody else can bring anything about."""
+"""Identity of the thread whose loop runs callbacks, while no other process or thread can change anything."""
 
 
 def now() -> float:
@@ -113,7 +113,7 @@ class Selector(selectors.DefaultSelector):
         self.reactive: list[asyncio.SubprocessTransport] = []
         """Those among them that only react to what they receive, as the test has said."""
         self.turns: Turns | None = None
-        """Measured while somebody asks for them: the processor time of a thread is dear to ask for."""
+        """Measured within a block of `turns` only: the kernel takes 1 us to report the processor time of a thread."""
         self._barrier = Barrier()
 
     def select(self, timeout: float | None = None) -> Any:

@@ -16,7 +16,7 @@ async def test_stall_marks_data_old_until_sockets_are_drained() -> None:
     watch = StallWatch(stalls.append)
     watch.start()
     with everybodys():
-        await asyncio.sleep(0)  # the clock of callbacks that began before goes slower
+        await asyncio.sleep(0)  # the next callbacks run on the clock of everybody
         time.sleep(1.2 * STALL)  # noqa: ASYNC251
         assert watch.old  # before any timer has run
         assert watch.waited >= 1.2 * STALL
@@ -35,7 +35,7 @@ async def test_stopped_watch_finds_nothing_old() -> None:
     watch.start()
     watch.stop()
     with everybodys():
-        await asyncio.sleep(0)  # the clock of callbacks that began before goes slower
+        await asyncio.sleep(0)  # the next callbacks run on the clock of everybody
         time.sleep(1.2 * STALL)  # noqa: ASYNC251
         assert not watch.old
 
