@@ -15,7 +15,7 @@ from typing import Any
 
 import msgspec
 
-from anafi_mav.cli import heap, interrupts, log, options, run_check
+from anafi_mav.cli import interrupts, log, options, run_check
 from anafi_mav.cli.addresses import SHARED, Ports, Reservations, spot
 from anafi_mav.cli.child import SimulatorProcess
 from anafi_mav.cli.scenarios import load as load_scenario
@@ -134,7 +134,6 @@ def _serve(arguments: argparse.Namespace) -> int:
     if video is not None and not is_loopback(video.host):
         what = "is open to the network without TLS: a program on the way can watch"
         complain(f"warning: video.host: {video.host} {what}", "yellow")
-    heap.settle()
     problems = asyncio.run(_run(config, arguments.sim_log.absolute() if arguments.sim_log else None))
     for problem in problems:
         complain(f"not kept: {problem}")

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import msgspec
 
-from anafi_mav.cli import heap, interrupts, log, options, sim_validate
+from anafi_mav.cli import interrupts, log, options, sim_validate
 from anafi_mav.cli.options import integer, number
 from anafi_mav.cli.scenarios import load as load_scenario
 from anafi_mav.cli.terminal import say
@@ -195,7 +195,6 @@ def _scenarios(fleet: Fleet) -> dict[str, Scenario]:
 
 async def _run(fleet: Fleet, log: Path | None, stdin_watch: bool) -> None:
     scenarios = _scenarios(fleet)
-    heap.settle()
     stop = asyncio.Event()
     interrupts.listen(lambda number: stop.set(), "SIGINT", "SIGTERM")
     if stdin_watch:
