@@ -108,7 +108,11 @@ class GuidedService(Service):
                 self._change_speed, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
             ),
             dialect.MAV_CMD_DO_CHANGE_ALTITUDE: Action(
-                self._change_altitude, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
+                self._change_altitude,
+                location=False,
+                altitude=Altitude.UNUSED,
+                effect=Effect.CHANGE,
+                still_holds=lambda: not self.host.vehicle.guided.has_failed,
             ),
             dialect.MAV_CMD_CONDITION_YAW: Action(
                 self._turn, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
