@@ -79,6 +79,8 @@ class OrbitService(Service, PlainTask):
         super().__init__(host)
         self._orbit: _Orbit | None = None
 
+        self._is_flown = False
+        """The newest orbit was flown to its end."""
     @property
     def circle(self) -> Circle | None:
         """Return the circle that is flown, or flown to; None without one."""
@@ -87,7 +89,11 @@ class OrbitService(Service, PlainTask):
     def actions(self) -> Mapping[int, Action]:
         return {
             dialect.MAV_CMD_DO_ORBIT: Action(
-                self._fly_orbit, location=True, altitude=Altitude.AMSL, effect=Effect.CHANGE
+                self._fly_orbit,
+                location=True,
+                altitude=Altitude.AMSL,
+                effect=Effect.CHANGE,
+                still_holds=lambda: self._orbit is not None or self._is_flown,
             )
         }
 
@@ -145,7 +151,7 @@ class OrbitService(Service, PlainTask):
                 )
             else:
                 vehicle.drone.piloting.hover()  # ends a move of ours, which would ignore sticks
-            self._orbit = orbit
+            self._orbit, self._is_flown = orbit, False
             grant.begin()
             if is_away and (move := vehicle.drone.piloting.move) is not None:
                 orbit.approach = self.host.spawn(self._approach(move, orbit))
@@ -241,6 +247,7 @@ class OrbitService(Service, PlainTask):
         elif lap.done:
             self._stop(texts.ORBIT_DONE, Severity.INFO)
         else:
+            self._is_flown = True
             vehicle.drone.piloting.pilot(sticks)
 
     def _stop(self, why: OperatorText, severity: Severity) -> None:
