@@ -11,6 +11,7 @@ import contextlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from anafi_mav import geo, texts, units
 from anafi_mav.drone import events
@@ -78,9 +79,9 @@ class OrbitService(Service, PlainTask):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._orbit: _Orbit | None = None
-
         self._is_flown = False
         """The newest orbit was flown to its end."""
+
     @property
     def circle(self) -> Circle | None:
         """Return the circle that is flown, or flown to; None without one."""
@@ -135,8 +136,9 @@ class OrbitService(Service, PlainTask):
         if here is None:
             raise Refused(texts.ORBIT, texts.NO_FIX)
         start = entry(circle, here)
-        for point in outline(circle, here):
-            check_place(vehicle, point)
+        check_place(vehicle, start)
+        for before, point in pairwise(outline(circle)):
+            check_place(vehicle, point, start=before)
         orbit = _Orbit(Lap(self._held_back(circle)), vehicle.settings.cruise_speed)
         circle = orbit.lap.circle
         bearing = _bearing(circle.centre, start)
@@ -245,9 +247,9 @@ class OrbitService(Service, PlainTask):
         if sticks is None:
             self._stop(texts.POSITION_UNKNOWN, Severity.WARNING)
         elif lap.done:
+            self._is_flown = True
             self._stop(texts.ORBIT_DONE, Severity.INFO)
         else:
-            self._is_flown = True
             vehicle.drone.piloting.pilot(sticks)
 
     def _stop(self, why: OperatorText, severity: Severity) -> None:
