@@ -207,7 +207,7 @@ class GuidedService(Service):
 
         Continue means to fly on to the target of the move that the pause stopped, or to resume its mission. After a
         pause that stopped neither, setpoints may fly the drone again. Refused when the vehicle was commanded
-        otherwise since, or the drone has landed.
+        otherwise since, the mission was replaced, or the drone has landed.
         """
         vehicle = self.host.vehicle
         if command.params[0] == 0.0:
@@ -218,7 +218,7 @@ class GuidedService(Service):
                 await vehicle.guided.go(task, by=command.right)
             elif task is vehicle.mission and vehicle.mission.paused:
                 await vehicle.set_mode(FlightMode.MISSION, command.right)
-            elif vehicle.control.paused:
+            elif task is None and vehicle.control.paused:
                 vehicle.control.resume()  # setpoints may fly it again
             else:
                 raise Refused(texts.CONTINUE, texts.NOTHING_PAUSED)
