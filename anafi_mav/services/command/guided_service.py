@@ -99,6 +99,11 @@ def _effect_of_pause(command: Command) -> Effect:
     return Effect.HOLD if command.params[0] == 0.0 else Effect.CHANGE
 
 
+def _effect_of_turn(command: Command) -> Effect:
+    """A turn by an angle counts each time; a turn to a heading may be answered twice."""
+    return Effect.EACH if command.params[3] == 1.0 else Effect.CHANGE
+
+
 class GuidedService(Service):
     """Changes the flight under way."""
 
@@ -115,7 +120,7 @@ class GuidedService(Service):
                 still_holds=lambda: not self.host.vehicle.guided.has_failed,
             ),
             dialect.MAV_CMD_CONDITION_YAW: Action(
-                self._turn, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
+                self._turn, location=False, altitude=Altitude.UNUSED, effect=_effect_of_turn
             ),
             dialect.MAV_CMD_DO_PAUSE_CONTINUE: Action(
                 self._pause_or_continue, location=False, altitude=Altitude.UNUSED, effect=_effect_of_pause
