@@ -12,8 +12,9 @@ import asyncio
 import contextlib
 import math
 from collections.abc import Callable, Hashable
-from dataclasses import replace
 from typing import NamedTuple
+
+from msgspec.structs import replace
 
 from anafi_mav import texts, units
 from anafi_mav.clock import Alarm, Clock
@@ -71,6 +72,20 @@ _BEFORE_TAKEOFF = (FlyingState.LANDED, FlyingState.MOTOR_RAMPING)
 _GROUND = Needs.NO_PILOT | Needs.LIMITS | Needs.PLAIN_STICKS
 _AIR = _GROUND | Needs.NO_DESCENT | Needs.IN_AIR
 
+_RULES = {
+    (stands, needs_roll): TaskRules(
+        texts.OFFBOARD,
+        needs=(_GROUND if stands else _AIR) | (Needs.ROLL_SIGN if needs_roll else Needs.NONE),
+        ends_landing=Extent.COMMANDED,
+        ends_return=Extent.COMMANDED,
+        follows=True,
+        needs_operator=True,
+    )
+    for stands in (False, True)
+    for needs_roll in (False, True)
+}
+"""For a drone that stands on the ground or not, and a setpoint that a velocity loop flies or not."""
+
 
 class _Attempt(NamedTuple):
     """One attempt of a client to acquire control by setpoints, while what flew before is ending."""
@@ -116,15 +131,7 @@ class OffboardFlight(PlainTask):
     def rules(self) -> TaskRules:
         setpoint = self._stream.setpoint
         needs_roll = isinstance(setpoint, MotionSetpoint) and setpoint.needs_loop
-        needs = (_GROUND if self._stands else _AIR) | (Needs.ROLL_SIGN if needs_roll else Needs.NONE)
-        return TaskRules(
-            texts.OFFBOARD,
-            needs=needs,
-            ends_landing=Extent.COMMANDED,
-            ends_return=Extent.COMMANDED,
-            follows=True,
-            needs_operator=True,
-        )
+        return _RULES[self._stands, needs_roll]
 
     @property
     def mode(self) -> FlightMode | None:
