@@ -27,7 +27,7 @@ from anafi_mav.disk_writer import HANGS
 from anafi_mav.drone import Drone, events
 from anafi_mav.drone.contention import Contention
 from anafi_mav.drone.rest import HTTP_PORT
-from anafi_mav.errors import AnafiMavError, ConfigError, HandshakeRefused
+from anafi_mav.errors import AnafiMavError, ConfigError, HandshakeRefused, WrongAircraft
 from anafi_mav.fabric.endpoint import FabricEndpoint
 from anafi_mav.fabric.sample_age import StopKind
 from anafi_mav.fabric.system_state import StatePosition, SystemState
@@ -74,6 +74,13 @@ logger = logging.getLogger(__name__)
 RETRY_FIRST, RETRY_LAST = 0.5, 2.0
 """s between attempts to connect: doubled from the first to the last, so that a drone that comes back is a system
 again within five seconds."""
+
+RETRY_WRONG = 10.0
+"""s until an address where another aircraft answered is tried again: behind a Skycontroller each attempt ends the
+connection of another program."""
+
+MAX_SERIAL = 18
+"""Characters of a serial number that fit the text; Parrot's have as many."""
 
 CANCEL_WAIT = 0.1
 """s until a task that has not ended is cancelled once more."""
@@ -192,9 +199,12 @@ class _Supervised:
                     logger.warning("%s: %s", self.config.name, problem)
                     if isinstance(error, HandshakeRefused):
                         self.system.announce(Severity.WARNING, texts.CONNECTION_REFUSED.fill(status=error.status))
+                    elif isinstance(error, WrongAircraft):
+                        serial = error.serial[-MAX_SERIAL:] or "unknown"
+                        self.system.announce(Severity.CRITICAL, texts.WRONG_AIRCRAFT.fill(serial=serial))
                 self.problem = problem
                 self.first_attempt.set()
-                await self.drone.pause(pause)
+                await self.drone.pause(RETRY_WRONG if isinstance(error, WrongAircraft) else pause)
                 pause = min(2.0 * pause, RETRY_LAST)
             await self._contend()
 
@@ -453,6 +463,7 @@ class Gateway:
                 rtsp_port=RTSP_PORT if config.rtsp_port is None else config.rtsp_port,
                 interface=config.interface,
                 name=config.name,
+                serial=config.serial,
             )
             allow_kill = self.config.allow_kill if config.allow_kill is None else config.allow_kill
             system = System(
