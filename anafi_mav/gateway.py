@@ -13,6 +13,7 @@ import asyncio
 import logging
 from collections import Counter
 from collections.abc import Awaitable, Callable
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 
@@ -178,9 +179,11 @@ class _Supervised:
                     logger.warning("%s: connected", self.config.name)
                 self.problem, pause = "", RETRY_FIRST
                 try:
-                    self.system.link_up()
-                    self._changed()
-                    self.first_attempt.set()
+                    memory_problem = await self.system.load_memory()
+                    if self.drone.connected:
+                        self.system.link_up(memory_problem)
+                        self._changed()
+                        self.first_attempt.set()
                     reason = await asyncio.shield(self.drone.lost)
                     logger.warning("%s: link lost: %s", self.config.name, reason)
                     self.problem = f"link lost: {reason}"
@@ -352,11 +355,12 @@ class Gateway:
         Raises `ConfigError`; nothing is then left open or locked.
 
         `start` does it where this has not. It is a step of its own for the command line, which starts a simulator
-        only
-        when all endpoints are open.
+        only when all endpoints are open.
         """
         if self._node.endpoints:
             return
+        # Lock, keys and token are read and written in the event loop: no drone is connected yet that could wait, and
+        # nothing may begin before the folder is this gateway's. Later on all files are the threads' of `disk_writer`.
         self._lock_state()
         try:
             self._recorder = self._start_recording()
@@ -428,9 +432,11 @@ class Gateway:
             self._lock = None
 
     def _write_lock(self) -> None:
+        """Have the thread of files write the drones into the lock file: some may be in the air."""
         if self._lock is not None:
             web = "" if self.web is None else self.web.describe()
-            self._lock.write([supervised.held() for supervised in self._supervised], web)
+            drones = [supervised.held() for supervised in self._supervised]
+            STATE_WRITER.post(partial(self._lock.write, drones, web))
 
     def state_problems(self) -> list[str]:
         """Return a line for each problem with reading or storing state; empty without problems."""
