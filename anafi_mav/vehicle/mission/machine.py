@@ -736,7 +736,7 @@ class MissionMachine:
         self.phase = MissionPhase(state, state)
 
     def _paused_file(self) -> MissionProgress | None:
-        """Return the progress in a file that the drone has stopped, which another controller may resume."""
+        """Return the progress in a stopped file, which another controller may resume."""
         in_file = self.rest in (S.PAUSED, S.ENDING) and self.progress.leg is not None
         return self.progress if in_file else self.progress.left
 
