@@ -27,6 +27,7 @@ from anafi_mav.vehicle.base.bounds import TooLow
 from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.control import Request
 from anafi_mav.vehicle.base.flight_task import Hover, Needs, PlainTask, TaskRules
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, reason_of
 from anafi_mav.vehicle.base.right import Extent, Right
@@ -153,6 +154,18 @@ class OffboardFlight(PlainTask):
     def goal(self) -> Goal | None:
         """The position of what is being flown, resolved; None when it has none."""
         return None if self._stream.steering is None else self._stream.steering.goal
+
+    @property
+    def end_place(self) -> GeoPoint | None:
+        """Return the place on the map at which the flown setpoint ends; None when it leads on.
+
+        A velocity or acceleration beside a position leads beyond it.
+        """
+        goal, setpoint = self.goal, self._stream.setpoint
+        if goal is None or not isinstance(setpoint, MotionSetpoint):
+            return None
+        leads_on = setpoint.velocity != NOTHING or setpoint.acceleration != NOTHING
+        return None if leads_on else goal.place
 
     @property
     def yaw(self) -> float | None:
