@@ -326,6 +326,8 @@ class Gateway:
             StatusRoutes(self.web, self.status)
         self._report = StatusReport(self._node, self._clock)
         self._recorder: Recorder | None = None
+        self._downloads: Path | None = None
+        """Folder for copies of media, once `open` has found it."""
 
     async def __aenter__(self) -> Self:
         await self.start()
@@ -347,6 +349,7 @@ class Gateway:
         """
         if self._node.endpoints:
             return
+        self._downloads = download_folder(self.config.media)
         self._lock_state()
         try:
             self._recorder = self._start_recording()
@@ -463,7 +466,7 @@ class Gateway:
                 started,
                 allow_kill=allow_kill,
                 state=self._state,
-                download_folder=download_folder(self.config.media),
+                download_folder=self._downloads,
                 uris=self._uris(),
                 has_picture_pose=self.config.pose == "video",
                 failsafe_limits=FailsafeLimits(self.config.warnings.return_height, self.config.warnings.radio_range),
