@@ -551,6 +551,7 @@ class Gateway:
             self._unlock_state()
         else:  # what is late would overwrite the next gateway's files: the lock ends with this process
             logger.warning("state folder: %s", HANGS)
+            self._state_problem = self._state_problem or f"{self._state}: {HANGS}"
         if self._recorder is not None:
             await _guarded("the recording", self._recorder.close())
 

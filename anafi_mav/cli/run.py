@@ -191,7 +191,9 @@ async def _run(config: Config, sim_log: Path | None) -> list[str]:
         manager.stopping()
         for sentence in signals.unsaid():
             say(sentence, "yellow")
-        return gateway.state_problems()
+        problems = gateway.state_problems()  # while its drones are there
+    # What is last written is written while the gateway closes.
+    return [*problems, *(problem for problem in gateway.state_problems() if problem not in problems)]
 
 
 async def _start(
