@@ -20,13 +20,13 @@ from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.endpoint_options import EndpointConfig
 from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.access import STOPPING, Access, needed_access
+from anafi_mav.mavlink.access import STOPPING, Access, concerns_link, needed_access
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, reason
 from anafi_mav.mavlink.channel import Channel, total
 from anafi_mav.mavlink.endpoint import EndpointFactory, make_endpoint, parse_endpoint
 from anafi_mav.mavlink.frames import Packed, ReceivedFrame, pack
 from anafi_mav.mavlink.key_ring import KeyRing
-from anafi_mav.mavlink.router import Route, Router, targets
+from anafi_mav.mavlink.router import Route, Router, has_target, targets
 from anafi_mav.mavlink.signing import Signing
 from anafi_mav.mavlink.stall import StallWatch
 
@@ -64,6 +64,10 @@ class FrameTap(Protocol):
     def sent(self, packed: Packed, sysid: int, compid: int) -> None: ...
 
     def received(self, frame: ReceivedFrame) -> None: ...
+
+
+def _is_stations_heartbeat(message: Any) -> bool:
+    return isinstance(message, dialect.MAVLink_heartbeat_message) and message.type == dialect.MAV_TYPE_GCS
 
 
 def _log_change(change: str, channel: Channel) -> None:
@@ -269,7 +273,7 @@ class Node:
             if self.tap is not None:
                 self._guarded(self.tap.received, received)
             permitted = channel.access is Access.ALL or self._permits(channel, received)
-            may_forward = permitted and (channel.access is not Access.OBSERVE or self._is_harmless(channel, received))
+            may_forward = permitted and self._may_forward(channel, received)
             route = self._router.route(channel, received, now, reached, may_forward=may_forward)
             if route.forward:
                 self._forward(channel, received, route)
@@ -307,21 +311,40 @@ class Node:
         channel.counters[f"refused_access.{name}"] += 1
         return False
 
-    def _is_harmless(self, channel: Channel, received: ReceivedFrame) -> bool:
-        """Return True if a permitted frame of an observer deceives no other client.
+    def _may_forward(self, channel: Channel, received: ReceivedFrame) -> bool:
+        """Return True if a permitted frame may reach other channels; otherwise it is counted."""
+        if not self._stays_within(channel, received):
+            channel.counters["filtered_frames"] += 1
+            return False
+        if channel.access is Access.OBSERVE and not self._is_harmless(channel, received):
+            channel.counters["refused_observer"] += 1
+            return False
+        return True
 
-        It is a station's heartbeat or for one system, and not in the name of a system of ours, or of one behind a
-        channel with more access.
+    def _stays_within(self, channel: Channel, received: ReceivedFrame) -> bool:
+        """Return True if a frame reaches none but the systems of its channel's option `systems`.
+
+        The router decides about frames for one system. To all go a station's heartbeat, and what these systems send
+        to no target: a command to system 0 would be one to the systems behind other endpoints.
+        """
+        message = received.message
+        if channel.system_ids is None or targets(message)[0] != 0 or _is_stations_heartbeat(message):
+            return True
+        return received.sysid in channel.system_ids and not has_target(message)
+
+    def _is_harmless(self, channel: Channel, received: ReceivedFrame) -> bool:
+        """Return True if a permitted frame of an observer neither deceives nor disturbs others.
+
+        It is a station's heartbeat, or reads from one system. It is not in the name of a system of ours, or of one
+        behind a channel with more access.
         """
         named = self._router.is_ours(received.sysid) or any(
             other.access > channel.access for other in self._router.heard_on(received.sysid)
         )
         message = received.message
-        is_station = isinstance(message, dialect.MAVLink_heartbeat_message) and message.type == dialect.MAV_TYPE_GCS
-        if not named and (is_station or targets(message)[0] != 0):
-            return True
-        channel.counters["refused_observer"] += 1
-        return False
+        return not named and (
+            _is_stations_heartbeat(message) or (targets(message)[0] != 0 and not concerns_link(message))
+        )
 
     def _stalled(self, seconds: float) -> None:
         logger.warning(
