@@ -67,6 +67,8 @@ class Channel:
         """
         self.name = name
         """For people: the endpoint's URL and, where it has several peers, which one."""
+        self.endpoint = name.partition(" from ")[0]
+        """URL of the endpoint, which holds no space."""
         self.options = options
         """Those of its endpoint."""
         self.access = Access.of(options.access)

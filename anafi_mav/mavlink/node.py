@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
@@ -112,7 +112,10 @@ class Node:
         self._factories = factories or {}
         self._heartbeats: dict[tuple[int, int], Packed] = {}
         """The newest of each of our components; without those of autopilots, which depend on the flavour."""
-        self._closed_counters: Counter[str] = Counter()
+        self._stale = 0
+        """Messages of the time of a stall."""
+        self._closed: defaultdict[str, Counter[str]] = defaultdict(Counter)
+        """What was counted by closed channels, by the URL of their endpoint."""
         self._stalls: StallWatch | None = None
 
     async def start(self, entries: Sequence[str | EndpointConfig]) -> None:
@@ -229,9 +232,17 @@ class Node:
         """Return how late the event loop ran its timers within the last minute, s."""
         return [] if self._stalls is None else list(self._stalls.delays)
 
+    def closed_counters(self, url: str) -> Counter[str]:
+        """Return what the closed channels of an endpoint have counted."""
+        return self._closed[url]
+
     def counters(self) -> Counter[str]:
         """Everything counted since the start: by channels, endpoints and the router."""
-        result = self._closed_counters + total(self.channels) + self._router.counters
+        result = total(self.channels) + self._router.counters
+        for counters in self._closed.values():
+            result.update(counters)
+        if self._stale:
+            result["stale"] = self._stale
         for endpoint in self.endpoints:
             result.update(endpoint.counters)
         return result
@@ -253,7 +264,7 @@ class Node:
         _log_change("closed", channel)
         self._router.remove(channel)
         self.channels = [other for other in self.channels if other is not channel]
-        self._closed_counters.update(total([channel]))
+        self._closed[channel.endpoint].update(total([channel]))
         if self.on_channel is not None:
             self._guarded(self.on_channel, channel, False)
 
@@ -280,7 +291,7 @@ class Node:
             if not route.hosts or not self._delivers:
                 continue
             if old:
-                self._closed_counters["stale"] += 1
+                self._stale += 1
                 if received.id not in STOPPING:
                     continue
             if received.id == dialect.MAVLINK_MSG_ID_SETUP_SIGNING:
