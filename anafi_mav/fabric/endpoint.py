@@ -146,7 +146,10 @@ class FabricEndpoint(Endpoint):
         if not self._connection.is_up:
             return f"{self.url}: not connected ({self._connection.problem}), retrying"
         count = len(self._stations)
-        kept_off = "".join(f", system {sysid} is another gateway's" for sysid in sorted(self.claims.refused))
+        kept_off = "".join(
+            f", system {sysid} is another gateway's{', too' if sysid in self.claims.held else ''}"
+            for sysid in sorted(self.claims.taken)
+        )
         lost = sum(station.input.lost for station in self._stations.values())
         lost_on_the_way = f", {lost} of their samples lost" if lost else ""
         return f"{self.url}: connected, {count} station{'' if count == 1 else 's'}{lost_on_the_way}{kept_off}"
@@ -217,7 +220,8 @@ class FabricEndpoint(Endpoint):
     def _claim(self) -> None:
         keys, session = self._connection.keys, self._connection.zenoh
         can_hold = self._is_listed and self._systems.is_started()
-        for change in self.claims.decide(is_listed=can_hold, can_claim=self._systems.is_on_ground):
+        now = self._clock.monotonic()
+        for change in self.claims.decide(now, is_listed=can_hold, can_claim=self._systems.is_on_ground):
             sysid, token = change.sysid, keys.drone_token(change.sysid, self._connection.session_text)
             if change.step is ClaimStep.HOLD:
                 session.declare_token(token)
@@ -225,7 +229,8 @@ class FabricEndpoint(Endpoint):
                 session.answer_queries(keys.state(sysid))
                 session.publish_on(keys.down(sysid))
                 continue
-            logger.critical("%s: system %d is held by gateway %s", self.url, sysid, change.holder)
+            also = ", too" if change.step is ClaimStep.CLASH else ""
+            logger.critical("%s: system %d is held by gateway %s%s", self.url, sysid, change.holder, also)
             if change.step is ClaimStep.RELEASE:
                 for key in (token, keys.up(sysid, "**"), keys.state(sysid), keys.down(sysid)):
                     session.end(key)
@@ -367,10 +372,8 @@ class FabricEndpoint(Endpoint):
     def _act_by_time(self) -> None:
         now = self._clock.monotonic()
         self._claim()
-        self._reported &= self.claims.refused.keys()
-        self._reported |= {
-            sysid for sysid in self.claims.refused if sysid in self._reported or self._systems.refused_id(sysid)
-        }
+        self._reported &= self.claims.taken
+        self._reported |= {sysid for sysid in self.claims.taken - self._reported if self._systems.refused_id(sysid)}
         for station in tuple(self._stations):
             self._ping_if_due(station, now)
         if now - self._stated >= STATE_EVERY and self._connection.is_up:

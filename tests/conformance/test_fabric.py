@@ -30,6 +30,7 @@ from support.setpoints import VELOCITY_ONLY, engage, local, streaming
 from support.world import HOME, World, loopback, world
 
 from anafi_mav.clock import SystemClock
+from anafi_mav.fabric import claims
 from anafi_mav.fabric.envelope import UpEnvelope
 from anafi_mav.fabric.ground import FabricGround
 from anafi_mav.mavlink import dialect as own
@@ -198,7 +199,9 @@ async def test_system_id_of_another_gateway_is_left_to_it(tmp_path: Path, monkey
         output, _ = await check.communicate()
         assert check.returncode == 1
         assert "system 1 is held by gateway" in output.decode()
-        # The first goes on, and no sooner than it ends does the second hold the id.
+        # The first goes on, and no sooner than it has ended for a while does the second hold the id.
+        monkeypatch.setattr(claims, "FREE_FOR", 1.0)
+        monkeypatch.setattr(claims, "SPREAD", 0.0)
         monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))  # one gateway uses one state folder
         async with world(endpoints=(node.url,)) as other:
             await other.client.wait("STATUSTEXT", lambda m: m.text.startswith("System id 1: another"), since=0)
@@ -207,6 +210,30 @@ async def test_system_id_of_another_gateway_is_left_to_it(tmp_path: Path, monkey
             mark = station.mark()
             await station.heartbeat(lambda beat: True, since=mark, timeout=10.0)
             assert "1 station" in "".join(other.gateway.lines())
+
+
+async def test_lost_link_of_a_gateway_gives_its_system_id_to_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a restarted router: the gateway is back within seconds, and another one waits for its id."""
+    async with router() as node:
+        relay = StallingRelay(node.port)
+        port = await relay.start()
+        try:
+            async with world(endpoints=(f"zenoh://127.0.0.1:{port}",)) as w, ground(node.url) as stations:
+                station = w.take(await FabricStation().join(stations))
+                monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))  # one gateway uses one state folder
+                async with world(endpoints=(node.url,)) as other:
+                    await other.client.wait("STATUSTEXT", lambda m: m.text.startswith("System id 1: another"), since=0)
+                    await relay.close()
+                    await station.silence("HEARTBEAT", 2.0)
+                    relay = StallingRelay(node.port)
+                    await relay.start(port)
+                    await station.heartbeat(lambda beat: True, since=station.mark(), timeout=20.0)
+                    assert "system 1 is another gateway's" in "".join(other.gateway.lines())
+                    assert "another gateway" not in "".join(w.gateway.lines())
+        finally:
+            await relay.close()
 
 
 async def test_killed_gateway_that_returns_is_found_by_its_stations(tmp_path: Path) -> None:
