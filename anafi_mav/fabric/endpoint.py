@@ -31,6 +31,7 @@ from anafi_mav.mavlink.base import Endpoint, EndpointUrl, Outbox, Sink, shaped_c
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.frames import ReceivedFrame
 from anafi_mav.mavlink.node import Inbound
+from anafi_mav.mavlink.peer_table import REPLACEABLE
 from anafi_mav.mavlink.router import targets
 
 logger = logging.getLogger(__name__)
@@ -90,6 +91,8 @@ class _Station:
 
     lane: _Lane
     input: StationInput
+    heard: float
+    """Time of its last sample, or of getting its place."""
     pinged: float = 0.0
     reported: float = -math.inf
     """Time of the last text about a late frame."""
@@ -206,10 +209,7 @@ class FabricEndpoint(Endpoint):
         elif key.kind is KeyKind.STATION:
             if not change.is_alive:
                 self._drop(key.owner)
-                following = self._places.leave(key.owner)
-                if following is not None:
-                    logger.info("%s: station %s has a place now", self.url, following)
-                    self._add(following)
+                self._follow(self._places.leave(key.owner))
             elif not self._places.is_known(key.owner):
                 if self._places.arrive(key.owner):
                     self._add(key.owner)
@@ -239,9 +239,31 @@ class FabricEndpoint(Endpoint):
         keys = self._connection.keys
         lane = self._lane(f"{self.url} from {station}", lambda sysid: keys.down(sysid, station))
         lane.channel.ends_with_station = lane.channel.has_ages = True
-        self._stations[station] = _Station(lane, StationInput(session_of(station)))
+        self._stations[station] = _Station(lane, StationInput(session_of(station)), self._clock.monotonic())
         self._ping(station)
         self._sink.opened(lane.channel)
+
+    def _follow(self, station: str | None) -> None:
+        """Serve a station that has got the place of another one."""
+        if station is not None:
+            logger.info("%s: station %s has a place now", self.url, station)
+            self._add(station)
+
+    def _make_room(self, now: float) -> None:
+        """Give the places of silent stations to those that wait.
+
+        A silent one waits then, and is not lost.
+        """
+        silent = sorted(self._stations, key=lambda name: self._stations[name].heard) if self._places.has_waiting else []
+        for name in silent:
+            station = self._stations[name]
+            if now - station.heard < REPLACEABLE or not self._places.has_waiting:
+                return
+            self.counters["evicted_peers"] += 1
+            logger.warning("%s: station %s gives way, silent for %.0f s", self.url, name, now - station.heard)
+            station.lane.channel.ends_with_station = False
+            self._drop(name)
+            self._follow(self._places.give_way(name))
 
     def _drop(self, station: str) -> None:
         gone = self._stations.pop(station, None)
@@ -314,6 +336,7 @@ class FabricEndpoint(Endpoint):
         if not station.input.is_next(sysid, envelope):
             channel.counters["repeated_samples"] += 1
             return
+        station.heard = now
         channel.counters["lost_samples"] = station.input.lost
         station.input.hear(sysid)
         age = station.input.age(envelope, now)
@@ -372,6 +395,7 @@ class FabricEndpoint(Endpoint):
     def _act_by_time(self) -> None:
         now = self._clock.monotonic()
         self._claim()
+        self._make_room(now)
         self._reported &= self.claims.taken
         self._reported |= {sysid for sysid in self.claims.taken - self._reported if self._systems.refused_id(sysid)}
         for station in tuple(self._stations):

@@ -30,7 +30,7 @@ from support.setpoints import VELOCITY_ONLY, engage, local, streaming
 from support.world import HOME, World, loopback, world
 
 from anafi_mav.clock import SystemClock
-from anafi_mav.fabric import claims
+from anafi_mav.fabric import claims, endpoint
 from anafi_mav.fabric.envelope import UpEnvelope
 from anafi_mav.fabric.ground import FabricGround
 from anafi_mav.mavlink import dialect as own
@@ -234,6 +234,21 @@ async def test_lost_link_of_a_gateway_gives_its_system_id_to_no_other(
                     assert "another gateway" not in "".join(w.gateway.lines())
         finally:
             await relay.close()
+
+
+async def test_silent_station_gives_its_place_to_one_that_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(endpoint, "REPLACEABLE", 2.0)  # a station sends once a second
+    async with (
+        router() as node,
+        world(endpoints=(f"{node.url}?max_clients=1",)) as w,
+        ground(node.url) as first,
+        ground(node.url) as second,
+    ):
+        idle = await FabricStation().join(first)
+        await idle.close()  # its place at the ground process remains
+        pilot = w.take(await FabricStation().join(second))
+        await accepted(pilot, dialect.MAV_CMD_REQUEST_MESSAGE, 148)
+        assert counted(w, "refused_peers") == counted(w, "evicted_peers") == 1
 
 
 async def test_killed_gateway_that_returns_is_found_by_its_stations(tmp_path: Path) -> None:
