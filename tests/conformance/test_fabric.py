@@ -370,6 +370,22 @@ async def test_oversized_samples_are_counted_and_disturb_no_station() -> None:
             token.undeclare()
 
 
+async def test_key_that_a_station_sends_is_not_published() -> None:
+    """Gateways take it from signed links only; on the network it could be read."""
+    key = bytes(range(32))
+    async with flown() as (w, node):
+        with await asyncio.to_thread(opened, node) as session:
+            samples = session.declare_subscriber("anafi/1/up/**")
+            await asyncio.to_thread(samples.recv)
+            w.client.send(dialect.MAVLink_setup_signing_message(1, 1, key, 1))
+            w.client.send(dialect.MAVLink_setup_signing_message(0, 0, key, 1))
+            w.client.send(dialect.MAVLink_statustext_message(6, b"after the key"))
+            contents = [b""]
+            while b"after the key" not in contents[-1]:
+                contents.append((await asyncio.to_thread(samples.recv)).payload.to_bytes())
+        assert not [content for content in contents if key in content]
+
+
 async def test_flood_of_queries_leaves_room_for_the_next_one() -> None:
     """Queries beyond those that may be open end without an answer, and none stays open."""
     async with router() as node, world(endpoints=(node.url,)):
