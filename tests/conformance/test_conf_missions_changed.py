@@ -339,3 +339,14 @@ async def test_mission_uploaded_in_a_pause_flies_despite_refused_files() -> None
         assert (await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, COMPLETE, since=mark)
         assert reached(w, mark) == [0, 1]
+
+
+async def test_continue_after_the_paused_mission_was_replaced_is_refused() -> None:
+    """It would fly nothing of the new mission, and so it is not accepted."""
+    async with world(web=True) as w:
+        await on_the_way(w, 2)
+        pause = dialect.MAV_CMD_DO_PAUSE_CONTINUE
+        assert (await w.client.command(pause, 0)).result == dialect.MAV_RESULT_ACCEPTED
+        await state(w, PAUSED, seq=2)
+        await put(w, [way(6.0, 0.0, 6.0), way(0.0, 6.0, 6.0)])
+        assert (await w.client.command(pause, 1)).result == dialect.MAV_RESULT_TEMPORARILY_REJECTED

@@ -294,7 +294,7 @@ class CommandService(Service):
             if running.answer is None:
                 continue
             command = running.answer[1].command
-            if command.id == inbound.message.command and command.effect.is_revocable:
+            if command.id == inbound.message.command and command.is_revocable:
                 task.cancel()
 
     def _explain(self, error: AnafiMavError) -> int:
