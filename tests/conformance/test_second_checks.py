@@ -1,7 +1,7 @@
 """Conditions that are checked again after a wait, judged by what the simulated drone received.
 
-What is requested waits for the end of what flew before. If the drone lands, returns or is disarmed meanwhile, the request
-is refused, and the drone receives nothing of it.
+What is requested waits for the end of what flew before. If the drone lands, returns or is disarmed meanwhile, the
+request is refused, and the drone receives nothing of it.
 """
 
 from __future__ import annotations
