@@ -14,7 +14,7 @@ from typing import Any
 
 import msgspec
 
-from anafi_mav.cli import heap, interrupts, log, run_check
+from anafi_mav.cli import event_loop, heap, interrupts, log, run_check
 from anafi_mav.cli.addresses import Reservations, spot
 from anafi_mav.cli.child import SimulatorProcess
 from anafi_mav.cli.service_manager import ServiceManager
@@ -131,7 +131,7 @@ def _serve(arguments: argparse.Namespace) -> int:
         what = "is open to the network without TLS: a program on the way can watch"
         complain(f"warning: video.host: {video.host} {what}", "yellow")
     heap.settle()
-    problems = asyncio.run(_run(config, arguments.sim_log.absolute() if arguments.sim_log else None))
+    problems = event_loop.run(_run(config, arguments.sim_log.absolute() if arguments.sim_log else None))
     for problem in problems:
         complain(f"not kept: {problem}")
     return 1 if problems else 0
