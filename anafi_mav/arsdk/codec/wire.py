@@ -18,7 +18,7 @@ import enum
 import struct
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, NamedTuple, Protocol, TypeVar, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, NamedTuple, Protocol, TypeVar, final, get_args, get_origin, get_type_hints
 
 import msgspec
 
@@ -122,6 +122,7 @@ class Message(msgspec.Struct, frozen=True):
     DIRECTION: ClassVar[Direction]
 
 
+@final
 class UnknownMessage(msgspec.Struct, frozen=True):
     """A message that is not declared here.
 
