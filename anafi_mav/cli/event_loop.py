@@ -1,4 +1,4 @@
-"""The event loop of the gateway, which looks at its sockets less often while many drones send.
+"""Event loop of the gateway: it looks at its sockets less often while they are busy.
 
 Each wake-up costs system calls, a change of the process and a processor whose caches hold other things. With 250
 drones a datagram arrives every tenth of a millisecond. While sockets bring that many, those of a moment are read
@@ -70,7 +70,10 @@ class _Policy(asyncio.DefaultEventLoopPolicy):
 
 
 def run(work: Coroutine[Any, Any, ResultT]) -> ResultT:
-    """Run a coroutine as asyncio.run does. Windows has an event loop of its own, without a selector."""
+    """Run a coroutine as asyncio.run does.
+
+    Windows has an event loop of its own, without a selector.
+    """
     if sys.platform != "win32":
         asyncio.set_event_loop_policy(_Policy())
     return asyncio.run(work)

@@ -1,4 +1,4 @@
-"""The simulated drones of a gateway's configuration: their addresses, and the fleet for the simulator."""
+"""Simulated drones of a configuration: their addresses, and the fleet for the simulator."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ _OFF = _Stream(None, None)
 
 
 class _Lane(Generic[ChannelT]):
-    """One message on the channels that it is streamed on, and when it is due next on one of them."""
+    """One message on the channels that stream it, and when it is due next on one of them."""
 
     __slots__ = ("streams", "until")
 
@@ -160,7 +160,10 @@ class Streams(Generic[ChannelT]):
         return found
 
     def is_streamed(self, channels: Sequence[ChannelT], id: int) -> bool:
-        """Return True if a message is streamed on one of these channels; see `due_on` about their list."""
+        """Return True if a message is streamed on one of these channels.
+
+        About their list see `due_on`.
+        """
         return bool(self._lane(self._audience(channels), id).streams)
 
     def due(self, channel: ChannelT, id: int, now: float) -> bool:

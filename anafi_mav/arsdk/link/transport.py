@@ -412,7 +412,10 @@ class Transport:
 
     @property
     def is_idle(self) -> bool:
-        """True while nothing waits to be sent, acknowledged or returned by `expire`; only pings become due then."""
+        """True while nothing waits to be sent, acknowledged or returned by `expire`.
+
+        Only pings become due then.
+        """
         for queue in self._queues.values():
             if queue.flight or queue.waiting:
                 return False

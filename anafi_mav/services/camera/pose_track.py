@@ -52,7 +52,10 @@ class SampleTrack:
     """
 
     def __init__(self, width: int, *, angles: bool = False, spacing: float = 0.0) -> None:
-        """Create it empty; `width`: values of a sample, `spacing`: s between two samples that are kept."""
+        """Create it empty.
+
+        `width`: values of a sample, `spacing`: s between two samples that are kept.
+        """
         self._angles = angles
         self._spacing = spacing
         self._row = struct.Struct(f"{1 + width}d")
@@ -65,7 +68,10 @@ class SampleTrack:
         """Time of the newest sample."""
 
     def add(self, at: float, *values: float) -> None:
-        """Add a sample; one that is not newer than the last by the spacing, or not finite, is left out."""
+        """Add a sample.
+
+        One that is not newer than the last by the spacing, or not finite, is left out.
+        """
         if at - self.newest <= self._spacing or not math.isfinite(sum(values)):
             return
         if not self._ring:

@@ -60,7 +60,7 @@ class FtpService(Service):
         self._files, self._folders = files, folders
 
     def _tree(self, flavour: Flavour) -> FileTree:
-        """Return the files as clients of a flavour see them; most drones have clients of one at most."""
+        """Return the files as clients of a flavour see them."""
         tree = self._trees.get(flavour.name)
         if tree is None:
             files = self._files
