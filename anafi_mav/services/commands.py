@@ -252,6 +252,11 @@ class Command:
         return effect if isinstance(effect, Effect) else effect(self)
 
     @property
+    def is_revocable(self) -> bool:
+        """COMMAND_CANCEL may end it, also a movement of the aircraft that counts each time."""
+        return self.effect.is_revocable or (self.effect is Effect.EACH and self.group is ActionGroup.FLIGHT)
+
+    @property
     def group(self) -> ActionGroup:
         """Group of actions that it may replace."""
         group = self.definition.group

@@ -35,10 +35,10 @@ DEFAULT_RADIUS = 10.0
 DEFAULT_SPEED = 3.0
 """m/s along the circle when the command gives no speed."""
 
-LOOKS = 16
-"""Number of points of a circle that must be where the drone may fly.
+LOOKS = 32
+"""Number of straight pieces of a circle that must lead where the drone may fly.
 
-Between two it is 2 % of the radius further out.
+Between the ends of one the circle is 0.5 % of the radius further out.
 """
 
 ON_IT = 5.0
@@ -98,17 +98,11 @@ def entry(circle: Circle, here: GeoPoint) -> GeoPoint:
     return GeoPoint(*geo.destination(*circle.centre.point, north * circle.radius, east * circle.radius))
 
 
-def outline(circle: Circle, here: GeoPoint) -> list[GeoPoint]:
-    """Return the points of the circle to check before it is flown.
-
-    The first is the entry from `here`.
-    """
-    corners = (2.0 * math.pi * n / LOOKS for n in range(LOOKS))
+def outline(circle: Circle) -> list[GeoPoint]:
+    """Return the corners of the circle's outline, to be checked. The last is the first again."""
+    corners = (2.0 * math.pi * n / LOOKS for n in range(LOOKS + 1))
     centre, radius = circle.centre.point, circle.radius
-    return [
-        entry(circle, here),
-        *(GeoPoint(*geo.destination(*centre, math.cos(a) * radius, math.sin(a) * radius)) for a in corners),
-    ]
+    return [GeoPoint(*geo.destination(*centre, math.cos(a) * radius, math.sin(a) * radius)) for a in corners]
 
 
 def heading_at(circle: Circle, bearing: float) -> float | None:

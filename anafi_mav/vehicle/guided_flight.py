@@ -19,6 +19,7 @@ from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.move_heading import oriented
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import By
+from anafi_mav.vehicle.base.severity import Severity
 
 SAME_HEIGHT = 0.1
 """m by which the height of a moveTo may differ from the commanded one.
@@ -26,6 +27,9 @@ SAME_HEIGHT = 0.1
 Some millimetres distinguish two of them.
 """
 
+
+_SHORT = {MoveEnd.ERROR: texts.MOVE_FAILED, MoveEnd.CANCELED: texts.MOVE_CANCELLED}
+"""Ends of a move short of its target, with the reason for the text."""
 
 GOTO = TaskRules(texts.GOTO, needs=Needs.NO_DESCENT | Needs.IN_AIR, follows=True)
 
@@ -70,6 +74,13 @@ class GuidedFlight:
         self._vehicle = vehicle
         self._arrived: tuple[GeoPoint, Position | None, int] | None = None
         """Target of the last completed move, and the drone's newest GPS location and the control's epoch then."""
+        self._failed_at: int | None = None
+        """The control's epoch when the drone, or another controller, last ended a move short of its target."""
+
+    @property
+    def has_failed(self) -> bool:
+        """True when the newest goto has ended short of its target, and nothing was commanded since."""
+        return self._failed_at == self._vehicle.control.epoch
 
     @property
     def goto(self) -> Goto | None:
@@ -164,7 +175,7 @@ class GuidedFlight:
             orientation=orientation,
         )
         if (move := vehicle.drone.piloting.move) is not None:
-            move.ended.add_done_callback(lambda ended: self._on_arrival(goto, ended))
+            move.ended.add_done_callback(lambda ended: self._on_end(goto, ended))
 
     async def _climb(self, ato: float, yaw: float | None, mode: FlightMode, by: By) -> None:
         """Go straight up or down to a height (m above take-off) by a moveBy, which needs no GPS fix.
@@ -204,11 +215,21 @@ class GuidedFlight:
         is_newest = self._vehicle.drone.gps.state.location is location and self._vehicle.control.epoch == epoch
         return place if is_newest else None
 
-    def _on_arrival(self, goto: Goto, ended: asyncio.Future[MoveEnd]) -> None:
-        """A move has ended; at its target the drone hovers, and the task is over."""
-        if not ended.cancelled() and ended.result() is MoveEnd.DONE:
-            self._vehicle.control.release(goto)
-            self._arrived = goto.place, self._vehicle.drone.gps.state.location, self._vehicle.control.epoch
+    def _on_end(self, goto: Goto, ended: asyncio.Future[MoveEnd]) -> None:
+        """A move has ended: the drone hovers, at its target or short of it, and the task is over.
+
+        Every client gets a text when it is short of it, and none has commanded that: the mode does not change.
+        """
+        vehicle, control = self._vehicle, self._vehicle.control
+        how = None if ended.cancelled() else ended.result()
+        if how is MoveEnd.DONE:
+            control.release(goto)
+            self._arrived = goto.place, vehicle.drone.gps.state.location, control.epoch
+        elif how in _SHORT and control.active is goto:
+            control.release(goto)
+            self._failed_at = control.epoch
+            reason = texts.PILOT if vehicle.drone.controller.pilot_acquired_control else _SHORT[how]
+            vehicle.text(Severity.WARNING, texts.TASK_ENDED.fill(what=texts.GOTO, reason=reason))
 
 
 def _rules_of_offset(what: Subject) -> TaskRules:

@@ -19,6 +19,7 @@ from support.flavours import both
 from support.mav import NAN, Client
 from support.plans import ACCEPTED as TAKEN
 from support.plans import FENCE, RALLY, Item, around, circle, clear, content, download, rally, square, upload
+from support.setpoints import NO_ACCELERATION, NO_YAW, NO_YAW_RATE, allow_speed, engage, local, streaming
 from support.world import HOME, MODES, World, world
 
 from anafi_mav import geo, mav_enums
@@ -147,6 +148,37 @@ async def test_conf_076_stopped_before_the_fence(flavour: str) -> None:
         statuses = [m for _, m in w.client.since(mark, "FENCE_STATUS")]
         assert {(m.breach_status, m.breach_count) for m in statuses} == {(0, 0)}
         assert len([text for text in texts(w.client, mark) if text.startswith("Fence")]) == 1
+
+
+@both
+async def test_conf_076_position_with_a_velocity_is_stopped_before_the_fence(flavour: str) -> None:
+    """A feed-forward of 9 m/s leads away from a position inside: the drone holds before the square, not behind it."""
+    async with world(flavour=flavour, speed=1.0) as w:
+        assert (await upload(w.client, square(PLACE, 30.0), FENCE)).type == TAKEN
+        await w.take_off(10.0)
+        allow_speed(w)
+        mark = w.client.mark()
+        setpoint = local(NO_ACCELERATION | NO_YAW | NO_YAW_RATE, at=(0.0, 0.0, -10.0), v=(9.0, 0.0, 0.0))
+        async with streaming(w.client, setpoint):
+            await engage(w.client, flavour)
+            await said(w.client, "too fast for", since=mark, timeout=20.0)
+            await at_rest(w)
+        assert 10.0 < farthest(w) < 30.0
+
+
+@both
+async def test_conf_076_goto_that_a_new_fence_cuts_off_is_stopped_before_it(flavour: str) -> None:
+    """The fence is uploaded while the drone flies to a place that is outside of it."""
+    async with world(flavour=flavour, speed=1.0) as w:
+        await w.take_off(10.0)
+        away = geo.destination(*PLACE, 200.0, 0.0)
+        ack = await w.client.command(REPOSITION, -1, 1, 0, NAN, frame=6, x=away[0], y=away[1], z=10.0)
+        assert ack.result == ACCEPTED
+        mark = w.client.mark()
+        assert (await upload(w.client, square(PLACE, 40.0), FENCE)).type == TAKEN
+        await said(w.client, "too fast for", since=mark, timeout=20.0)
+        await at_rest(w)
+        assert 10.0 < farthest(w) < 40.0
 
 
 @pytest.mark.parametrize(

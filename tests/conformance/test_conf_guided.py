@@ -7,10 +7,12 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fault_scenarios import CANCELLED, IN_PROGRESS
 from support.flavours import both
 from support.world import HOME, World, world
 
 from anafi_mav import geo, units
+from anafi_mav.mavlink import dialect as newer
 
 ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
@@ -94,6 +96,26 @@ async def test_conf_082_speed_command_changes_the_running_move(flavour: str) -> 
 
 
 @both
+async def test_conf_082_hold_that_arrives_with_a_change_of_speed_stops_the_move(flavour: str) -> None:
+    """A parameter and a Hold in one segment: the move that is to change its speed ends."""
+    async with world(flavour=flavour, speed=1.0) as w:
+        await w.take_off(10.0)
+        await go_north(w)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 5.0, 20.0)
+        moves, mark = len(sent(w, "move.extended_move_to")), w.client.mark()
+        speed = dialect.MAVLink_param_set_message(1, 1, b"ANF_CRUISE_SPEED", 4.0, dialect.MAV_PARAM_TYPE_REAL32)
+        hold = dialect.MAVLink_command_long_message(1, 1, PAUSE, 0, 0, 0, 0, 0, 0, 0, 0)
+        w.client.send_raw(w.client.pack(speed) + w.client.pack(hold))
+        ack = await w.client.wait("COMMAND_ACK", lambda m: m.result != IN_PROGRESS, since=mark)
+        assert (ack.command, ack.result) == (PAUSE, ACCEPTED)
+        await w.drone.wait_log(
+            lambda e: e.kind == "pose" and abs(e.args["vn"]) < 0.2, 10.0, since=w.drone.log[-1].t + 1.0
+        )
+        assert len(sent(w, "move.extended_move_to")) == moves
+        assert w.drone.pose.north < 40.0
+
+
+@both
 async def test_conf_082_a_speed_counts_for_later_moves_too(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         assert (await w.client.command(SPEED, 0, 4.0, 0, 0)).result == ACCEPTED
@@ -159,6 +181,31 @@ async def test_conf_143_condition_yaw_of_an_unknown_reference_is_denied(referenc
         await w.take_off(5.0)
         assert (await w.client.command(YAW, 90, 60, 1, reference)).result == DENIED
         assert sent(w, "move.extended_move_by") == []
+
+
+async def test_conf_143_relative_yaw_sent_twice_turns_twice() -> None:
+    """A person means each of two equal turns by an angle; one with a confirmation is a retransmission."""
+    async with world() as w:
+        await w.take_off(5.0)
+        for _ in range(2):
+            assert (await w.client.command(YAW, 30, 0, 1, 1, timeout=20.0)).result == ACCEPTED
+        await heading(w, 60.0)
+        mark = w.client.mark()
+        w.client.send(dialect.MAVLink_command_long_message(1, 1, YAW, 1, 30, 0, 1, 1, NAN, NAN, NAN))
+        assert (await w.client.wait("COMMAND_ACK", lambda m: m.command == YAW, since=mark)).result == ACCEPTED
+        # The climb to 5 m and two turns.
+        assert len([move for move in sent(w, "ardrone3.Piloting.moveBy") if any(move.values())]) == 3
+
+
+async def test_conf_143_relative_yaw_can_be_cancelled() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off(5.0)
+        mark = w.client.mark()
+        w.client.send_command(YAW, 180, 10, 1, 1)
+        await w.drone.wait_log(lambda e: e.name.endswith("extended_move_by"))
+        w.client.send(newer.MAVLink_command_cancel_message(1, 1, YAW))
+        ack = await w.client.wait("COMMAND_ACK", lambda m: m.command == YAW and m.result != IN_PROGRESS, since=mark)
+        assert ack.result == CANCELLED
 
 
 async def test_conf_143_condition_yaw_on_the_way() -> None:

@@ -119,3 +119,18 @@ async def test_a_launch_by_hand() -> None:
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
         w.drone.throw()
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 20.0)
+
+
+async def test_end_of_a_calibration_in_the_air_disturbs_no_orbit() -> None:
+    """MAVSDK's cancel of a calibration; in the air none can run."""
+    async with world(speed=1.0) as w:
+        await w.take_off(10.0)
+        circling = 0x01030000
+        assert (await w.client.command(dialect.MAV_CMD_DO_ORBIT, 8.0, 3.0)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == circling)
+        none = dialect.MAV_CMD_PREFLIGHT_CALIBRATION
+        assert (await w.client.command(none, 0, 0, 0, 0, x=0.0, y=0.0, z=0.0)).result == ACCEPTED
+        mark = w.client.mark()
+        for _ in range(3):
+            await w.client.wait("HEARTBEAT")
+        assert {beat.custom_mode for _, beat in w.client.since(mark, "HEARTBEAT")} == {circling}

@@ -11,6 +11,8 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.flavours import both
 from support.mav import NAN
+from support.plans import ACCEPTED as TAKEN
+from support.plans import FENCE, circle, upload
 from support.setpoints import motion, said
 from support.world import HOLD, HOME, World, world
 
@@ -110,6 +112,36 @@ async def test_an_orbit_of_so_many_radians_ends_in_hold() -> None:
         mark = w.client.mark()
         await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, since=mark, timeout=40.0)
         await w.client.wait("STATUSTEXT", lambda m: "angle flown" in m.text, since=mark)
+
+
+@pytest.mark.parametrize("bearing", [0.1, 3.0, 5.6])
+async def test_orbit_through_an_exclusion_zone_is_refused(bearing: float) -> None:
+    """A zone of 3 m on a circle of 60 m, at a bearing in rad."""
+    async with world() as w:
+        at = geo.destination(*HOME[:2], 60.0 * math.cos(bearing), 60.0 * math.sin(bearing))
+        assert (await upload(w.client, [circle(at, 3.0, inclusion=False)], FENCE)).type == TAKEN
+        await w.take_off(10.0)
+        mark = w.client.mark()
+        ack = await w.client.command(ORBIT, 60.0, 3.0, frame=GLOBAL, x=HOME[0], y=HOME[1], z=HOME[2] + 10.0)
+        assert ack.result == DENIED
+        await said(w.client, "path crosses exclusion", mark)
+
+
+async def test_orbit_that_has_ended_is_flown_when_sent_again() -> None:
+    """The same command within the time of a retransmission, after the orbit has ended for want of GPS."""
+    async with world(speed=1.0) as w:
+        await w.take_off(10.0)
+        place = {"x": HOME[0], "y": HOME[1], "z": HOME[2] + 10.0}
+        assert (await w.client.command(ORBIT, 4.0, 2.0, frame=GLOBAL, **place)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.name.endswith(".PCMD") and (e.args["roll"] or e.args["pitch"]), 10.0)
+        mark = w.client.mark()
+        w.drone.faults.gps = False
+        await said(w.client, "Orbit ended", mark)
+        w.drone.faults.gps = True
+        await w.client.wait("GPS_RAW_INT", lambda m: m.fix_type >= dialect.GPS_FIX_TYPE_3D_FIX, since=w.client.mark())
+        mark = w.client.mark()
+        assert (await w.client.command(ORBIT, 4.0, 2.0, frame=GLOBAL, **place)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == CIRCLING["px4"], since=mark, timeout=3.0)
 
 
 async def test_without_gps_the_orbit_ends_in_a_hover() -> None:

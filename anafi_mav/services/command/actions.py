@@ -165,6 +165,7 @@ def flight_actions(vehicle: Vehicle) -> dict[int, Action]:
             altitude=Altitude.BY_FRAME,
             effect=_effect_of_reposition,
             progress=ProgressPolicy.EARLY,
+            still_holds=lambda: not vehicle.guided.has_failed,
         ),
         dialect.MAV_CMD_DO_SET_MODE: Action(
             partial(set_mode, vehicle),

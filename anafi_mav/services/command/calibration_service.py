@@ -75,13 +75,15 @@ class CalibrationService(Service):
     async def _calibrate(self, command: Command) -> None:
         """Run MAV_CMD_PREFLIGHT_CALIBRATION for the magnetometer or the gimbal's horizon.
 
-        param2 1: magnetometer; param5 2: horizon. With all parameters 0 the calibration under way ends. The command
-        ends with the calibration: ACCEPTED when the drone reports that it has succeeded.
+        param2 1: magnetometer; param5 2: horizon. With all parameters 0 the calibration under way ends; in the air
+        there is none, and what flies is not disturbed. The command ends with the calibration: ACCEPTED when the drone
+        reports that it has succeeded.
         """
         values = [0.0 if math.isnan(value) else value for value in (*command.params, command.x, command.y, command.z)]
         wanted = {index: value for index, value in enumerate(values, 1) if value != 0.0}
         if not wanted:
-            await self._acquire(command)  # ends the one that runs
+            if self.host.vehicle.on_ground:
+                await self._acquire(command)  # ends the one that runs
         elif wanted == {2: _MAGNETOMETER}:
             await self._on_ground(command, texts.CALIBRATION, self._magnetometer)
         elif wanted == {5: _HORIZON}:

@@ -99,6 +99,11 @@ def _effect_of_pause(command: Command) -> Effect:
     return Effect.HOLD if command.params[0] == 0.0 else Effect.CHANGE
 
 
+def _effect_of_turn(command: Command) -> Effect:
+    """A turn by an angle counts each time; a turn to a heading may be answered twice."""
+    return Effect.EACH if command.params[3] == 1.0 else Effect.CHANGE
+
+
 class GuidedService(Service):
     """Changes the flight under way."""
 
@@ -108,10 +113,14 @@ class GuidedService(Service):
                 self._change_speed, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
             ),
             dialect.MAV_CMD_DO_CHANGE_ALTITUDE: Action(
-                self._change_altitude, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
+                self._change_altitude,
+                location=False,
+                altitude=Altitude.UNUSED,
+                effect=Effect.CHANGE,
+                still_holds=lambda: not self.host.vehicle.guided.has_failed,
             ),
             dialect.MAV_CMD_CONDITION_YAW: Action(
-                self._turn, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
+                self._turn, location=False, altitude=Altitude.UNUSED, effect=_effect_of_turn
             ),
             dialect.MAV_CMD_DO_PAUSE_CONTINUE: Action(
                 self._pause_or_continue, location=False, altitude=Altitude.UNUSED, effect=_effect_of_pause
@@ -203,7 +212,7 @@ class GuidedService(Service):
 
         Continue means to fly on to the target of the move that the pause stopped, or to resume its mission. After a
         pause that stopped neither, setpoints may fly the drone again. Refused when the vehicle was commanded
-        otherwise since, or the drone has landed.
+        otherwise since, the mission was replaced, or the drone has landed.
         """
         vehicle = self.host.vehicle
         if command.params[0] == 0.0:
@@ -214,7 +223,7 @@ class GuidedService(Service):
                 await vehicle.guided.go(task, by=command.right)
             elif task is vehicle.mission and vehicle.mission.paused:
                 await vehicle.set_mode(FlightMode.MISSION, command.right)
-            elif vehicle.control.paused:
+            elif task is None and vehicle.control.paused:
                 vehicle.control.resume()  # setpoints may fly it again
             else:
                 raise Refused(texts.CONTINUE, texts.NOTHING_PAUSED)

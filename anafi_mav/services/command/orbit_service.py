@@ -11,6 +11,7 @@ import contextlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from anafi_mav import geo, texts, units
 from anafi_mav.drone import events
@@ -78,6 +79,8 @@ class OrbitService(Service, PlainTask):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._orbit: _Orbit | None = None
+        self._is_flown = False
+        """The newest orbit was flown to its end."""
 
     @property
     def circle(self) -> Circle | None:
@@ -87,7 +90,11 @@ class OrbitService(Service, PlainTask):
     def actions(self) -> Mapping[int, Action]:
         return {
             dialect.MAV_CMD_DO_ORBIT: Action(
-                self._fly_orbit, location=True, altitude=Altitude.AMSL, effect=Effect.CHANGE
+                self._fly_orbit,
+                location=True,
+                altitude=Altitude.AMSL,
+                effect=Effect.CHANGE,
+                still_holds=lambda: self._orbit is not None or self._is_flown,
             )
         }
 
@@ -129,8 +136,9 @@ class OrbitService(Service, PlainTask):
         if here is None:
             raise Refused(texts.ORBIT, texts.NO_FIX)
         start = entry(circle, here)
-        for point in outline(circle, here):
-            check_place(vehicle, point)
+        check_place(vehicle, start)
+        for before, point in pairwise(outline(circle)):
+            check_place(vehicle, point, start=before)
         orbit = _Orbit(Lap(self._held_back(circle)), vehicle.settings.cruise_speed)
         circle = orbit.lap.circle
         bearing = _bearing(circle.centre, start)
@@ -145,7 +153,7 @@ class OrbitService(Service, PlainTask):
                 )
             else:
                 vehicle.drone.piloting.hover()  # ends a move of ours, which would ignore sticks
-            self._orbit = orbit
+            self._orbit, self._is_flown = orbit, False
             grant.begin()
             if is_away and (move := vehicle.drone.piloting.move) is not None:
                 orbit.approach = self.host.spawn(self._approach(move, orbit))
@@ -239,6 +247,7 @@ class OrbitService(Service, PlainTask):
         if sticks is None:
             self._stop(texts.POSITION_UNKNOWN, Severity.WARNING)
         elif lap.done:
+            self._is_flown = True
             self._stop(texts.ORBIT_DONE, Severity.INFO)
         else:
             vehicle.drone.piloting.pilot(sticks)

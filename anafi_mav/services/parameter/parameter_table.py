@@ -475,9 +475,13 @@ async def _set_climb_speed(host: Host, value: float) -> None:
 
 
 async def _go_on(host: Host) -> None:
-    """A move under way changes its speed, as it does for MAV_CMD_DO_CHANGE_SPEED."""
-    if (goto := host.vehicle.guided.goto) is not None:
-        await host.vehicle.guided.go(goto, by=Source.GATEWAY)
+    """A move under way changes its speed, as it does for MAV_CMD_DO_CHANGE_SPEED.
+
+    Not while a command is carried out: a Hold that has arrived would be ended by it.
+    """
+    vehicle = host.vehicle
+    if vehicle.control.is_settled and (goto := vehicle.guided.goto) is not None:
+        await vehicle.guided.go(goto, by=Source.GATEWAY)
 
 
 def _climb_limits(host: Host) -> Limits | None:

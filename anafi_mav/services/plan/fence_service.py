@@ -20,12 +20,22 @@ from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.plan.fence_mirror import FenceMirror
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.stream import MessageStream, Times
+from anafi_mav.vehicle.base.geo_point import GeoPoint, point_of
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, reason_of
 from anafi_mav.vehicle.base.requester import Source
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
-from anafi_mav.vehicle.fence.fence_watch import CEILING, EVERYTHING, FLOOR, FenceWatch, Reaction, Sight, State
+from anafi_mav.vehicle.fence.fence_watch import (
+    CEILING,
+    EVERYTHING,
+    FLOOR,
+    FenceWatch,
+    OutsideFence,
+    Reaction,
+    Sight,
+    State,
+)
 from anafi_mav.vehicle.vehicle import Vehicle
 
 LOOK_EVERY = 0.5
@@ -105,13 +115,8 @@ class FenceService(Service):
         vehicle, drone = self.host.vehicle, self.host.drone
         state, place, home = drone.piloting.state, vehicle.place, vehicle.home
         velocity = (0.0, 0.0) if state.velocity is None else (state.velocity.north, state.velocity.east)
-        # A move, a plan and a setpoint's position end at a place that was judged before; an orbit turns.
-        goal = vehicle.offboard.goal
-        own_way = (
-            drone.piloting.move is not None
-            or (goal is not None and goal.place is not None)
-            or vehicle.mode in (FlightMode.MISSION, FlightMode.ORBIT)
-        )
+        # A plan and an orbit were judged before; they turn.
+        own_way = vehicle.mode in (FlightMode.MISSION, FlightMode.ORBIT) or self._ends_inside
         return Sight(
             None if place is None else place.point,
             now - self._located,
@@ -124,6 +129,25 @@ class FenceService(Service):
             steering=not own_way and state.plan != PlayingState.PLAYING,
             orders=vehicle.control.epoch,
         )
+
+    @property
+    def _ends_inside(self) -> bool:
+        """True when the drone flies to a place by itself, and place and way are inside the fence.
+
+        They were when the move began, but the fence may be another one since.
+        """
+        vehicle, move = self.host.vehicle, self.host.drone.piloting.move
+        if move is not None and move.target is not None:
+            end: GeoPoint | None = GeoPoint(move.target.latitude, move.target.longitude)
+        else:
+            end = vehicle.offboard.end_place
+        if end is None:
+            return False
+        try:
+            self._watch.check_place(end.point, point_of(vehicle.home), point_of(vehicle.place))
+        except OutsideFence:
+            return False
+        return True
 
     def _look(self, now: float) -> None:
         self._looked = now

@@ -202,18 +202,9 @@ class Aircraft(ABC):
 
     def lacking(self, needs: Needs) -> OperatorText | None:
         """Return the first condition that is not met, as the reason of a refusal; None: all are."""
-        drone = self.drone
         if Needs.NO_DESCENT in needs and (descent := self.descent) is not None:
             return descent
-        unmet: tuple[tuple[Needs, bool, OperatorText], ...] = (
-            (Needs.IN_AIR, not self.in_air, texts.NOT_IN_AIR),
-            (Needs.FIX, self.place is None, texts.NO_FIX),
-            (Needs.NO_PILOT, drone.controller.pilot_acquired_control, texts.PILOT),
-            (Needs.LIMITS, drone.piloting.limits is None, texts.TILT_UNKNOWN),
-            (Needs.PLAIN_STICKS, self.sticks_follow_camera, texts.STICKS_FOLLOW_CAMERA),
-            (Needs.ROLL_SIGN, self.roll.sign is RollSign.INVERTED, texts.ROLL_INVERTED),
-        )
-        return next((reason for need, is_unmet, reason in unmet if need in needs and is_unmet), None)
+        return next((reason for need, is_unmet, reason in _UNMET if need in needs and is_unmet(self)), None)
 
     def prearm_problems(self) -> list[OperatorText]:
         """Return the reasons why the drone would not take off, in sentences; empty without any."""
@@ -249,3 +240,14 @@ class Aircraft(ABC):
     @abstractmethod
     async def terminate(self, by: By) -> None:
         """Cut the motors, if the configuration allows it at all."""
+
+
+_UNMET: tuple[tuple[Needs, Callable[[Aircraft], bool], OperatorText], ...] = (
+    (Needs.IN_AIR, lambda aircraft: not aircraft.in_air, texts.NOT_IN_AIR),
+    (Needs.FIX, lambda aircraft: aircraft.place is None, texts.NO_FIX),
+    (Needs.NO_PILOT, lambda aircraft: aircraft.drone.controller.pilot_acquired_control, texts.PILOT),
+    (Needs.LIMITS, lambda aircraft: aircraft.drone.piloting.limits is None, texts.TILT_UNKNOWN),
+    (Needs.PLAIN_STICKS, lambda aircraft: aircraft.sticks_follow_camera, texts.STICKS_FOLLOW_CAMERA),
+    (Needs.ROLL_SIGN, lambda aircraft: aircraft.roll.sign is RollSign.INVERTED, texts.ROLL_INVERTED),
+)
+"""When a need is not met, and the reason of a refusal then, in the order in which they are checked."""

@@ -170,6 +170,14 @@ class Control:
         return self._situation.holds_streams
 
     @property
+    def is_settled(self) -> bool:
+        """True when no command or request has arrived whose effect is not there yet.
+
+        Only then may what is no action, and so has no place in their sequence, change what flies.
+        """
+        return self._situation.pending is None and self.actions.is_idle
+
+    @property
     def epoch(self) -> int:
         """Count of requests, and of what ended all commands: the ground, the loss of the link."""
         return self._situation.epoch

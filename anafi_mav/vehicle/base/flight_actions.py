@@ -48,6 +48,11 @@ class FlightActions:
         task = asyncio.current_task()
         return None if task is None else self._tasks.get(task)
 
+    @property
+    def is_idle(self) -> bool:
+        """True when no action runs, or has arrived, that may fly the drone."""
+        return not any(action.flies for action in self._tasks.values())
+
     def add(self, task: asyncio.Task[None], action: FlightAction) -> None:
         """Note an action that has arrived, until it ends."""
         self._tasks[task] = action

@@ -12,8 +12,9 @@ import asyncio
 import contextlib
 import math
 from collections.abc import Callable, Hashable
-from dataclasses import replace
 from typing import NamedTuple
+
+from msgspec.structs import replace
 
 from anafi_mav import texts, units
 from anafi_mav.clock import Alarm, Clock
@@ -26,6 +27,7 @@ from anafi_mav.vehicle.base.bounds import TooLow
 from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.control import Request
 from anafi_mav.vehicle.base.flight_task import Hover, Needs, PlainTask, TaskRules
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, reason_of
 from anafi_mav.vehicle.base.right import Extent, Right
@@ -69,6 +71,20 @@ _BEFORE_TAKEOFF = (FlyingState.LANDED, FlyingState.MOTOR_RAMPING)
 
 _GROUND = Needs.NO_PILOT | Needs.LIMITS | Needs.PLAIN_STICKS
 _AIR = _GROUND | Needs.NO_DESCENT | Needs.IN_AIR
+
+_RULES = {
+    (stands, needs_roll): TaskRules(
+        texts.OFFBOARD,
+        needs=(_GROUND if stands else _AIR) | (Needs.ROLL_SIGN if needs_roll else Needs.NONE),
+        ends_landing=Extent.COMMANDED,
+        ends_return=Extent.COMMANDED,
+        follows=True,
+        needs_operator=True,
+    )
+    for stands in (False, True)
+    for needs_roll in (False, True)
+}
+"""For a drone that stands on the ground or not, and a setpoint that a velocity loop flies or not."""
 
 
 class _Attempt(NamedTuple):
@@ -115,15 +131,7 @@ class OffboardFlight(PlainTask):
     def rules(self) -> TaskRules:
         setpoint = self._stream.setpoint
         needs_roll = isinstance(setpoint, MotionSetpoint) and setpoint.needs_loop
-        needs = (_GROUND if self._stands else _AIR) | (Needs.ROLL_SIGN if needs_roll else Needs.NONE)
-        return TaskRules(
-            texts.OFFBOARD,
-            needs=needs,
-            ends_landing=Extent.COMMANDED,
-            ends_return=Extent.COMMANDED,
-            follows=True,
-            needs_operator=True,
-        )
+        return _RULES[self._stands, needs_roll]
 
     @property
     def mode(self) -> FlightMode | None:
@@ -146,6 +154,18 @@ class OffboardFlight(PlainTask):
     def goal(self) -> Goal | None:
         """The position of what is being flown, resolved; None when it has none."""
         return None if self._stream.steering is None else self._stream.steering.goal
+
+    @property
+    def end_place(self) -> GeoPoint | None:
+        """Return the place on the map at which the flown setpoint ends; None when it leads on.
+
+        A velocity or acceleration beside a position leads beyond it.
+        """
+        goal, setpoint = self.goal, self._stream.setpoint
+        if goal is None or not isinstance(setpoint, MotionSetpoint):
+            return None
+        leads_on = setpoint.velocity != NOTHING or setpoint.acceleration != NOTHING
+        return None if leads_on else goal.place
 
     @property
     def yaw(self) -> float | None:

@@ -7,7 +7,8 @@ the same place, for it is repeated in case one gets lost, not to make the drone 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from anafi_mav import geo, texts
 from anafi_mav.vehicle.base.aircraft import Aircraft
@@ -18,8 +19,7 @@ from anafi_mav.vehicle.base.velocity_loop import Axis, Demand, MotionEstimate
 from anafi_mav.vehicle.offboard.setpoints import MotionSetpoint, PositionReference, Vector
 
 
-@dataclass(frozen=True)
-class Goal:
+class Goal(Struct, frozen=True):
     """A setpoint's position, resolved."""
 
     origin: PositionReference

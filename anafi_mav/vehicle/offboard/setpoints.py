@@ -6,15 +6,15 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
 from typing import TypeAlias
+
+from msgspec import Struct
 
 NO_MOTION = 0.01
 """rad, rad/s, m/s, m/s2 and share of full climb up to which a setpoint asks for no motion: single precision."""
 
 
-@dataclass(frozen=True)
-class AttitudeSetpoint:
+class AttitudeSetpoint(Struct, frozen=True):
     """Setpoint of one SET_ATTITUDE_TARGET."""
 
     roll: float
@@ -49,8 +49,7 @@ Vector: TypeAlias = "tuple[float | None, float | None, float | None]"
 NOTHING: Vector = (None, None, None)
 
 
-@dataclass(frozen=True)
-class MotionSetpoint:
+class MotionSetpoint(Struct, frozen=True):
     """Setpoint of one SET_POSITION_TARGET_*."""
 
     origin: PositionReference

@@ -5,8 +5,10 @@ Positions and headings that count from the drone are resolved once: the same set
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import NamedTuple
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from anafi_mav import texts, units
 from anafi_mav.drone import Limits, PilotingCommand
@@ -28,8 +30,7 @@ class AskedHeading(NamedTuple):
 NO_HEADING = AskedHeading(False, None, None)
 
 
-@dataclass(frozen=True)
-class Steering:
+class Steering(Struct, frozen=True):
     """Flight by an engagement's newest setpoint; replaced as a whole by the next one's."""
 
     controller: VelocityController

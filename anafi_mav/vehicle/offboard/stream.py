@@ -19,8 +19,10 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass, field, replace
 from typing import Any
+
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 from anafi_mav import texts
 from anafi_mav.texts import OperatorText
@@ -117,8 +119,7 @@ def lasts(setpoint: Setpoint, guided_timeout: float | None) -> float:
     return guided_timeout - TOLD_EARLY if steers and alone else SILENCE
 
 
-@dataclass(frozen=True)
-class Received:
+class Received(Struct, frozen=True):
     """A client's newest setpoint."""
 
     setpoint: Setpoint
@@ -134,8 +135,7 @@ class Received:
         return self.at + self.lasts
 
 
-@dataclass(frozen=True)
-class Engagement:
+class Engagement(Struct, frozen=True):
     """Flight by the setpoints of one client, or its wish to take off; ends as a whole."""
 
     pilot: Hashable
@@ -149,8 +149,7 @@ class Engagement:
     """Flight by the newest setpoint; None before it begins."""
 
 
-@dataclass(frozen=True)
-class OffboardStream:
+class OffboardStream(Struct, frozen=True):
     """The newest setpoints, their age, and whose of them fly the drone."""
 
     received: Mapping[Hashable, Received] = field(default_factory=dict)

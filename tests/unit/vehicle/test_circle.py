@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import pytest
 
@@ -89,9 +90,13 @@ def test_the_nearest_point_of_the_circle() -> None:
 
 
 def test_the_outline_is_on_the_circle() -> None:
-    points = outline(circle(), CENTRE)
-    assert len(points) == 17
+    points = outline(circle())
+    assert len(points) == 33
+    assert points[0] == points[-1]
     assert {round(geo.distance(*CENTRE.point, *point.point), 1) for point in points} == {20.0}
+    # 32 pieces of 2 * 20 m * sin(pi / 32) each.
+    pieces = {round(geo.distance(*a.point, *b.point), 2) for a, b in pairwise(points)}
+    assert pieces == {3.92}
 
 
 def test_the_tilt_limits_the_speed() -> None:

@@ -38,7 +38,7 @@ ROWS: dict[str, tuple[bool, Altitude, object, ProgressPolicy]] = {
     "COMPONENT_ARM_DISARM": (False, Altitude.UNUSED, BY_PARAMETER, ProgressPolicy.PROMPT),
     "VIDEO_START_STREAMING": (False, Altitude.UNUSED, Effect.TARGET, ProgressPolicy.PROMPT),
     "VIDEO_STOP_STREAMING": (False, Altitude.UNUSED, Effect.STOP, ProgressPolicy.PROMPT),
-    "CONDITION_YAW": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
+    "CONDITION_YAW": (False, Altitude.UNUSED, BY_PARAMETER, ProgressPolicy.PROMPT),
     "DO_ACCEPT_MAG_CAL": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
     "DO_CANCEL_MAG_CAL": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
     "DO_CHANGE_ALTITUDE": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
