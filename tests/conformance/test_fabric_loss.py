@@ -110,6 +110,16 @@ async def test_setpoints_of_a_stall_move_nothing_and_land_gets_through() -> None
         assert w.gateway.counters()["late_inputs"] > 5
 
 
+async def test_link_of_600_ms_there_and_back_connects() -> None:
+    async with router() as node:
+        relay = StallingRelay(node.port, delay=0.3)
+        try:
+            async with joined(f"zenoh://127.0.0.1:{await relay.start()}", node.url, flying=False) as w:
+                assert w.gateway.counters()["reopened"] == 0
+        finally:
+            await relay.close()
+
+
 async def test_drones_are_back_soon_when_new_connections_get_no_answer() -> None:
     async with stalling() as (w, relay):
         relay.unanswered = 2
