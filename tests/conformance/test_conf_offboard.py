@@ -770,3 +770,16 @@ async def test_position_is_held_against_a_velocity_that_leads_away(frame: int) -
             # Where 9 m/s and the approach are equal: the root of 3 times the distance is 9.
             assert math.hypot(w.drone.pose.north, w.drone.pose.east) == pytest.approx(27.0, abs=3.0)
             assert math.hypot(w.drone.pose.vn, w.drone.pose.ve) < 1.0
+
+
+async def test_height_is_held_against_a_climb_that_leads_away() -> None:
+    """A climb of 20 m/s, far beyond the drone's own limit, with a height of 8 m."""
+    async with world(speed=1.0) as w:
+        await w.take_off(8.0)
+        fastest = w.drone.firmware.settings.number("max_vertical_speed")
+        setpoint = local(NO_ACCELERATION | NO_YAW | NO_YAW_RATE, at=(0.0, 0.0, -8.0), v=(0.0, 0.0, -20.0))
+        async with streaming(w.client, setpoint):
+            await engage(w.client, "px4")
+            began = now()
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > began + 30.0, 40.0)
+            assert w.drone.pose.up == pytest.approx(8.0 + fastest, abs=0.5)  # the height loop has 1 /s

@@ -390,7 +390,8 @@ class VelocityController:
             self._climb = units.clip(self._climb, -limits.climb_mps, limits.climb_mps)
             return self._climb
         self._climb = None
-        climb = -(demand.down_velocity or 0.0)
+        # A faster one cannot be flown, and would only shift the height that is held.
+        climb = -units.clip(demand.down_velocity or 0.0, -limits.climb_mps, limits.climb_mps)
         if demand.height is not None and self.motion.height is not None:
             climb += HEIGHT_GAIN * (demand.height - self.motion.height)
         return units.clip(climb, -limits.climb_mps, limits.climb_mps)
