@@ -12,6 +12,7 @@ import logging
 import os
 import re
 import secrets
+import stat
 from pathlib import Path
 
 logger = logging.getLogger(__name__)
@@ -57,8 +58,14 @@ def read_token(folder: Path | None) -> AccessToken | None:
 
 
 def load_token(folder: Path | None) -> AccessToken:
-    """Return the token of a state folder, made and stored where there is none."""
+    """Return the token of a state folder, made and stored where there is none.
+
+    One that other users could read is replaced.
+    """
     found = read_token(folder)
+    if found is not None and folder is not None and _is_readable_by_others(folder / FILE):
+        logger.warning("%s: other users could read it: another token replaces it", folder / FILE)
+        found = None
     if found is not None:
         return found
     made = AccessToken(secrets.token_urlsafe(BYTES))
@@ -68,6 +75,11 @@ def load_token(folder: Path | None) -> AccessToken:
         except OSError as error:
             logger.warning("%s: %s: the token of web and video ends with the gateway", folder, error.strerror)
     return made
+
+
+def _is_readable_by_others(path: Path) -> bool:
+    """Windows has no such permissions; there the folder is the user's own."""
+    return os.name == "posix" and bool(path.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO))
 
 
 def _store(path: Path, text: str) -> None:

@@ -134,7 +134,7 @@ class EndpointOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
             le=MAX_CLIENTS,
             description="Most clients at a time. When all places are taken, a new client replaces the one that has "
             "been silent for longest, if that is at least 5 s. Clients without [proof](#forged-addresses) or key have "
-            "as many places of their own. `udpin` and `tcpin` only.",
+            "as many places of their own. `udpin`, `tcpin` and `zenoh` only.",
             extra=expected(f"a whole number from 1 to {MAX_CLIENTS}"),
         ),
     ] = CLIENTS

@@ -339,6 +339,8 @@ class Gateway:
             StatusRoutes(self.web, self.status)
         self._report = StatusReport(self._node, self._clock)
         self._recorder: Recorder | None = None
+        self._downloads: Path | None = None
+        """Folder for copies of media, once `open` has found it."""
 
     async def __aenter__(self) -> Self:
         await self.start()
@@ -359,6 +361,7 @@ class Gateway:
         """
         if self._node.endpoints:
             return
+        self._downloads = download_folder(self.config.media)
         # Lock, keys and token are read and written in the event loop: no drone is connected yet that could wait, and
         # nothing may begin before the folder is this gateway's. Later on all files are the threads' of `disk_writer`.
         self._lock_state()
@@ -480,7 +483,7 @@ class Gateway:
                 started,
                 allow_kill=allow_kill,
                 state=self._state,
-                download_folder=download_folder(self.config.media),
+                download_folder=self._downloads,
                 uris=self._uris(),
                 has_picture_pose=self.config.pose == "video",
                 failsafe_limits=FailsafeLimits(self.config.warnings.return_height, self.config.warnings.radio_range),
@@ -565,6 +568,7 @@ class Gateway:
             self._unlock_state()
         else:  # what is late would overwrite the next gateway's files: the lock ends with this process
             logger.warning("state folder: %s", HANGS)
+            self._state_problem = self._state_problem or f"{self._state}: {HANGS}"
         if self._recorder is not None:
             await _guarded("the recording", self._recorder.close())
 

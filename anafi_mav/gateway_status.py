@@ -151,11 +151,10 @@ class StatusReport:
         )
 
     def _endpoint(self, endpoint: Endpoint, now: float) -> EndpointStatus:
-        # A channel is named after its endpoint, and after its peer where there are several.
-        many = f"{endpoint.url} from "
-        mine = [one for one in self._node.channels if one.name == endpoint.url or one.name.startswith(many)]
+        mine = [one for one in self._node.channels if one.endpoint == endpoint.url]
+        closed = self._node.closed_counters(endpoint.url)
         refused: Counter[str] = Counter()
-        for counters in (endpoint.counters, *(channel.counters + channel.parser.counters for channel in mine)):
+        for counters in (endpoint.counters, closed, *(channel.counters + channel.parser.counters for channel in mine)):
             refused.update({REFUSALS[name]: count for name, count in counters.items() if name in REFUSALS})
         return EndpointStatus(
             url=endpoint.shown_url,

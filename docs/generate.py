@@ -73,6 +73,7 @@ ENDPOINTS = """
 | `tcpin://HOST:PORT` | waits at HOST:PORT for TCP connections |
 | `tcpout://HOST:PORT` | connects to HOST:PORT by TCP |
 | `serial:///dev/ttyUSB0:57600` | a serial line, here with 57600 baud |
+| `zenoh://HOST:PORT` | connects to a zenoh router, for stations anywhere ([fabric](fabric.md)) |
 
 An endpoint has the options of [this table](#endpoints). They have two forms with the same meaning, in a URL and as
 keys. In a URL they follow `?`, are joined by `&`, and a list is joined by commas. In a shell, put the URL in quotes:
@@ -99,16 +100,21 @@ an endpoint without [`signing`](security.md) can do what its `access` permits.
 - A message beyond the access has no effect. A command is answered with DENIED, a parameter with PARAM_ERROR and its
   value, a plan with MISSION_ACK DENIED, a file request with FILE_PROTECTED; a text names the access. `refused_access`
   of the gateway's counters has their number, in total and by message.
-- It is not forwarded to other systems either. Of an observer's messages only a station's heartbeat and what is for one
-  system are forwarded, and nothing in the name of a drone of the gateway, or of a system that is heard on an endpoint
-  with more access (`refused_observer`): give observers system ids of their own.
+- It is not forwarded to other systems either. Of an observer's messages only a station's heartbeat and what
+  reads from one system are forwarded: no rates and no ends of file sessions, which that system has for all of the
+  gateway's clients. Nothing is forwarded in the name of a drone of the gateway, or of a system that is heard on an
+  endpoint with more access (`refused_observer`): give observers system ids of their own.
+- An observer that reads a plan keeps no other client from changing it.
 - The heartbeat of an observer does not count as a ground station's: with `ANF_GCS_LOSS` set, the drone acts on the loss
   of the last station that may control it.
 - A pose at more than ten times a second opens the live video for an observer too, as it does for every client.
 - Several clients of one endpoint have the same access. Give observers an endpoint of their own.
 
 `systems` limits an endpoint to some drones: the others are invisible there, and a message to them has no effect
-(`refused_systems`). `allow_messages` and `block_messages` filter what is streamed. A client that requests the rate of a
+(`refused_systems`). What its clients send to all is not forwarded, but for a station's heartbeat and for what these
+systems themselves send to no target.
+
+`allow_messages` and `block_messages` filter what is streamed. A client that requests the rate of a
 filtered message gets DENIED. Answers are not filtered.
 
 ### Forged addresses

@@ -9,12 +9,13 @@ import argparse
 import asyncio
 
 from anafi_mav.cli import interrupts, log
+from anafi_mav.cli.start_warnings import warnings_of_ground
 from anafi_mav.cli.terminal import complain, say
 from anafi_mav.clock import SystemClock
 from anafi_mav.errors import ConfigError
 from anafi_mav.fabric.ground import FabricGround
 from anafi_mav.mavlink.base import EndpointUrl
-from anafi_mav.mavlink.endpoint import is_readable_on_the_way, parse_endpoint
+from anafi_mav.mavlink.endpoint import parse_endpoint
 
 DEFAULT_ENDPOINT = "udpout://127.0.0.1:14550"
 
@@ -35,9 +36,8 @@ def run(arguments: argparse.Namespace) -> int:
     log.set_up(20 if arguments.verbose else 30)
     fabric = _parsed("--zenoh", arguments.zenoh)
     stations = [_parsed("--endpoint", text) for text in arguments.endpoint or [DEFAULT_ENDPOINT]]
-    if is_readable_on_the_way(fabric):
-        what = "crosses the network without TLS: a program on the way can read it and fly the drones; use link=tls"
-        complain(f"warning: {fabric.text} {what}", "red")
+    for warning in warnings_of_ground(fabric, stations):
+        complain(f"warning: {warning.text}", warning.style)
     interrupts.run(_serve(fabric, stations))
     return 0
 

@@ -220,8 +220,8 @@ class LogFileHandler(logging.Handler):
             self._lost = 0
 
 
-def check(path: Path) -> None:
-    """Raise `ConfigError` for a log file that cannot be written. Nothing is made."""
+def check(option: str, path: Path) -> None:
+    """Raise `ConfigError` for an option's file that cannot be written. Nothing is made."""
     try:
         if path.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
@@ -229,11 +229,11 @@ def check(path: Path) -> None:
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
         check_folder(path.parent, path.name)
     except OSError as error:
-        raise _unusable(path, error) from error
+        raise _unusable(option, path, error) from error
 
 
-def _unusable(path: Path, error: OSError) -> ConfigError:
-    return ConfigError("--log-file", f"expected a file that can be written, got {path}: {error.strerror}")
+def _unusable(option: str, path: Path, error: OSError) -> ConfigError:
+    return ConfigError(option, f"expected a file that can be written, got {path}: {error.strerror}")
 
 
 def set_up(level: int = logging.WARNING, *, path: Path | None = None, kind: str = TEXT) -> None:
@@ -246,7 +246,7 @@ def set_up(level: int = logging.WARNING, *, path: Path | None = None, kind: str 
         try:
             file = LogFileHandler(path)
         except OSError as error:
-            raise _unusable(path, error) from error
+            raise _unusable("--log-file", path, error) from error
         handlers.append(file)
         atexit.register(file.end)
     for handler in handlers:

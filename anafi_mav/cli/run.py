@@ -15,19 +15,15 @@ from typing import Any
 
 import msgspec
 
-from anafi_mav.cli import heap, interrupts, log, options, run_check
+from anafi_mav.cli import interrupts, log, options, run_check, start_warnings
 from anafi_mav.cli.addresses import SHARED, Ports, Reservations, spot
 from anafi_mav.cli.child import SimulatorProcess
 from anafi_mav.cli.scenarios import load as load_scenario
 from anafi_mav.cli.service_manager import ServiceManager
 from anafi_mav.cli.terminal import complain, say
-from anafi_mav.config import Config, DroneConfig, SimConfig, from_mapping, load, remarks
+from anafi_mav.config import Config, DroneConfig, SimConfig, from_mapping, load
 from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import Gateway, state_in_use
-from anafi_mav.mavlink.endpoint import is_open_to_network, is_readable_on_the_way, parse_endpoint
-from anafi_mav.mavlink.key_ring import folder_of, has_key
-from anafi_mav.relay.uri_host import is_loopback
-from anafi_mav.services.flavours import FLAVOURS
 from anafi_mav.sim.world import quirks
 from anafi_mav.sim.world.model import MODELS
 from anafi_mav.state_lock import read_holder, state_folder
@@ -87,8 +83,10 @@ def _check(arguments: argparse.Namespace) -> int:
     """Print a line for each thing that a start needs; 1 when one of them is wrong."""
     try:
         if arguments.log_file is not None:
-            log.check(arguments.log_file)
+            log.check("--log-file", arguments.log_file)
         config = configuration(arguments.config, arguments.drone, arguments.endpoint, arguments.allow_kill)
+        if arguments.sim_log is not None and any(drone.sim is not None for drone in config.drones):
+            log.check("--sim-log", arguments.sim_log)
         findings = asyncio.run(run_check.findings(config, place))
     except ConfigError as error:
         located = _located(error, arguments)
@@ -110,31 +108,8 @@ def _located(error: ConfigError, arguments: argparse.Namespace) -> ConfigError:
 
 def _serve(arguments: argparse.Namespace) -> int:
     config = configuration(arguments.config, arguments.drone, arguments.endpoint, arguments.allow_kill)
-    for remark in remarks(config):
-        complain(f"warning: {remark}", "yellow")
-    state = state_folder(config.state)
-    for index, entry in enumerate(config.endpoints):
-        with contextlib.suppress(ConfigError):  # the gateway says what is wrong with it
-            url = parse_endpoint(entry, tuple(FLAVOURS))
-            if is_open_to_network(url) and not (state and has_key(folder_of(state), url.key_name)):
-                can = "read the drones' data" if url.options.access == "observe" else "fly the drones"
-                what = f"is open to the network without signing: any program that reaches it can {can}"
-                complain(f"warning: endpoints[{index}]: {url.text} {what}", "yellow")
-            if is_readable_on_the_way(url):
-                what = "crosses the network without TLS: a program on the way can read it and fly the drones"
-                complain(f"warning: endpoints[{index}]: {url.text} {what}; use link=tls", "red")
-    http = config.http_server
-    if http is not None and not is_loopback(http.host):
-        what = (
-            "is open to the network without TLS: a program on the way can read the token of the web page; "
-            "put a reverse proxy with TLS before it"
-        )
-        complain(f"warning: http.host: {http.host} {what}", "yellow")
-    video = config.video_server
-    if video is not None and not is_loopback(video.host):
-        what = "is open to the network without TLS: a program on the way can watch"
-        complain(f"warning: video.host: {video.host} {what}", "yellow")
-    heap.settle()
+    for warning in start_warnings.warnings_of(config):
+        complain(f"warning: {warning.text}", warning.style)
     problems = asyncio.run(_run(config, arguments.sim_log.absolute() if arguments.sim_log else None))
     for problem in problems:
         complain(f"not kept: {problem}")
@@ -215,7 +190,9 @@ async def _run(config: Config, sim_log: Path | None) -> list[str]:
         manager.stopping()
         for sentence in signals.unsaid():
             say(sentence, "yellow")
-        return gateway.state_problems()
+        problems = gateway.state_problems()  # while its drones are there
+    # What is last written is written while the gateway closes.
+    return [*problems, *(problem for problem in gateway.state_problems() if problem not in problems)]
 
 
 async def _start(

@@ -10,14 +10,17 @@ from __future__ import annotations
 import importlib.util
 import platform
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from anafi_mav import __version__
+from anafi_mav.cli import start_warnings
 from anafi_mav.cli.addresses import Reservations
 from anafi_mav.cli.doctor import Finding, ok, wrong
-from anafi_mav.config import Config, remarks
+from anafi_mav.config import Config
 from anafi_mav.errors import ConfigError
-from anafi_mav.gateway import Gateway
+from anafi_mav.gateway import Gateway, download_folder
+from anafi_mav.state_lock import check_folder
 
 __all__ = ["findings", "wrong"]
 
@@ -28,7 +31,7 @@ Place = Callable[[Config, Reservations], tuple[Config, dict[str, Any] | None]]
 async def findings(config: Config, place: Place) -> list[Finding]:
     """Return a line for each thing that a start needs."""
     found = [versions(), ok("configuration", f"{len(config.drones)} drones, {len(config.endpoints)} endpoints")]
-    found += [ok("configuration", f"warning: {remark}") for remark in remarks(config)]
+    found += [ok("configuration", f"warning: {warning.text}") for warning in start_warnings.warnings_of(config)]
     with Reservations() as reservations:
         try:
             placed, _ = place(config, reservations)
@@ -51,9 +54,21 @@ async def findings(config: Config, place: Place) -> list[Finding]:
         found += [ok("open", line) for line in gateway.lines()]
         if config.recording.folder is not None:
             found.append(ok("recording", f"folder can be written: {config.recording.folder}"))
+        downloads = download_folder(config.media)
+        if downloads is not None:
+            found.append(_writable("media.download_folder", downloads))
     finally:
         await gateway.close()
     return found
+
+
+def _writable(key: str, folder: Path) -> Finding:
+    """Return whether files can be made in a folder, which may be absent."""
+    try:
+        check_folder(folder)
+    except OSError as error:
+        return wrong(key, f"{folder}: {error.strerror}", "name a folder that this user can write")
+    return ok(key, f"folder can be written: {folder}")
 
 
 def versions() -> Finding:

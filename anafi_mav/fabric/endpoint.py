@@ -31,6 +31,7 @@ from anafi_mav.mavlink.base import Endpoint, EndpointUrl, Outbox, Sink, shaped_c
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.frames import ReceivedFrame
 from anafi_mav.mavlink.node import Inbound
+from anafi_mav.mavlink.peer_table import REPLACEABLE
 from anafi_mav.mavlink.router import targets
 
 logger = logging.getLogger(__name__)
@@ -90,6 +91,8 @@ class _Station:
 
     lane: _Lane
     input: StationInput
+    heard: float
+    """Time of its last sample, or of getting its place."""
     pinged: float = 0.0
     reported: float = -math.inf
     """Time of the last text about a late frame."""
@@ -146,7 +149,10 @@ class FabricEndpoint(Endpoint):
         if not self._connection.is_up:
             return f"{self.url}: not connected ({self._connection.problem}), retrying"
         count = len(self._stations)
-        kept_off = "".join(f", system {sysid} is another gateway's" for sysid in sorted(self.claims.refused))
+        kept_off = "".join(
+            f", system {sysid} is another gateway's{', too' if sysid in self.claims.held else ''}"
+            for sysid in sorted(self.claims.taken)
+        )
         lost = sum(station.input.lost for station in self._stations.values())
         lost_on_the_way = f", {lost} of their samples lost" if lost else ""
         return f"{self.url}: connected, {count} station{'' if count == 1 else 's'}{lost_on_the_way}{kept_off}"
@@ -203,10 +209,7 @@ class FabricEndpoint(Endpoint):
         elif key.kind is KeyKind.STATION:
             if not change.is_alive:
                 self._drop(key.owner)
-                following = self._places.leave(key.owner)
-                if following is not None:
-                    logger.info("%s: station %s has a place now", self.url, following)
-                    self._add(following)
+                self._follow(self._places.leave(key.owner))
             elif not self._places.is_known(key.owner):
                 if self._places.arrive(key.owner):
                     self._add(key.owner)
@@ -217,7 +220,8 @@ class FabricEndpoint(Endpoint):
     def _claim(self) -> None:
         keys, session = self._connection.keys, self._connection.zenoh
         can_hold = self._is_listed and self._systems.is_started()
-        for change in self.claims.decide(is_listed=can_hold, can_claim=self._systems.is_on_ground):
+        now = self._clock.monotonic()
+        for change in self.claims.decide(now, is_listed=can_hold, can_claim=self._systems.is_on_ground):
             sysid, token = change.sysid, keys.drone_token(change.sysid, self._connection.session_text)
             if change.step is ClaimStep.HOLD:
                 session.declare_token(token)
@@ -225,7 +229,8 @@ class FabricEndpoint(Endpoint):
                 session.answer_queries(keys.state(sysid))
                 session.publish_on(keys.down(sysid))
                 continue
-            logger.critical("%s: system %d is held by gateway %s", self.url, sysid, change.holder)
+            also = ", too" if change.step is ClaimStep.CLASH else ""
+            logger.critical("%s: system %d is held by gateway %s%s", self.url, sysid, change.holder, also)
             if change.step is ClaimStep.RELEASE:
                 for key in (token, keys.up(sysid, "**"), keys.state(sysid), keys.down(sysid)):
                     session.end(key)
@@ -234,9 +239,31 @@ class FabricEndpoint(Endpoint):
         keys = self._connection.keys
         lane = self._lane(f"{self.url} from {station}", lambda sysid: keys.down(sysid, station))
         lane.channel.ends_with_station = lane.channel.has_ages = True
-        self._stations[station] = _Station(lane, StationInput(session_of(station)))
+        self._stations[station] = _Station(lane, StationInput(session_of(station)), self._clock.monotonic())
         self._ping(station)
         self._sink.opened(lane.channel)
+
+    def _follow(self, station: str | None) -> None:
+        """Serve a station that has got the place of another one."""
+        if station is not None:
+            logger.info("%s: station %s has a place now", self.url, station)
+            self._add(station)
+
+    def _make_room(self, now: float) -> None:
+        """Give the places of silent stations to those that wait.
+
+        A silent one waits then, and is not lost.
+        """
+        silent = sorted(self._stations, key=lambda name: self._stations[name].heard) if self._places.has_waiting else []
+        for name in silent:
+            station = self._stations[name]
+            if now - station.heard < REPLACEABLE or not self._places.has_waiting:
+                return
+            self.counters["evicted_peers"] += 1
+            logger.warning("%s: station %s gives way, silent for %.0f s", self.url, name, now - station.heard)
+            station.lane.channel.ends_with_station = False
+            self._drop(name)
+            self._follow(self._places.give_way(name))
 
     def _drop(self, station: str) -> None:
         gone = self._stations.pop(station, None)
@@ -309,6 +336,7 @@ class FabricEndpoint(Endpoint):
         if not station.input.is_next(sysid, envelope):
             channel.counters["repeated_samples"] += 1
             return
+        station.heard = now
         channel.counters["lost_samples"] = station.input.lost
         station.input.hear(sysid)
         age = station.input.age(envelope, now)
@@ -367,10 +395,9 @@ class FabricEndpoint(Endpoint):
     def _act_by_time(self) -> None:
         now = self._clock.monotonic()
         self._claim()
-        self._reported &= self.claims.refused.keys()
-        self._reported |= {
-            sysid for sysid in self.claims.refused if sysid in self._reported or self._systems.refused_id(sysid)
-        }
+        self._make_room(now)
+        self._reported &= self.claims.taken
+        self._reported |= {sysid for sysid in self.claims.taken - self._reported if self._systems.refused_id(sysid)}
         for station in tuple(self._stations):
             self._ping_if_due(station, now)
         if now - self._stated >= STATE_EVERY and self._connection.is_up:

@@ -12,10 +12,11 @@ from anafi_mav.fabric.arrivals import Arrival, FabricSample, LinkChange, TokenCh
 from anafi_mav.fabric.connection import FabricConnection
 from anafi_mav.fabric.envelope import MAX_SAMPLE, FrameNumbers, Ping, Pong, UpEnvelope, micros, split_frames
 from anafi_mav.fabric.keys import KeyKind, station_id
+from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, reason
 from anafi_mav.mavlink.channel import Channel, total
 from anafi_mav.mavlink.endpoint import make_endpoint
-from anafi_mav.mavlink.frames import ReceivedFrame
+from anafi_mav.mavlink.frames import SIGNED, ReceivedFrame
 from anafi_mav.mavlink.router import targets
 from anafi_mav.mavlink.stall import StallWatch
 
@@ -64,9 +65,9 @@ class FabricGround:
         `on_systems` is called with the systems on the fabric whenever they change. Raises `ConfigError`.
         """
         self.counters: Counter[str] = Counter()
-        """unknown_keys, no_system (frames for systems that are not on the fabric), stale (frames that waited while the
-        host stalled, and are published with that age), lost_frames (from gateways to stations), and those of the
-        queues."""
+        """unknown_keys, refused_keys (of SETUP_SIGNING without a signature), no_system (frames for systems that are not
+        on the fabric), stale (frames that waited while the host stalled, and are published with that age), lost_frames
+        (from gateways to stations), and those of the queues."""
         self._clock = clock
         self._on_systems = on_systems
         self._url = fabric
@@ -171,6 +172,11 @@ class FabricGround:
             self.counters["stale"] += len(frames)
         by_system: defaultdict[int, list[bytes]] = defaultdict(list)
         for received in frames:
+            if received.id == dialect.MAVLINK_MSG_ID_SETUP_SIGNING and not received.raw[2] & SIGNED:
+                # A gateway takes it from signed links only. Everybody who may read them on the network has the key.
+                self.counters["refused_keys"] += 1
+                logger.warning("%s: key of SETUP_SIGNING not published: use anafi-mav keygen", channel.name)
+                continue
             target = targets(received.message)[0]
             systems = self.sysids if target == 0 else [target] if self._holders.get(target) else []
             if not systems:

@@ -19,6 +19,11 @@ class StationPlaces:
         """Return True for a station that is served or waits."""
         return station in self._served or station in self._waiting
 
+    @property
+    def has_waiting(self) -> bool:
+        """True while a station waits for a place."""
+        return bool(self._waiting)
+
     def arrive(self, station: str) -> bool:
         """Give a station a place; False when all are taken: it waits."""
         if len(self._served) < self._limit:
@@ -27,6 +32,13 @@ class StationPlaces:
         if len(self._waiting) < MAX_WAITING:
             self._waiting[station] = None
         return False
+
+    def give_way(self, station: str) -> str | None:
+        """Let a served station wait, behind those that do; return the one that gets its place."""
+        following = self.leave(station)
+        if following is not None:
+            self._waiting[station] = None
+        return following
 
     def leave(self, station: str) -> str | None:
         """Forget a station; return the one that gets its place, if there is one.

@@ -162,6 +162,25 @@ MESSAGE_IDS: dict[str, int] = {kind.msgname: id for id, kind in dialect.mavlink_
 """Message ids by name."""
 
 
+_OF_LINK = frozenset({dialect.MAVLINK_MSG_ID_REQUEST_DATA_STREAM, dialect.MAVLINK_MSG_ID_LOG_REQUEST_END})
+_COMMANDS_OF_LINK = frozenset({dialect.MAV_CMD_SET_MESSAGE_INTERVAL, dialect.MAV_CMD_CONTROL_HIGH_LATENCY})
+_FTP_OF_LINK = frozenset({dialect.MAV_FTP_OPCODE_TERMINATESESSION, dialect.MAV_FTP_OPCODE_RESETSESSION})
+
+
+def concerns_link(message: Any) -> bool:
+    """Return True for a permitted message of an observer that changes the state of its link.
+
+    Here each client has its own rates and sessions. A system behind another endpoint has one link to the gateway: its
+    rates and sessions are those of all clients.
+    """
+    id = message.get_msgId()
+    if id in COMMANDS:
+        return message.command in _COMMANDS_OF_LINK
+    if id == dialect.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL:
+        return bytes(message.payload)[_FTP_OPCODE] in _FTP_OF_LINK
+    return id in _OF_LINK or id == dialect.MAVLINK_MSG_ID_PARAM_SET
+
+
 class MessageFilter:
     """The message ids that pass."""
 

@@ -67,6 +67,8 @@ class Channel:
         """
         self.name = name
         """For people: the endpoint's URL and, where it has several peers, which one."""
+        self.endpoint = name.partition(" from ")[0]
+        """URL of the endpoint, which holds no space."""
         self.options = options
         """Those of its endpoint."""
         self.access = Access.of(options.access)
@@ -133,7 +135,8 @@ class Channel:
         dropped_frames (queue full, or sent after the channel had closed), refused_access (frames that need more than
         its access, also by name), refused_operator (of a station while another one is the operator, also by name),
         refused_forwards (from senders that the gateway does not sign for), refused_observer (what observers send to
-        all, or in the name of others), withheld_frames (the peer has not proved to be at its address).
+        all, in the name of others, or to change a link of others), filtered_frames (forwarded frames that `systems` or
+        a message filter keeps off), withheld_frames (the peer has not proved to be at its address).
         """
         if self.sent_frames:
             self._counters["sent_frames"] = self.sent_frames

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
@@ -20,13 +20,13 @@ from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.endpoint_options import EndpointConfig
 from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.access import STOPPING, Access, needed_access
+from anafi_mav.mavlink.access import STOPPING, Access, concerns_link, needed_access
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, reason
 from anafi_mav.mavlink.channel import Channel, total
 from anafi_mav.mavlink.endpoint import EndpointFactory, make_endpoint, parse_endpoint
 from anafi_mav.mavlink.frames import Packed, ReceivedFrame, pack
 from anafi_mav.mavlink.key_ring import KeyRing
-from anafi_mav.mavlink.router import Route, Router, targets
+from anafi_mav.mavlink.router import Route, Router, has_target, targets
 from anafi_mav.mavlink.signing import Signing
 from anafi_mav.mavlink.stall import StallWatch
 
@@ -64,6 +64,10 @@ class FrameTap(Protocol):
     def sent(self, packed: Packed, sysid: int, compid: int) -> None: ...
 
     def received(self, frame: ReceivedFrame) -> None: ...
+
+
+def _is_stations_heartbeat(message: Any) -> bool:
+    return isinstance(message, dialect.MAVLink_heartbeat_message) and message.type == dialect.MAV_TYPE_GCS
 
 
 def _log_change(change: str, channel: Channel) -> None:
@@ -108,7 +112,10 @@ class Node:
         self._factories = factories or {}
         self._heartbeats: dict[tuple[int, int], Packed] = {}
         """The newest of each of our components; without those of autopilots, which depend on the flavour."""
-        self._closed_counters: Counter[str] = Counter()
+        self._stale = 0
+        """Messages of the time of a stall."""
+        self._closed: defaultdict[str, Counter[str]] = defaultdict(Counter)
+        """What was counted by closed channels, by the URL of their endpoint."""
         self._stalls: StallWatch | None = None
 
     async def start(self, entries: Sequence[str | EndpointConfig]) -> None:
@@ -225,9 +232,17 @@ class Node:
         """Return how late the event loop ran its timers within the last minute, s."""
         return [] if self._stalls is None else list(self._stalls.delays)
 
+    def closed_counters(self, url: str) -> Counter[str]:
+        """Return what the closed channels of an endpoint have counted."""
+        return self._closed[url]
+
     def counters(self) -> Counter[str]:
         """Everything counted since the start: by channels, endpoints and the router."""
-        result = self._closed_counters + total(self.channels) + self._router.counters
+        result = total(self.channels) + self._router.counters
+        for counters in self._closed.values():
+            result.update(counters)
+        if self._stale:
+            result["stale"] = self._stale
         for endpoint in self.endpoints:
             result.update(endpoint.counters)
         return result
@@ -249,7 +264,7 @@ class Node:
         _log_change("closed", channel)
         self._router.remove(channel)
         self.channels = [other for other in self.channels if other is not channel]
-        self._closed_counters.update(total([channel]))
+        self._closed[channel.endpoint].update(total([channel]))
         if self.on_channel is not None:
             self._guarded(self.on_channel, channel, False)
 
@@ -269,14 +284,14 @@ class Node:
             if self.tap is not None:
                 self._guarded(self.tap.received, received)
             permitted = channel.access is Access.ALL or self._permits(channel, received)
-            may_forward = permitted and (channel.access is not Access.OBSERVE or self._is_harmless(channel, received))
+            may_forward = permitted and self._may_forward(channel, received)
             route = self._router.route(channel, received, now, reached, may_forward=may_forward)
             if route.forward:
                 self._forward(channel, received, route)
             if not route.hosts or not self._delivers:
                 continue
             if old:
-                self._closed_counters["stale"] += 1
+                self._stale += 1
                 if received.id not in STOPPING:
                     continue
             if received.id == dialect.MAVLINK_MSG_ID_SETUP_SIGNING:
@@ -307,21 +322,40 @@ class Node:
         channel.counters[f"refused_access.{name}"] += 1
         return False
 
-    def _is_harmless(self, channel: Channel, received: ReceivedFrame) -> bool:
-        """Return True if a permitted frame of an observer deceives no other client.
+    def _may_forward(self, channel: Channel, received: ReceivedFrame) -> bool:
+        """Return True if a permitted frame may reach other channels; otherwise it is counted."""
+        if not self._stays_within(channel, received):
+            channel.counters["filtered_frames"] += 1
+            return False
+        if channel.access is Access.OBSERVE and not self._is_harmless(channel, received):
+            channel.counters["refused_observer"] += 1
+            return False
+        return True
 
-        It is a station's heartbeat or for one system, and not in the name of a system of ours, or of one behind a
-        channel with more access.
+    def _stays_within(self, channel: Channel, received: ReceivedFrame) -> bool:
+        """Return True if a frame reaches none but the systems of its channel's option `systems`.
+
+        The router decides about frames for one system. To all go a station's heartbeat, and what these systems send
+        to no target: a command to system 0 would be one to the systems behind other endpoints.
+        """
+        message = received.message
+        if channel.system_ids is None or targets(message)[0] != 0 or _is_stations_heartbeat(message):
+            return True
+        return received.sysid in channel.system_ids and not has_target(message)
+
+    def _is_harmless(self, channel: Channel, received: ReceivedFrame) -> bool:
+        """Return True if a permitted frame of an observer neither deceives nor disturbs others.
+
+        It is a station's heartbeat, or reads from one system. It is not in the name of a system of ours, or of one
+        behind a channel with more access.
         """
         named = self._router.is_ours(received.sysid) or any(
             other.access > channel.access for other in self._router.heard_on(received.sysid)
         )
         message = received.message
-        is_station = isinstance(message, dialect.MAVLink_heartbeat_message) and message.type == dialect.MAV_TYPE_GCS
-        if not named and (is_station or targets(message)[0] != 0):
-            return True
-        channel.counters["refused_observer"] += 1
-        return False
+        return not named and (
+            _is_stations_heartbeat(message) or (targets(message)[0] != 0 and not concerns_link(message))
+        )
 
     def _stalled(self, seconds: float) -> None:
         logger.warning(

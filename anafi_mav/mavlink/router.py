@@ -184,6 +184,11 @@ class Router(Generic[KeyT, HostT]):
         return False
 
 
+def has_target(message: object) -> bool:
+    """Return True for a message with a field for its target, whatever that says."""
+    return hasattr(message, "target_system") or isinstance(message, dialect.MAVLink_manual_control_message)
+
+
 def targets(message: object) -> tuple[int, int]:
     """Return target system and component of a message; 0 means all.
 

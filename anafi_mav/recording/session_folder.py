@@ -145,6 +145,8 @@ class SessionFolder:
             with contextlib.suppress(OSError):
                 file.close()
         self._parts.clear()
+        with contextlib.suppress(OSError):  # not empty
+            self.path.rmdir()  # of a start that failed: a service may try again every second
 
     def _write(self, batch: dict[str, bytes]) -> None:
         for name, data in batch.items():

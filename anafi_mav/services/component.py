@@ -303,6 +303,17 @@ class Component:
             _count_refusal(inbound)
         return reason
 
+    def change_objection(self, inbound: Inbound) -> OperatorText | None:
+        """Return the reason for which a change that takes effect now is refused, and count it.
+
+        None: it may be made.
+        """
+        reason = self.vehicle.operators.objection(inbound.sysid, Need.COMMAND)
+        if reason is not None:
+            _count_refusal(inbound)
+            self.drop_input(client_of(inbound), InputStream.CHANGE, reason)
+        return reason
+
     def _refuse(self, inbound: Inbound, reason: OperatorText) -> None:
         """Answer and count a message of a station without the role that it needs; it has no effect."""
         _count_refusal(inbound)

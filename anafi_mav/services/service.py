@@ -114,6 +114,12 @@ class Host(Protocol):
         None: it may be flown. It is refused while another station is the operator of the aircraft.
         """
 
+    def change_objection(self, inbound: Inbound) -> OperatorText | None:
+        """Return the reason for which a change that takes effect now is refused, and count it.
+
+        None: it may be made. Another station may have become the operator since the change began.
+        """
+
     def use_input(self, client: Hashable, stream: InputStream) -> None:
         """Note that an input of a stream is flown: what was reported of earlier ones is over."""
 

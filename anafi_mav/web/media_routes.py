@@ -33,6 +33,9 @@ log = logging.getLogger("anafi_mav.web")
 BROWSER_HEADERS = ("Origin", "Sec-Fetch-Site", "Sec-Fetch-Mode")
 """A browser adds one of these to each request that a page can make it send (Fetch standard, Fetch Metadata)."""
 
+PROXY_HEADERS = ("Forwarded", "Via", "X-Forwarded-For", "X-Real-IP")
+"""A reverse proxy on this computer adds one of these, where it is set up to name its clients (RFC 7239, RFC 9110)."""
+
 Answer = Callable[[web.Request, Drone], Awaitable[web.StreamResponse]]
 """Answers a request for the media of a drone."""
 
@@ -137,7 +140,8 @@ class MediaRoutes:
     async def _delete(self, request: web.Request, drone: Drone) -> web.Response:
         if any(name in request.headers for name in BROWSER_HEADERS):
             return _refuse(403, "a browser may not delete; use `anafi-mav media delete`")
-        if request.remote is None or not is_loopback(request.remote):
+        is_forwarded = any(name in request.headers for name in PROXY_HEADERS)
+        if request.remote is None or not is_loopback(request.remote) or is_forwarded:
             return _refuse(403, "files are deleted for programs of the gateway's computer only")
         resource = await _resource(request, drone)
         cameras = drone.camera.state

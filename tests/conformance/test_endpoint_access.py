@@ -9,7 +9,8 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.mav import Client
 from support.params import write
-from support.world import OPTIONS_PORT, World, world
+from support.plans import RALLY, begin_download, rally, upload
+from support.world import HOME, OPTIONS_PORT, World, world
 
 from anafi_mav.mavlink import dialect as own
 from anafi_mav.mavlink.frames import unpack
@@ -96,6 +97,16 @@ async def test_refused_request_of_an_observer_is_answered() -> None:
         observer.send(dialect.MAVLink_param_request_read_message(1, 1, b"ANF_RTH_ALT", -1))
         await observer.wait("PARAM_VALUE", since=mark)
         assert (await pilot.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == ACCEPTED
+
+
+async def test_download_of_an_observer_does_not_keep_a_pilot_from_an_upload() -> None:
+    points = [rally(HOME[:2], 20.0), rally((HOME[0] + 0.001, HOME[1]), 25.0)]
+    async with world(options=["access=observe"]) as w:
+        observer = await w.connect(250, port=OPTIONS_PORT)
+        for _ in range(2):
+            assert (await upload(w.client, points, RALLY)).type == dialect.MAV_MISSION_ACCEPTED
+            await begin_download(observer, RALLY)
+            assert (await upload(w.client, points[:1], RALLY)).type == dialect.MAV_MISSION_ACCEPTED
 
 
 async def test_acknowledgement_of_an_observer_draws_no_text() -> None:

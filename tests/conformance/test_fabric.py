@@ -30,6 +30,7 @@ from support.setpoints import VELOCITY_ONLY, engage, local, streaming
 from support.world import HOME, World, loopback, world
 
 from anafi_mav.clock import SystemClock
+from anafi_mav.fabric import claims, endpoint
 from anafi_mav.fabric.envelope import UpEnvelope
 from anafi_mav.fabric.ground import FabricGround
 from anafi_mav.mavlink import dialect as own
@@ -198,7 +199,9 @@ async def test_system_id_of_another_gateway_is_left_to_it(tmp_path: Path, monkey
         output, _ = await check.communicate()
         assert check.returncode == 1
         assert "system 1 is held by gateway" in output.decode()
-        # The first goes on, and no sooner than it ends does the second hold the id.
+        # The first goes on, and no sooner than it has ended for a while does the second hold the id.
+        monkeypatch.setattr(claims, "FREE_FOR", 1.0)
+        monkeypatch.setattr(claims, "SPREAD", 0.0)
         monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))  # one gateway uses one state folder
         async with world(endpoints=(node.url,)) as other:
             await other.client.wait("STATUSTEXT", lambda m: m.text.startswith("System id 1: another"), since=0)
@@ -207,6 +210,45 @@ async def test_system_id_of_another_gateway_is_left_to_it(tmp_path: Path, monkey
             mark = station.mark()
             await station.heartbeat(lambda beat: True, since=mark, timeout=10.0)
             assert "1 station" in "".join(other.gateway.lines())
+
+
+async def test_lost_link_of_a_gateway_gives_its_system_id_to_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a restarted router: the gateway is back within seconds, and another one waits for its id."""
+    async with router() as node:
+        relay = StallingRelay(node.port)
+        port = await relay.start()
+        try:
+            async with world(endpoints=(f"zenoh://127.0.0.1:{port}",)) as w, ground(node.url) as stations:
+                station = w.take(await FabricStation().join(stations))
+                monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))  # one gateway uses one state folder
+                async with world(endpoints=(node.url,)) as other:
+                    await other.client.wait("STATUSTEXT", lambda m: m.text.startswith("System id 1: another"), since=0)
+                    await relay.close()
+                    await station.silence("HEARTBEAT", 2.0)
+                    relay = StallingRelay(node.port)
+                    await relay.start(port)
+                    await station.heartbeat(lambda beat: True, since=station.mark(), timeout=20.0)
+                    assert "system 1 is another gateway's" in "".join(other.gateway.lines())
+                    assert "another gateway" not in "".join(w.gateway.lines())
+        finally:
+            await relay.close()
+
+
+async def test_silent_station_gives_its_place_to_one_that_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(endpoint, "REPLACEABLE", 2.0)  # a station sends once a second
+    async with (
+        router() as node,
+        world(endpoints=(f"{node.url}?max_clients=1",)) as w,
+        ground(node.url) as first,
+        ground(node.url) as second,
+    ):
+        idle = await FabricStation().join(first)
+        await idle.close()  # its place at the ground process remains
+        pilot = w.take(await FabricStation().join(second))
+        await accepted(pilot, dialect.MAV_CMD_REQUEST_MESSAGE, 148)
+        assert counted(w, "refused_peers") == counted(w, "evicted_peers") == 1
 
 
 async def test_killed_gateway_that_returns_is_found_by_its_stations(tmp_path: Path) -> None:
@@ -326,6 +368,22 @@ async def test_oversized_samples_are_counted_and_disturb_no_station() -> None:
                 await asyncio.to_thread(samples.recv)
             assert counted(w, "late_commands") == 1  # no ping was answered
             token.undeclare()
+
+
+async def test_key_that_a_station_sends_is_not_published() -> None:
+    """Gateways take it from signed links only; on the network it could be read."""
+    key = bytes(range(32))
+    async with flown() as (w, node):
+        with await asyncio.to_thread(opened, node) as session:
+            samples = session.declare_subscriber("anafi/1/up/**")
+            await asyncio.to_thread(samples.recv)
+            w.client.send(dialect.MAVLink_setup_signing_message(1, 1, key, 1))
+            w.client.send(dialect.MAVLink_setup_signing_message(0, 0, key, 1))
+            w.client.send(dialect.MAVLink_statustext_message(6, b"after the key"))
+            contents = [b""]
+            while b"after the key" not in contents[-1]:
+                contents.append((await asyncio.to_thread(samples.recv)).payload.to_bytes())
+        assert not [content for content in contents if key in content]
 
 
 async def test_flood_of_queries_leaves_room_for_the_next_one() -> None:

@@ -13,15 +13,19 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.fault_scenarios import ACCEPTED, DENIED, FAILED, watched
 from support.flavours import both
+from support.ftp import ACK, NAK, TERMINATE, Ftp
 from support.gimbal import LEVEL, NAN, PITCHYAW, looks
 from support.mav import Client
 from support.params import write
+from support.plans import RALLY, begin_download, rally, upload
 from support.setpoints import COPTER_GUIDED, VELOCITY_ONLY, engage, local, motion, said, streaming, texts
-from support.world import HOLD, OPTIONS_PORT, World, world
+from support.world import HOLD, HOME, OPTIONS_PORT, World, world
 
 from anafi_mav.mavlink import dialect as own
 from anafi_mav.mavlink.frames import unpack
 from anafi_mav.services.command.operator_need import GIMBAL_COMMANDS, GIMBAL_MESSAGES
+from anafi_mav.services.plan.plan_files import PATHS, pack_plan
+from anafi_mav.vehicle.fence.plan_items import PlanItem
 from anafi_mav.vehicle.operator_control import SILENT
 
 REQUEST_CONTROL = own.MAV_CMD_REQUEST_OPERATOR_CONTROL
@@ -38,6 +42,10 @@ REFUSED = "operator is system 255"
 STICK = dialect.MAVLink_manual_control_message(1, 700, 0, 500, 0, 0)
 CENTRED = dialect.MAVLink_manual_control_message(1, 0, 0, 500, 0, 0)
 NORTH = local(VELOCITY_ONLY, v=(2.0, 0.0, 0.0))
+POINT = PlanItem(
+    dialect.MAV_CMD_NAV_RALLY_POINT, 3, (0.0, 0.0, 0.0, 0.0), round(HOME[0] * 1e7), round(HOME[1] * 1e7), 20.0
+)
+CREATE, WRITE = 6, 7
 
 
 def now() -> float:
@@ -259,6 +267,33 @@ async def test_other_station_moves_nothing_by_any_message() -> None:
         assert {beat.custom_mode for beat in vehicle} == {HOLD}
         assert await sent(outsider, control_request(outsider)) == UNSUPPORTED
         assert await shown(teacher) == (MANAGER, TEACHER, [])
+
+
+async def test_file_of_a_plan_that_others_have_begun_to_write_changes_nothing() -> None:
+    """Its last request ends a session, which every client may."""
+    async with world(options=[ON], flavour="ardupilot") as w:
+        (teacher,) = await stations(w, OPTIONS_PORT, ids=(TEACHER,))
+        outsider = await w.connect(250)
+        ftp, content = Ftp(outsider), pack_plan([POINT], RALLY)
+        assert (await ftp.ask(CREATE, PATHS[RALLY].encode())).opcode == ACK
+        assert (await ftp.ask(WRITE, content)).opcode == ACK
+        assert await sent(teacher, control_request(teacher)) == ACCEPTED
+        assert (await ftp.ask(TERMINATE)).opcode == NAK
+        await said(outsider, "Message refused: operator is system 255", 0)
+        (memory,) = [system.memory for system in w.gateway.systems]
+        assert not memory.plans.get(RALLY)
+        assert w.gateway.counters()["refused_operator.FILE_TRANSFER_PROTOCOL"] == 1
+
+
+async def test_download_of_another_station_does_not_keep_the_operator_from_an_upload() -> None:
+    async with world(options=[ON]) as w:
+        (teacher,) = await stations(w, OPTIONS_PORT, ids=(TEACHER,))
+        outsider = await w.connect(250)
+        points = [rally(HOME[:2], 20.0), rally((HOME[0] + 0.001, HOME[1]), 25.0)]
+        assert (await upload(teacher, points, RALLY)).type == dialect.MAV_MISSION_ACCEPTED
+        assert await sent(teacher, control_request(teacher)) == ACCEPTED
+        await begin_download(outsider, RALLY)
+        assert (await upload(teacher, points, RALLY)).type == dialect.MAV_MISSION_ACCEPTED
 
 
 @both

@@ -14,11 +14,12 @@ from prometheus_client.parser import text_string_to_metric_families
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.fault_scenarios import ACCEPTED, DENIED, goto
 from support.statuses import NASTY, STATUS
-from support.world import World, world
+from support.world import OPTIONS_PORT, World, world
 
 from anafi_mav.cli import status as command
 from anafi_mav.errors import ConfigError
 from anafi_mav.status_record import VERSION, GatewayStatus
+from anafi_mav.web.status_routes import MAX_AGE
 
 
 def url(w: World, path: str) -> str:
@@ -61,6 +62,19 @@ async def test_status_of_a_flight_has_drone_client_and_refusal() -> None:
             assert answer.headers["Content-Type"] == "text/plain; version=0.0.4; charset=utf-8"
             families = {one.name: one for one in text_string_to_metric_families(await answer.text())}
         assert families["anafi_mav_drone_in_air"].samples[0].value == 1.0
+
+
+async def test_refusals_of_a_client_that_has_left_stay_in_the_status() -> None:
+    async with world(options=["access=observe"]) as w:
+        observer = await w.connect(250, port=OPTIONS_PORT)
+        assert (await observer.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == DENIED
+        await observer.close()
+        await w.client.wait("SYSTEM_TIME", since=w.client.mark())  # the gateway has seen the end, too
+        await asyncio.sleep(MAX_AGE + 0.1)
+        status = await fetched(w)
+        assert status.endpoints[1].clients == ()
+        assert status.endpoints[1].refused == {"message beyond the access of the endpoint": 1}
+        assert status.counters["refused_access"] == 1
 
 
 async def test_status_command_finds_the_gateway_by_its_state_folder() -> None:

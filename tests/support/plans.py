@@ -141,6 +141,14 @@ async def count(client: Client, kind: int, timeout: float = 5.0) -> Any:
     return await client.wait("MISSION_COUNT", lambda m: m.mission_type == kind, since=mark, timeout=timeout)
 
 
+async def begin_download(client: Client, kind: int) -> None:
+    """Request a list and its first item, and no other."""
+    assert (await count(client, kind)).count > 1
+    mark = client.mark()
+    client.send(dialect.MAVLink_mission_request_int_message(1, 1, 0, kind))
+    await client.wait("MISSION_ITEM_INT", lambda m: m.mission_type == kind, since=mark)
+
+
 async def download(
     client: Client, kind: int, *, tries: int = 1, patience: float = 5.0, as_float: bool = False
 ) -> list[Any]:

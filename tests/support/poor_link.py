@@ -105,9 +105,9 @@ class StallingRelay:
         self._tasks: set[asyncio.Task[None]] = set()
         self._server: asyncio.Server | None = None
 
-    async def start(self) -> int:
-        """Listen; return the port."""
-        self._server = await asyncio.start_server(self._connected, "127.0.0.1", 0)
+    async def start(self, at: int = 0) -> int:
+        """Listen, at any free port or at this one; return the port."""
+        self._server = await asyncio.start_server(self._connected, "127.0.0.1", at)
         if self._stall_every is not None:
             self._run(self._stall_again(self._stall_every))
         port: int = self._server.sockets[0].getsockname()[1]

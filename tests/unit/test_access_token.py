@@ -94,6 +94,15 @@ def test_token_is_kept_for_its_owner_alone(tmp_path: Path) -> None:
     assert load_token(tmp_path).text != made.text
 
 
+def test_token_that_others_could_read_is_replaced(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    seen = load_token(tmp_path).text
+    (tmp_path / FILE).chmod(0o640)
+    assert load_token(tmp_path).text != seen
+    assert stat.S_IMODE((tmp_path / FILE).stat().st_mode) == 0o600
+    assert "other users could read it" in caplog.text
+    assert seen not in caplog.text
+
+
 async def test_gateway_open_to_the_network_needs_the_token_it_keeps(tmp_path: Path) -> None:
     host = loopback()
     config = Config(

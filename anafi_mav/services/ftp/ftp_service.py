@@ -225,7 +225,9 @@ class _ClientFiles:
 
     def write(self, path: str, content: bytes) -> bool:
         file = self._writable(path)
-        return file is not None and file.write is not None and file.write(self._inbound, content)
+        if file is None or file.write is None or self._host.change_objection(self._inbound) is not None:
+            return False
+        return file.write(self._inbound, content)
 
     def refused(self, refusal: FileRefused) -> None:
         if refusal.text is not None:

@@ -15,6 +15,7 @@ from functools import partial
 from anafi_mav import texts, units
 from anafi_mav.clock import Alarm
 from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.access import Access
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.plans.formats.parrot import Version
@@ -32,6 +33,7 @@ from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, PlanFault, PlanItem
 from anafi_mav.vehicle.fence.rally import Return
+from anafi_mav.vehicle.operator_control import Need
 
 logger = logging.getLogger(__name__)
 
@@ -45,7 +47,7 @@ _CHANGES = (
 """Messages that begin a change of a list."""
 
 
-class _ChannelPeer(Peer, frozen=True):
+class _ChannelPeer(Peer, frozen=True, kw_only=True):
     """A client and the way to it."""
 
     channel: Channel
@@ -120,8 +122,15 @@ class PlanService(Service):
         return True
 
     def _peer(self, inbound: Inbound) -> _ChannelPeer:
+        operators = self.host.vehicle.operators
+        is_refused = operators.objection(inbound.sysid, Need.COMMAND) is not None
         return _ChannelPeer(
-            client_of(inbound), inbound.sysid, inbound.compid, flavour_of(inbound.channel), inbound.channel
+            client_of(inbound),
+            inbound.sysid,
+            inbound.compid,
+            flavour_of(inbound.channel),
+            channel=inbound.channel,
+            may_change=inbound.channel.access is not Access.OBSERVE and not is_refused,
         )
 
     def link_up(self) -> None:

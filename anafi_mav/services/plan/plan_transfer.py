@@ -80,6 +80,8 @@ class Peer(msgspec.Struct, frozen=True):
     sysid: int
     compid: int
     flavour: Flavour
+    may_change: bool = True
+    """False for a client that only reads plans: its downloads keep no other client away."""
 
 
 class Reply(msgspec.Struct, frozen=True):
@@ -182,6 +184,8 @@ class _Upload:
 class _Download:
     items: Sequence[PlanItem]
     asked: float
+    keeps_away: bool
+    """False for a client that may not change plans: it must not keep those who may from doing so."""
     left: set[int] = field(default_factory=set)
     """Items that were not asked for yet."""
 
@@ -191,7 +195,7 @@ class _Download:
 
         A client that requests only the count blocks no other client.
         """
-        return 0 < len(self.left) < len(self.items)
+        return self.keeps_away and 0 < len(self.left) < len(self.items)
 
 
 @dataclass
@@ -424,7 +428,7 @@ class PlanTransfer:
         if items:
             while len(self._downloads) >= MAX_DOWNLOADS:
                 del self._downloads[next(iter(self._downloads))]
-            self._downloads[peer.client] = _Download(items, now, set(range(len(items))))
+            self._downloads[peer.client] = _Download(items, now, peer.may_change, set(range(len(items))))
         return [
             Reply(
                 dialect.MAVLink_mission_count_message(

@@ -13,6 +13,7 @@ from support.product import product
 from support.world import loopback, world
 
 from anafi_mav.config import Config, DroneConfig
+from anafi_mav.disk_writer import HANGS
 from anafi_mav.gateway import Gateway
 from anafi_mav.state_lock import STATE_WRITER, read_holder, state_folder
 
@@ -58,3 +59,4 @@ async def test_state_folder_on_a_hanging_disk_stays_locked_behind_the_end(tmp_pa
     with hanging(STATE_WRITER):
         await gateway.close()
         assert read_holder(tmp_path) is not None
+        assert gateway.state_problems() == [f"{tmp_path}: {HANGS}"]

@@ -89,6 +89,44 @@ def test_check_writes_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert files(tmp_path) == before
 
 
+def test_check_shows_the_warnings_of_a_start(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = configuration(tmp_path, 0, "http: {host: 0.0.0.0, port: 0}")
+    status, out = check(path, capsys, "--endpoint", "udpin://0.0.0.0:0")
+    assert status == 0
+    assert "configuration: ok: warning: http.host: 0.0.0.0 is open to the network without TLS" in out
+    assert "warning: endpoints[0]: udpin://0.0.0.0:0 is open to the network without signing" in out
+
+
+@pytest.mark.parametrize(
+    ("folder", "wrong"),
+    [
+        ("FOLDER/fleet.yaml/x", "media.download_folder: WRONG: FOLDER/fleet.yaml/x: Not a directory"),
+        ("~nobody-of-this-name/x", "media.download_folder: WRONG: expected the path of a folder: "),
+        ("FOLDER/photos", "media.download_folder: ok: folder can be written: FOLDER/photos"),
+    ],
+)
+def test_check_looks_at_the_folder_for_media(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], folder: str, wrong: str
+) -> None:
+    more = f"http: {{port: 0}}\n        media: {{download_folder: {folder.replace('FOLDER', str(tmp_path))}}}"
+    status, out = check(configuration(tmp_path, 0, more), capsys)
+    assert wrong.replace("FOLDER", str(tmp_path)) in out
+    assert status == ("WRONG" in wrong)
+
+
+def test_check_names_a_log_of_the_simulator_that_cannot_be_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "fleet.yaml"
+    drone = f"{{name: alpha, sysid: 1, sim: {{address: {loopback()}}}}}"
+    path.write_text(
+        f"state: {tmp_path}/state\nendpoints: ['tcpin://127.0.0.1:0']\nhttp: off\nvideo: off\ndrones: [{drone}]"
+    )
+    status, out = check(str(path), capsys, "--sim-log", str(tmp_path))
+    assert status == 1
+    assert f"--sim-log: expected a file that can be written, got {tmp_path}: Is a directory" in out
+
+
 @pytest.mark.parametrize(
     ("more", "state", "log_file", "wrong"),
     [

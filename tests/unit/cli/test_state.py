@@ -15,6 +15,7 @@ from support.mav import Client
 from support.product import product, program
 from support.world import loopback
 
+from anafi_mav.mavlink.key_ring import write_key
 from anafi_mav.state_lock import read_holder, state_folder
 
 MISSIONS = Path(__file__).parents[3] / "missions"
@@ -93,6 +94,24 @@ async def test_full_disk_is_reported_to_each_client_that_uploads(tmp_path: Path)
             assert await upload.end() == 0, upload
         p.process.send_signal(signal.SIGTERM)
         assert await p.end() == 0
+
+
+async def test_timestamps_that_are_not_kept_at_the_end_set_the_exit_status(tmp_path: Path) -> None:
+    """A file in the place of the folder of keys, put there after they were saved last, stands for a full disk."""
+    address, keys = loopback(), tmp_path / "state" / "keys"
+    write_key(keys, "field", bytes(range(40)))
+    config = f"""
+        state: {tmp_path / "state"}
+        endpoints: ["tcpin://{address}:5760?signing=field"]
+        drones: [{{name: alpha, sysid: 1, sim: {{address: {loopback()}}}}}]
+    """
+    async with product(tmp_path, config) as p:
+        keys.rename(tmp_path / "away")
+        keys.write_text("a file in its place")
+        p.process.send_signal(signal.SIGTERM)
+        assert await p.end() == 1
+        (line,) = (line for line in p.complaints if line.startswith("anafi-mav: not kept: "))
+        assert line == "anafi-mav: not kept: key field: File exists; old frames may be accepted after a restart"
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")

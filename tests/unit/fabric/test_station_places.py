@@ -28,3 +28,14 @@ def test_waiting_stations_are_bounded() -> None:
         places.arrive(str(number))
     assert places.is_known(str(MAX_WAITING - 1))
     assert not places.is_known(str(MAX_WAITING))
+
+
+def test_station_that_gives_way_waits_behind_the_others() -> None:
+    places = StationPlaces(1)
+    for name in ("a", "b", "c"):
+        places.arrive(name)
+    assert places.has_waiting
+    assert places.give_way("a") == "b"
+    assert places.is_known("a")
+    assert [places.leave(name) for name in ("b", "c", "a")] == ["c", "a", None]
+    assert not places.has_waiting

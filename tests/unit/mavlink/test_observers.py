@@ -5,46 +5,21 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from support.node_party import DRONE, FOREIGN, OURS, STATION, Party
 
-from anafi_mav.endpoint_options import EndpointOptions
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.channel import Channel
-from anafi_mav.mavlink.frames import Parser, frame, pack
-from anafi_mav.mavlink.node import Node
 
-OURS, FOREIGN = 1, 5
-DRONE = dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_QUADROTOR, 12, 128, 0, 4, 3)
-STATION = dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3)
 LIE = dialect.MAVLink_statustext_message(dialect.MAV_SEVERITY_CRITICAL, b"Battery critical: land now")
 LAND = dialect.MAVLink_command_long_message(FOREIGN, 1, dialect.MAV_CMD_NAV_LAND, 0, 0, 0, 0, 0, 0, 0, 0)
 LIST = dialect.MAVLink_param_request_list_message(FOREIGN, 1)
 
 
-class Party:
-    """A node with an observer, a pilot and the channel of a foreign drone."""
+def command(id: int) -> Any:
+    return dialect.MAVLink_command_long_message(FOREIGN, 1, id, 0, dialect.MAVLINK_MSG_ID_ATTITUDE, -1, 0, 0, 0, 0, 0)
 
-    def __init__(self) -> None:
-        self.node = Node()
-        self.node.add_host(OURS, 1, lambda inbound: None)
-        self.written: dict[str, list[bytes]] = {"observer": [], "pilot": [], "drone": []}
-        self.channels = {
-            name: Channel(
-                name, written.append, options=EndpointOptions(access="observe" if name == "observer" else "all")
-            )
-            for name, written in self.written.items()
-        }
-        for channel in self.channels.values():
-            self.node.opened(channel)
 
-    def send(self, name: str, message: Any, source: tuple[int, int], seq: int = 0) -> None:
-        channel = self.channels[name]
-        self.node.received(channel, channel.receive(frame(pack(message), seq, *source)))
-
-    def got(self, name: str) -> list[tuple[str, int, int]]:
-        """Kind, system and component of what a client has been sent since the last call."""
-        data = b"".join(self.written[name])
-        self.written[name].clear()
-        return [(one.message.get_type(), one.sysid, one.compid) for one in Parser().receive(data)]
+def file_request(opcode: int) -> Any:
+    return dialect.MAVLink_file_transfer_protocol_message(0, FOREIGN, 1, bytes((0, 0, 0, opcode)).ljust(251, b"\0"))
 
 
 @pytest.mark.parametrize(
@@ -86,3 +61,34 @@ def test_observers_copy_does_not_stop_a_pilots_command() -> None:
     party.send("observer", LAND, (255, 190), seq=7)
     party.send("pilot", LAND, (255, 190), seq=7)
     assert party.got("drone") == [("COMMAND_LONG", 255, 190)]
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL),
+        command(dialect.MAV_CMD_CONTROL_HIGH_LATENCY),
+        dialect.MAVLink_request_data_stream_message(FOREIGN, 1, dialect.MAV_DATA_STREAM_ALL, 0, 0),
+        dialect.MAVLink_param_set_message(FOREIGN, 1, b"_HASH_CHECK", 0.0, dialect.MAV_PARAM_TYPE_UINT32),
+        dialect.MAVLink_log_request_end_message(FOREIGN, 1),
+        file_request(dialect.MAV_FTP_OPCODE_RESETSESSION),
+        file_request(dialect.MAV_FTP_OPCODE_TERMINATESESSION),
+    ],
+    ids=lambda message: message.get_type(),
+)
+def test_observer_changes_no_link_of_a_foreign_system(message: Any) -> None:
+    """That system has one link to the gateway: its rates and sessions are those of the pilot, too."""
+    party = Party()
+    party.send("drone", DRONE, (FOREIGN, 1))
+    party.send("observer", message, (200, 190))
+    assert party.got("drone") == []
+    party.send("pilot", message, (255, 190))
+    assert party.got("drone") == [(message.get_type(), 255, 190)]
+
+
+def test_observer_reads_messages_and_files_of_a_foreign_system() -> None:
+    party = Party()
+    party.send("drone", DRONE, (FOREIGN, 1))
+    party.send("observer", command(dialect.MAV_CMD_REQUEST_MESSAGE), (200, 190))
+    party.send("observer", file_request(dialect.MAV_FTP_OPCODE_LISTDIRECTORY), (200, 190), seq=1)
+    assert party.got("drone") == [("COMMAND_LONG", 200, 190), ("FILE_TRANSFER_PROTOCOL", 200, 190)]

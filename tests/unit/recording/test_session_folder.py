@@ -40,6 +40,13 @@ async def test_session_is_written_in_parts_of_bounded_size(tmp_path: Path) -> No
     assert session.counters["written_bytes"] == 3510
 
 
+async def test_session_without_a_byte_leaves_no_folder(tmp_path: Path) -> None:
+    session = await written(tmp_path)
+    assert session.path.parent == tmp_path
+    assert [*parts_of(tmp_path)] == []
+    assert not session.path.exists()
+
+
 def sizes(session: SessionFolder) -> dict[str, int]:
     """Bytes of each part of a session."""
     return {part.name: part.stat().st_size for part in parts_of(session.path.parent) if part.parent == session.path}

@@ -1,0 +1,17 @@
+"""`anafi-mav ground`: what it warns about before it opens anything."""
+
+from __future__ import annotations
+
+import pytest
+from support.fabric import free_port
+
+from anafi_mav.cli import main
+
+
+def test_endpoint_for_stations_beyond_loopback_warns_at_start(capsys: pytest.CaptureFixture[str]) -> None:
+    """192.0.2.1 is nobody's (RFC 5737): nothing is opened by this test."""
+    fabric = f"zenoh://127.0.0.1:{free_port()}"
+    assert main(["ground", "--zenoh", fabric, "--endpoint", "tcpin://192.0.2.1:5760"]) == 2
+    warning, error = capsys.readouterr().err.splitlines()
+    assert warning.startswith("anafi-mav: warning: --endpoint: tcpin://192.0.2.1:5760 is open to the network: ")
+    assert error.startswith("anafi-mav: --endpoint: cannot open tcpin://192.0.2.1:5760: ")
