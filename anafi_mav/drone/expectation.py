@@ -216,7 +216,7 @@ class Commander:
             raise CommandRejected("replaced by a newer command")
 
     def send(self, message: Message, *, stops: bool = False, is_setting: bool = False) -> int:
-        """Hand a command to the transport. A stop or a landing goes before settings that wait there.
+        """Hand a command to the transport; stops and landings go before settings there.
 
         Raises `LinkLost` when there is no link, or what the gate raises.
 
@@ -344,7 +344,10 @@ class Commander:
         stops: bool = False,
         is_setting: bool = False,
     ) -> T:
-        """Send a command and return what the judge makes of the answer. `stops` and `is_setting`: see `send`."""
+        """Send a command and return what the judge makes of the answer.
+
+        `stops` and `is_setting`: see `send`.
+        """
         expectation = self.expect(answers, judge)
         self.dispatch(expectation, command, timeout, stops=stops, is_setting=is_setting)
         return await expectation.wait()

@@ -467,7 +467,10 @@ MAX_CRUISE_SPEED = 15.0
 
 
 def _move_speed(value: float) -> float | None:
-    """Return the speed (m/s) of moves, None for the drone's own. Raises `Refused` for one at which none would end."""
+    """Return the speed (m/s) of moves, None for the drone's own.
+
+    Raises `Refused` for one at which no move would end.
+    """
     if 0.0 < value < SLOWEST:
         raise Refused(texts.SPEED, texts.SPEED_RANGE.fill(slowest=SLOWEST, fastest=MAX_CRUISE_SPEED))
     return value or None

@@ -356,9 +356,10 @@ class VelocityController:
         return _kept(math.atan(right / G), wish_right, full), pitch
 
     def _approach(self, demand: Demand, frame: float) -> tuple[float, float]:
-        """Velocity (north, east) towards the demanded position; `frame` is that of the velocities (rad from north).
+        """Return the velocity (north, east) towards the demanded position.
 
-        A velocity that leads away from the position is a mistake in one of them: the position holds.
+        `frame`: rad from north to the first axis of velocities. One that leads away from the position is a mistake in
+        one of the two, and the position holds.
         """
         along, across = _turned(self.motion.north, self.motion.east, -demand.turn)
         x = 0.0 if demand.x.position is None else demand.x.position - along
