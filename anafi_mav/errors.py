@@ -44,6 +44,17 @@ class HandshakeRefused(LinkLost):
         self.status = status
 
 
+class WrongAircraft(AnafiMavError):
+    """Another aircraft than the wanted one is at an address.
+
+    `serial` is its serial number, empty when it reports none.
+    """
+
+    def __init__(self, serial: str, wanted: str) -> None:
+        super().__init__(f"not connected: the aircraft has serial number {serial or 'unknown'}, expected {wanted}")
+        self.serial = serial
+
+
 class CommandTimeout(AnafiMavError, TimeoutError):
     """The drone did not confirm a command in time.
 

@@ -13,6 +13,7 @@ import asyncio
 import logging
 from collections import Counter
 from collections.abc import Awaitable, Callable
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 
@@ -27,7 +28,7 @@ from anafi_mav.disk_writer import HANGS
 from anafi_mav.drone import Drone, events
 from anafi_mav.drone.contention import Contention
 from anafi_mav.drone.rest import HTTP_PORT
-from anafi_mav.errors import AnafiMavError, ConfigError, HandshakeRefused
+from anafi_mav.errors import AnafiMavError, ConfigError, HandshakeRefused, WrongAircraft
 from anafi_mav.fabric.endpoint import FabricEndpoint
 from anafi_mav.fabric.sample_age import StopKind
 from anafi_mav.fabric.system_state import StatePosition, SystemState
@@ -74,6 +75,13 @@ logger = logging.getLogger(__name__)
 RETRY_FIRST, RETRY_LAST = 0.5, 2.0
 """s between attempts to connect: doubled from the first to the last, so that a drone that comes back is a system
 again within five seconds."""
+
+RETRY_WRONG = 10.0
+"""s until an address where another aircraft answered is tried again: behind a Skycontroller each attempt ends the
+connection of another program."""
+
+MAX_SERIAL = 18
+"""Characters of a serial number that fit the text; Parrot's have as many."""
 
 CANCEL_WAIT = 0.1
 """s until a task that has not ended is cancelled once more."""
@@ -171,9 +179,11 @@ class _Supervised:
                     logger.warning("%s: connected", self.config.name)
                 self.problem, pause = "", RETRY_FIRST
                 try:
-                    self.system.link_up()
-                    self._changed()
-                    self.first_attempt.set()
+                    memory_problem = await self.system.load_memory()
+                    if self.drone.connected:
+                        self.system.link_up(memory_problem)
+                        self._changed()
+                        self.first_attempt.set()
                     reason = await asyncio.shield(self.drone.lost)
                     logger.warning("%s: link lost: %s", self.config.name, reason)
                     self.problem = f"link lost: {reason}"
@@ -192,9 +202,12 @@ class _Supervised:
                     logger.warning("%s: %s", self.config.name, problem)
                     if isinstance(error, HandshakeRefused):
                         self.system.announce(Severity.WARNING, texts.CONNECTION_REFUSED.fill(status=error.status))
+                    elif isinstance(error, WrongAircraft):
+                        serial = error.serial[-MAX_SERIAL:] or "unknown"
+                        self.system.announce(Severity.CRITICAL, texts.WRONG_AIRCRAFT.fill(serial=serial))
                 self.problem = problem
                 self.first_attempt.set()
-                await self.drone.pause(pause)
+                await self.drone.pause(RETRY_WRONG if isinstance(error, WrongAircraft) else pause)
                 pause = min(2.0 * pause, RETRY_LAST)
             await self._contend()
 
@@ -344,12 +357,13 @@ class Gateway:
         Raises `ConfigError`; nothing is then left open or locked.
 
         `start` does it where this has not. It is a step of its own for the command line, which starts a simulator
-        only
-        when all endpoints are open.
+        only when all endpoints are open.
         """
         if self._node.endpoints:
             return
         self._downloads = download_folder(self.config.media)
+        # Lock, keys and token are read and written in the event loop: no drone is connected yet that could wait, and
+        # nothing may begin before the folder is this gateway's. Later on all files are the threads' of `disk_writer`.
         self._lock_state()
         try:
             self._recorder = self._start_recording()
@@ -421,9 +435,11 @@ class Gateway:
             self._lock = None
 
     def _write_lock(self) -> None:
+        """Have the thread of files write the drones into the lock file: some may be in the air."""
         if self._lock is not None:
             web = "" if self.web is None else self.web.describe()
-            self._lock.write([supervised.held() for supervised in self._supervised], web)
+            drones = [supervised.held() for supervised in self._supervised]
+            STATE_WRITER.post(partial(self._lock.write, drones, web))
 
     def state_problems(self) -> list[str]:
         """Return a line for each problem with reading or storing state; empty without problems."""
@@ -456,6 +472,7 @@ class Gateway:
                 rtsp_port=RTSP_PORT if config.rtsp_port is None else config.rtsp_port,
                 interface=config.interface,
                 name=config.name,
+                serial=config.serial,
             )
             allow_kill = self.config.allow_kill if config.allow_kill is None else config.allow_kill
             system = System(

@@ -51,6 +51,7 @@ MAX_SYSTEMS = 20
 REFUSALS = {
     "refused_addresses": "address not in allowed_peers",
     "refused_peers": "all places taken",
+    "refused_browsers": "HTTP or TLS of a browser, not MAVLink",
     "refused_access": "message beyond the access of the endpoint",
     "refused_operator": "message while another station is the operator",
     "refused_unsigned": "frame without a signature",

@@ -748,6 +748,7 @@ SYSTEM_ID_TAKEN = Template("System id {sysid}: another gateway has it on fabric"
 # == Link to the drone ==
 
 CONNECTION_REFUSED = Template("Connection refused by drone (status {status})", status=-99)
+WRONG_AIRCRAFT = Template("Not connected: drone has serial {serial}", serial="PI040444BA9H000000")
 OTHER_CONTROLLER = OperatorText("Drone connected to another controller")
 COMMAND_WITHOUT_DRONE = OperatorText("Command failed: drone not connected")
 RECONNECTING_IN = Template("Reconnecting in {seconds:.0f} s, or on a command", seconds=999)

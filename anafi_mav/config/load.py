@@ -206,6 +206,8 @@ def _contradictions(config: Config) -> Iterator[tuple[str, str]]:
         for key_path, drone in drones.items():
             if not low <= drone.sysid <= high:
                 yield f"{key_path}.sysid", f"expected one of sysids, {config.sysids}, got {drone.sysid}"
+    serials = {f"{key_path}.serial": drone.serial for key_path, drone in drones.items() if drone.serial is not None}
+    yield from _twice("a serial", serials)
     yield from _twice("a name", {f"{key_path}.name": drone.name for key_path, drone in drones.items()})
     simulated = {f"{path}.sim": drone.sim for path, drone in drones.items() if drone.sim is not None}
     bound = {f"{path}.address": sim.address for path, sim in simulated.items() if sim.address is not None}
@@ -255,6 +257,8 @@ def _of_one_drone(key_path: str, drone: DroneConfig) -> Iterator[tuple[str, str]
         yield f"{key_path}.address", _wrong(DroneConfig, "address", drone.address)
     if drone.sim is not None:
         yield from _of_model(f"{key_path}.sim", drone.sim)
+    if drone.sim is not None and drone.serial is not None:
+        yield f"{key_path}.serial", "expected none for a simulated drone, whose serial number follows from its address"
     if drone.sim is not None and drone.interface is not None:
         yield f"{key_path}.interface", "expected none for a simulated drone, which lives on this machine"
     if drone.sim is not None and drone.sim.address is not None and not _is_ipv4(drone.sim.address):

@@ -207,6 +207,15 @@ class DroneConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
             extra=expected("a whole number from 1 to 250"),
         ),
     ]
+    serial: Annotated[
+        Annotated[str, Meta(pattern=r"\A[A-Za-z0-9]{5,32}\Z")] | None,
+        Meta(
+            description="Serial number of the aircraft, as `anafi-mav info` prints it. The `sysid` is then that "
+            "aircraft's: another one at this address is not connected, also behind a Skycontroller. Default: any "
+            "aircraft.",
+            extra=expected("5 to 32 letters and digits"),
+        ),
+    ] = None
     address: Annotated[
         Annotated[str, Meta(max_length=MAX_TEXT)] | None,
         Meta(

@@ -19,7 +19,7 @@ from anafi_mav import models
 from anafi_mav.arsdk.codec.secret_fields import without_secrets
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.link.controller import ControllerSession
-from anafi_mav.arsdk.link.handshake import DISCOVERY_PORT
+from anafi_mav.arsdk.link.handshake import DISCOVERY_PORT, DeviceInfo
 from anafi_mav.arsdk.messages import ardrone3, common, drone_manager, rth, skyctrl
 from anafi_mav.arsdk.messages import flight_plan as modern_plan
 from anafi_mav.arsdk.messages.animation import Type as AnimationType
@@ -61,7 +61,7 @@ from anafi_mav.drone.status.sound import Sound
 from anafi_mav.drone.video.route import Direct, Mux, VideoRoute
 from anafi_mav.drone.video.stream_choice import StreamChoice
 from anafi_mav.drone.video.video import Video
-from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError
+from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, WrongAircraft
 
 log = logging.getLogger("anafi_mav")
 message_log = logging.getLogger("anafi_mav.message")
@@ -108,14 +108,16 @@ class Drone:
         http_port: int = HTTP_PORT,
         rtsp_port: int = RTSP_PORT,
         name: str = "",
+        serial: str | None = None,
         clock: Clock | None = None,
     ) -> None:
         """Create a drone at an address, not connected yet.
 
         With `handshake_port` None the port from discovery is used. `interface` binds every socket to that network
-        interface. `name` is ours, for the log.
+        interface. `name` is ours, for the log. With `serial` only the aircraft with that serial number is connected.
         """
         self.address = address
+        self._wanted_serial = serial
         self.name = name or address
         self._discovery_port = discovery_port
         self._handshake_port = handshake_port
@@ -223,8 +225,8 @@ class Drone:
 
         States of an earlier connection are dropped, and none of its commands is sent again. After a silence the first
         new handshake waits until `HANDSHAKE_AFTER`; if the drone is heard before one has succeeded, its session and
-        states are kept, and it hovers. Raises `LinkLost`, which `HandshakeRefused` is too, or `RemoteProtocolError`
-        when what answers there is no drone.
+        states are kept, and it hovers. Raises `LinkLost`, which `HandshakeRefused` is too, `RemoteProtocolError`
+        when what answers there is no drone, or `WrongAircraft`.
         """
         if self._session is not None or self._opening:
             raise LocalProtocolError(f"{self.name} is connected, or about to be")
@@ -278,6 +280,7 @@ class Drone:
                 local_address=self._local_address,
                 interface=self._interface,
                 on_message=_ignore,
+                check_device=self._check_device,
                 fades=True,
             )
         )
@@ -295,6 +298,18 @@ class Drone:
         self.handshake_at, self._dismissed, self.may_be_displaced = loop_time(), None, False
         session.on_message = self._receive
         return session
+
+    def _check_device(self, device: DeviceInfo) -> None:
+        """Raise `WrongAircraft` before the handshake, which would displace a controller.
+
+        A Skycontroller describes itself: its aircraft is known once it is connected.
+        """
+        if device.model_id not in CONTROLLERS:
+            self._check_serial(device.serial)
+
+    def _check_serial(self, serial: str) -> None:
+        if self._wanted_serial not in (None, serial):
+            raise WrongAircraft(serial, str(self._wanted_serial))
 
     def _resume(self, session: ControllerSession) -> bool:
         """Go on with a session that was silent. False: it is still silent, or has ended."""
@@ -450,6 +465,7 @@ class Drone:
             (common.CurrentDateTime(date), common.AllStates(), common.AllSettings()),
             (common.AllStatesChanged, common.AllSettingsChanged),
         )
+        self._check_serial(self.identity.serial)
 
     async def _find_drone(self) -> None:
         """Wait until the Skycontroller is connected to its drone."""
@@ -468,12 +484,17 @@ class Drone:
         state = self.controller.state
         self._model = _model(state.drone_model or 0)
         self._announced_serial, self._announced_name = state.drone_serial or "", state.drone_name or ""
+        self._check_serial(self._announced_serial)
 
     def _controller_says(self, message: Message, now: float) -> None:
-        """The drone is gone from behind the Skycontroller: as if our own link to it were."""
-        link = self.controller.state.link
-        if self._complete and link is not None and link != Connection.CONNECTED and self._session is not None:
-            self._session.end(f"the Skycontroller lost the drone: {spoken(link)}")
+        """End the connection when the Skycontroller has lost its drone, or has another one."""
+        state = self.controller.state
+        if not self._complete or state.link is None or self._session is None:
+            return
+        if state.link != Connection.CONNECTED:
+            self._session.end(f"the Skycontroller lost the drone: {spoken(state.link)}")
+        elif state.drone_serial and self._announced_serial not in ("", state.drone_serial):
+            self._session.end(f"the Skycontroller is connected to another drone, {state.drone_serial}")
 
     def _plan_says(self, message: common.MavlinkFilePlayingStateChanged, now: float) -> None:
         self.piloting.on_plan(message)

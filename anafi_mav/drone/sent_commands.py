@@ -35,10 +35,6 @@ PLAN_MEMORY = 20.0
 """s in which a flight plan may begin; as Olympe (common.Mavlink.Start): the drone reads the whole file before it
 reports anything."""
 
-STOP_REPORT = 1.5
-"""s after PLAYING within which the drone reports the end of a plan that it has been commanded to stop before. An event
-is late by 1 s at most (the simulator's quirk `scramble`), and three retransmissions of 150 ms may be lost."""
-
 TAKEN_OFF = frozenset({FlyingState.TAKINGOFF, FlyingState.HOVERING, FlyingState.FLYING})
 RISING = TAKEN_OFF | {FlyingState.MOTOR_RAMPING}
 
@@ -146,6 +142,8 @@ class SentCommand(msgspec.Struct, eq=False):
     """It is undone when the drone refuses it, too: the drone would execute it later."""
     plan_before: str | None = None
     """Id of the plan that the drone reported when this start was sent."""
+    cause: Any = None
+    """The caller's value for what it starts, by which it recognises reports of that."""
     answered: bool = False
     """An event was about it: its motors ramped up, say, or its withdrawn plan began."""
     answer: Any = None
@@ -241,21 +239,14 @@ class SentCommands:
         """Return True when the reported effect of a command of this slot has not ended."""
         return any(one.phase is Phase.CONFIRMED for one in self._slots[slot])
 
-    def withdrawn_in_effect(self, slot: Slot) -> SentCommand | None:
-        """Return the withdrawn command of this slot whose reported effect has not ended."""
-        commands = self._slots[slot]
-        return next((one for one in commands if one.phase is Phase.WITHDRAWN and one.is_in_effect), None)
+    def in_effect(self, slot: Slot) -> SentCommand | None:
+        """Return the command of this slot whose reported effect has not ended, also a withdrawn one."""
+        return next((one for one in self._slots[slot] if one.is_in_effect), None)
 
-    def confirm_despite(self, older: SentCommand, sent: SentCommand) -> bool:
-        """Take the effect that was attributed to a withdrawn command for that of the newer one.
-
-        Returns False when the end of that effect was reported meanwhile, or the newer one does not wait any longer.
-        """
-        if not (older.is_in_effect and older.phase is Phase.WITHDRAWN and sent.awaited):
-            return False
-        older.apply(Event.OVER)
-        sent.apply(Event.EXECUTED)
-        return True
+    def is_undecided(self, plan: str, now: float) -> bool:
+        """Return True when a report of this plan may still be that of an earlier start."""
+        named = (one for one in self._slots[Slot.PLAN] if one.target == plan)
+        return any(one.phase is not Phase.CONFIRMED and one.may_be_reported(now) for one in named)
 
     def rule_out(self) -> None:
         """Note that no withdrawn command starts the motors any more.
@@ -329,25 +320,24 @@ class SentCommands:
     def _attribute_playing(self, uid: str, now: float) -> SentCommand | None:
         """PLAYING names the plan as the upload did; some firmware may name it otherwise.
 
-        - Of several starts of one plan it is the oldest's that is withdrawn and may still begin: the drone executes
-          them in their order. When no end of it follows, it was the newer's (`confirm_despite`).
-        - A name that is not known is that of the plan that is awaited.
+        - A plan is not started again while an earlier start of it is undecided (`is_undecided`), so a known name is
+          that of its newest start.
+        - A name that is not known is that of the newest start, while the drone may still begin that.
         - A withdrawn start begins late when it took the drone so long to read the plan that the command against it
           arrived before its beginning.
         """
         plans = self._slots[Slot.PLAN]
-        sent = self._plan_named(uid)
-        if sent is None and plans and plans[-1].awaited and not (uid and uid == plans[-1].plan_before):
-            sent = plans[-1]
-        elif sent is not None and sent.phase is not Phase.CONFIRMED:
-            withdrawn = (one for one in plans if one.target == uid and one.phase is Phase.WITHDRAWN)
-            sent = next((one for one in withdrawn if one.may_be_reported(now)), sent)
+        sent, newest = self._plan_named(uid), plans[-1] if plans else None
+        if sent is None and newest is not None and not (uid and uid == newest.plan_before):
+            is_open = newest.awaited or (newest.phase is Phase.WITHDRAWN and not newest.is_in_effect)
+            sent = newest if is_open else None
         if sent is not None and not sent.may_be_reported(now):
             sent = None
         for one in plans:
             if one is not sent and one.is_in_effect:
                 one.apply(Event.OVER)  # the drone plays one plan at a time
         if sent is not None:
+            sent.target = uid or sent.target
             sent.apply(Event.EXECUTED)
         return sent
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import re
 import socket
 from collections.abc import Callable
 
@@ -11,11 +12,19 @@ from anafi_mav.clock import Clock
 from anafi_mav.mavlink.base import EndpointUrl, Reopening, Sink, StreamPeer, close_peers
 from anafi_mav.mavlink.listener import Listener
 
+logger = logging.getLogger(__name__)
+
 CONNECT_TIMEOUT = 5.0
 """s for one attempt: a host that drops our packets would hold us for minutes."""
 
 UNANSWERED_MS = 30_000
 """A peer that takes nothing for so long is gone (pulled cable, dead battery); TCP itself waits a quarter of an hour."""
+
+
+_BROWSER = re.compile(rb"[A-Z]{3,16} |\x16\x03")
+"""Beginning of a request of HTTP (RFC 9112 §3), or of a handshake of TLS (RFC 8446 §5.1)."""
+_BROWSER_OR_NOT = re.compile(rb"[A-Z]{0,16}|\x16")
+"""Too little to decide."""
 
 
 class TcpPeer(StreamPeer):
@@ -34,6 +43,40 @@ class TcpPeer(StreamPeer):
 
     def heard(self) -> None:
         self._heard(self)
+
+
+class _ServedPeer(TcpPeer):
+    """A connection of a client of `tcpin`, unless it is a browser's.
+
+    The page of any web site can make a browser of this computer send a request to a port of it, with a body of the
+    page's choice: MAVLink frames. Nothing is received from a connection that begins as HTTP or TLS.
+    """
+
+    def __init__(
+        self,
+        url: EndpointUrl,
+        name: str,
+        sink: Sink,
+        heard: Callable[[TcpPeer], None],
+        refuse: Callable[[TcpPeer], None],
+    ) -> None:
+        """`refuse` drops the connection of a browser."""
+        super().__init__(url, name, sink, heard)
+        self._refuse = refuse
+        self._beginning: bytes | None = b""
+        """The first bytes, while it is not known whether a browser sent them; None afterwards."""
+
+    def data_received(self, data: bytes) -> None:
+        if self._beginning is not None:
+            data = self._beginning + data
+            if _BROWSER.match(data):
+                self._refuse(self)
+                return
+            if _BROWSER_OR_NOT.fullmatch(data):
+                self._beginning = data
+                return
+            self._beginning = None
+        super().data_received(data)
 
 
 class TcpIn(Listener):
@@ -81,7 +124,7 @@ class TcpIn(Listener):
         name, now = f"{address[0]}:{address[1]}", self._clock.monotonic()
         if not self._is_allowed(address[0]):
             return None
-        peer = TcpPeer(self.parsed, f"{self.url} from {name}", self._sink, self._heard)
+        peer = _ServedPeer(self.parsed, f"{self.url} from {name}", self._sink, self._heard, self._refuse_browser)
         self._protect(peer.channel)
         known = not peer.channel.is_signed  # a connection proves the address
         if not self._make_room(name, now, known=known):
@@ -98,6 +141,13 @@ class TcpIn(Listener):
         self._table.heard(peer, now)
         if not self._table.is_known(peer) and self._make_room(self._shown(peer), now, known=True):
             self._table.add(peer, now, known=True)
+
+    def _refuse_browser(self, peer: TcpPeer) -> None:
+        self.counters["refused_browsers"] += 1
+        # A page can send many: one line is enough.
+        level = logging.DEBUG if self.counters["refused_browsers"] > 1 else logging.WARNING
+        logger.log(level, "%s: %s dropped: it sends HTTP or TLS, as a browser does", self.url, self._shown(peer))
+        self._drop(peer)
 
     def _forget(self, peer: TcpPeer) -> None:
         self._peers.discard(peer)

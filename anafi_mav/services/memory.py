@@ -41,8 +41,9 @@ MAX_ASIDE = 100
 _SERIAL = re.compile(r"[A-Za-z0-9_-]{1,64}")
 """Parrot's are 18 letters and digits. It comes from the drone and becomes the name of a file."""
 
-SAVE_LIMIT = 3.0
-"""s that a client waits for the disk. A memory card may take one; behind a disk that hangs it gets its answer."""
+DISK_LIMIT = 3.0
+"""s that a client waits for the disk, and a drone for its stored data. A memory card may take one; behind a disk that
+hangs the client gets its answer, and the drone is a system without stored data."""
 
 Number = Annotated[float, Meta(ge=-3.5e38, le=3.5e38)] | Literal["inf", "-inf"] | None
 """A single-precision number as JSON can have it; None is NaN."""
@@ -97,6 +98,49 @@ def _loaded(item: _Item) -> PlanItem:
     )  # fmt: skip
 
 
+class _Stored(msgspec.Struct, frozen=True):
+    """Content of a drone's file, and the line for people when it could not be read."""
+
+    plans: dict[int, tuple[PlanItem, ...]] = {}
+    settings: dict[str, Any] = {}
+    problem: OperatorText | None = None
+    is_unreadable: bool = False
+    """The file is there and cannot be read now."""
+
+
+def _read_file(path: Path, serial: str) -> _Stored:
+    """Read a drone's file in the thread of files; put one aside that nothing can be read of."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            raise ValueError(f"it is larger than {MAX_BYTES} bytes")
+        content = msgspec.json.decode(data, type=_File)
+        if content.version != VERSION:
+            raise ValueError(f"it is of version {content.version}, not {VERSION}")
+        if content.serial != serial:
+            raise ValueError("it is of another drone")
+    except FileNotFoundError:
+        return _Stored()
+    except OSError as error:
+        return _Stored(problem=texts.MEMORY_UNREADABLE.fill(path=path, error=error.strerror), is_unreadable=True)
+    except (ValueError, RecursionError) as error:
+        return _Stored(problem=texts.MEMORY_INVALID.fill(path=path, error=error, aside=_put_aside(path)))
+    return _Stored({kind: tuple(map(_loaded, items)) for kind, items in content.plans.items()}, content.settings)
+
+
+def _put_aside(path: Path) -> str:
+    for number in range(1, MAX_ASIDE + 1):
+        aside = path.with_suffix(f".unreadable-{number}")
+        if not aside.exists():
+            try:
+                path.rename(aside)
+            except OSError as error:
+                return f"nothing, for {error.strerror}"
+            return aside.name
+    return "nothing, for there are too many of them"
+
+
 class Memory:
     """The file of one drone. `folder` None: nothing outlives the gateway."""
 
@@ -115,45 +159,37 @@ class Memory:
     @property
     def path(self) -> Path | None:
         """Return the drone's file; None without a folder or a valid serial number."""
-        if self._folder is None or not _SERIAL.fullmatch(self._serial):
-            return None
-        return self._folder / f"{self._serial}.json"
+        return self._path_of(self._serial)
 
-    def load(self, serial: str) -> OperatorText | None:
+    def _path_of(self, serial: str) -> Path | None:
+        if self._folder is None or not _SERIAL.fullmatch(serial):
+            return None
+        return self._folder / f"{serial}.json"
+
+    async def load(self, serial: str) -> OperatorText | None:
         """Read what is remembered of a drone. Returns a line for people when that could not be read.
 
         Of a drone that is back after a loss of the link there is nothing to read: what is here is as new as its file,
-        or newer, if that could not be written.
+        or newer, if that could not be written. A file that the disk does not deliver in time counts as unreadable.
         """
         if serial and serial == self._serial:
             return None
+        stored = _Stored()
+        path = self._path_of(serial)
+        if path is not None:
+            reading = asyncio.get_running_loop().run_in_executor(STATE_WRITER, _read_file, path, serial)
+            await asyncio.wait([reading], timeout=DISK_LIMIT)
+            if reading.done():
+                stored = reading.result()
+            else:
+                reading.cancel()  # what has not begun puts no file aside later
+                problem = texts.MEMORY_UNREADABLE.fill(path=path, error=HANGS)
+                stored = _Stored(problem=problem, is_unreadable=True)
         self._serial = serial
-        self._unreadable, self.problem = False, None
-        self.plans, self.settings = {}, {}
-        path = self.path
-        if path is None:
-            return None
-        try:
-            with path.open("rb") as file:
-                data = file.read(MAX_BYTES + 1)
-            if len(data) > MAX_BYTES:
-                raise ValueError(f"it is larger than {MAX_BYTES} bytes")
-            content = msgspec.json.decode(data, type=_File)
-            if content.version != VERSION:
-                raise ValueError(f"it is of version {content.version}, not {VERSION}")
-            if content.serial != serial:
-                raise ValueError("it is of another drone")
-        except FileNotFoundError:
-            return None
-        except OSError as error:
-            self._unreadable = True
-            self.problem = texts.MEMORY_UNREADABLE.fill(path=path, error=error.strerror)
-            return self.problem
-        except (ValueError, RecursionError) as error:
-            return texts.MEMORY_INVALID.fill(path=path, error=error, aside=self._put_aside(path))
-        self.plans = {kind: tuple(map(_loaded, items)) for kind, items in content.plans.items()}
-        self.settings = content.settings
-        return None
+        self.plans, self.settings = stored.plans, stored.settings
+        self._unreadable = stored.is_unreadable
+        self.problem = stored.problem if stored.is_unreadable else None
+        return stored.problem
 
     def put(self, mission_type: int, items: Sequence[PlanItem]) -> None:
         """Remember a plan; `save` writes it."""
@@ -174,7 +210,7 @@ class Memory:
         data = msgspec.json.encode(content)
         writing = asyncio.get_running_loop().run_in_executor(STATE_WRITER, replace_file, path, data)
         writing.add_done_callback(partial(self._note, path))
-        await asyncio.wait([writing], timeout=SAVE_LIMIT)
+        await asyncio.wait([writing], timeout=DISK_LIMIT)
         if not writing.done():
             self.problem = texts.MEMORY_UNWRITABLE.fill(path=path, error=HANGS)
         return self.problem
@@ -184,15 +220,3 @@ class Memory:
         error = None if writing.cancelled() else writing.exception()
         reason = getattr(error, "strerror", None) or error
         self.problem = None if error is None else texts.MEMORY_UNWRITABLE.fill(path=path, error=reason)
-
-    @staticmethod
-    def _put_aside(path: Path) -> str:
-        for number in range(1, MAX_ASIDE + 1):
-            aside = path.with_suffix(f".unreadable-{number}")
-            if not aside.exists():
-                try:
-                    path.rename(aside)
-                except OSError as error:
-                    return f"nothing, for {error.strerror}"
-                return aside.name
-        return "nothing, for there are too many of them"

@@ -266,8 +266,18 @@ class System:
 
     # Link up, link down.
 
-    def link_up(self) -> None:
-        """The drone is connected and has sent all its states: the system appears."""
+    async def load_memory(self) -> OperatorText | None:
+        """Read what is stored about the connected drone, before `link_up`.
+
+        Returns a line for people when that could not be read.
+        """
+        return await self.memory.load(self.drone.identity.serial)
+
+    def link_up(self, memory_problem: OperatorText | None) -> None:
+        """Make the system appear: the drone is connected and has sent all its states.
+
+        `memory_problem`: see `load_memory`.
+        """
         self.active = True
         self._undo = self.drone.subscribe(self._on_event)
         for component in self.components:
@@ -275,8 +285,8 @@ class System:
         for compid in ABSENT:
             self._node.add_host(self.sysid, compid, self._refuse)
         self._last_state = None
-        if (problem := self.memory.load(self.drone.identity.serial)) is not None:
-            self.text(Severity.WARNING, problem)
+        if memory_problem is not None:
+            self.text(Severity.WARNING, memory_problem)
         self.vehicle.link_up(TakeoffRecord.read(self.memory.settings.get(takeoff_point_service.KEY)))
         for service in self.services:
             service.link_up()

@@ -248,7 +248,7 @@ class Vehicle(Aircraft):
         if state in TAKING_OFF or (self.takeoff.climbing and not self.on_ground):
             return FlightMode.MISSION if self.mission.flying else FlightMode.TAKEOFF
         plays = self.drone.piloting.state.plan == PlayingState.PLAYING
-        if state in AIRBORNE and plays and not self.mission.machine.has_withdrawn_start:
+        if state in AIRBORNE and plays and not self.drone.flight_plan.plays_withdrawn:
             return FlightMode.MISSION
         return self.control.mode
 

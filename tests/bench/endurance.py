@@ -19,6 +19,7 @@ After a rest both simulators are started again.
 | tasks, files and sockets at the end | as after a sixth |
 | final results of each command (IN_PROGRESS before it is allowed) | one |
 | a command that FAILED while its drone was silent | with a text of that drone |
+| accepted take-offs of PX4's and of ArduPilot's clients | some of each |
 | a command without a result | none; queries that were sent while the drone was not connected excepted |
 | the gateway's process and its stderr | runs, no traceback |
 
@@ -548,14 +549,18 @@ class Endurance:
 
     def take_off(self, client: BenchClient, drone: int, chance: random.Random) -> None:
         client.command(drone, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
-        client.command(drone, mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, NAN, NAN, NAN, chance.uniform(2.0, 6.0))
+        height = chance.uniform(2.0, 6.0)
+        # The height of PX4's clients is above mean sea level.
+        up = height if client.is_ardupilot else HOME[2] + height
+        client.command(drone, mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, NAN, NAN, NAN, up)
 
     def go_to(self, client: BenchClient, drone: int, chance: random.Random) -> None:
         place = near(chance, chance.uniform(2.0, 15.0))
         client.place_command(drone, mavlink.MAV_CMD_DO_REPOSITION, (-1, 1, 0, NAN), place)
 
     def orbit(self, client: BenchClient, drone: int, chance: random.Random) -> None:
-        client.place_command(drone, mavlink.MAV_CMD_DO_ORBIT, (10.0, 2.0, 0, 0), near(chance, 8.0))
+        up = 8.0 if client.is_ardupilot else HOME[2] + 8.0
+        client.place_command(drone, mavlink.MAV_CMD_DO_ORBIT, (10.0, 2.0, 0, 0), near(chance, up))
 
     def mode(self, client: BenchClient, drone: int, chance: random.Random) -> None:
         if client.is_ardupilot:
@@ -745,6 +750,7 @@ class Endurance:
                 self.wrong.append(f"void: this computer lost {lost} datagrams of client {client.number}")
             if lost := client.count_lost():
                 self.wrong.append(f"void: this computer lost {lost} datagrams for client {client.number}")
+        self._judge_take_offs()
         names = {getattr(enums, name): name[11:] for name in dir(enums) if name.startswith("MAV_RESULT_")}
         named = {names[key]: count for key, count in results.most_common()}
         print(
@@ -757,6 +763,23 @@ class Endurance:
         assert self.gateway is not None
         if self.gateway.returncode is not None:
             self.wrong.append(f"the gateway ended with status {self.gateway.returncode}")
+
+    def _judge_take_offs(self) -> None:
+        """Count the take-offs of each family of clients: one whose take-offs are all refused tests little."""
+        for family, is_ardupilot in (("PX4", False), ("ArduPilot", True)):
+            ends = [
+                one.results[0][1]
+                for client in self.clients
+                if client.is_ardupilot is is_ardupilot
+                for (_, command), sent in client.commands.items()
+                if command == mavlink.MAV_CMD_NAV_TAKEOFF
+                for one in sent
+                if one.results
+            ]
+            accepted = ends.count(mavlink.MAV_RESULT_ACCEPTED)
+            print(f"take-offs of {family}'s clients: {accepted} of {len(ends)} accepted")
+            if not accepted:
+                self.wrong.append(f"no take-off of {family}'s clients was accepted")
 
     def _cut(self, one: Commanded, at: float) -> bool:
         """Whether the drone was silent between a command and its result."""

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from support import chromium
 from support.chromium import STRIP
-from support.mav import CAMERA
+from support.mav import CAMERA, Client
 from support.pictures import horizon
-from support.world import World, world
+from support.world import OPTIONS_PORT, World, world
 
+from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.dialect import (
     MAV_CMD_DO_PARACHUTE,
     MAV_CMD_VIDEO_START_STREAMING,
@@ -105,3 +106,38 @@ async def test_status_page_on_a_phone_shows_drone_refusal_and_picture() -> None:
         assert await page.js("document.documentElement.scrollWidth") == PHONE["width"]
         await page.js("document.querySelector('#drones button').click()")
         await viewers_end(w)
+
+
+LINK = "document.querySelector('#drones .link')?.textContent ?? ''"
+
+
+async def beats(*stations: Client) -> None:
+    """A heartbeat a second, without which an operator is lost."""
+    while True:
+        for station in stations:
+            station.send(
+                dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, dialect.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3)
+            )
+        await asyncio.sleep(1.0)
+
+
+async def test_status_page_names_operator_and_secondary_until_release() -> None:
+    async with (
+        world(speed=1.0, options=("operator_control=true&secondaries=254",)) as w,
+        chromium.chromium() as browser,
+    ):
+        page = await browser.page()
+        await page.command("Emulation.setDeviceMetricsOverride", **PHONE)
+        await page.open(url(w, "/status"))
+        await page.until(LINK, lambda text: "connections 1" in text and "operator" not in text)
+        teacher, student = [await w.connect(sysid, port=OPTIONS_PORT) for sysid in (255, 254)]
+        beating = asyncio.ensure_future(beats(teacher, student))
+        request = dialect.MAV_CMD_REQUEST_OPERATOR_CONTROL
+        ack = await teacher.command(request, 1, 0, 10, 255, x=0.0, y=0.0, z=0.0)
+        assert ack.result == MAV_RESULT_ACCEPTED
+        await page.until(LINK, lambda text: text.endswith(", operator system 255 (secondaries 254)"))
+        assert await page.js("document.documentElement.scrollWidth") == PHONE["width"]
+        ack = await teacher.command(request, 0, 0, 0, 255, x=0.0, y=0.0, z=0.0)
+        assert ack.result == MAV_RESULT_ACCEPTED
+        await page.until(LINK, lambda text: "operator" not in text)
+        beating.cancel()

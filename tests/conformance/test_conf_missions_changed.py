@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.flavours import both
+from support.hanging_disk import hanging
 from support.mav import Client
 from support.missions import (
     ACTIVE,
@@ -51,6 +52,7 @@ from support.world import HOME, World, world
 from anafi_mav import mav_enums
 from anafi_mav.services.memory import Memory
 from anafi_mav.sim.world.quirks import Quirk
+from anafi_mav.state_lock import STATE_WRITER
 
 ERROR, INVALID = 1, 5
 
@@ -279,6 +281,20 @@ async def test_conf_074_mission_armed_during_its_upload_is_the_new_one() -> None
         assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == ACCEPTED
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["east"] > 11.0, timeout=40.0)
         assert all(e.args["north"] < 2.0 for e in w.drone.log if e.kind == "pose")
+
+
+async def test_start_of_a_mission_being_stored_fails_with_a_text_when_the_link_is_lost() -> None:
+    """It waits for the disk: the loss of the drone does not reach it."""
+    async with world(web=True, speed=1.0) as w:
+        with hanging(STATE_WRITER):
+            w.drone.faults.mute = True
+            await up_to_the_last_item(w, ONE_WAY)
+            mark = w.client.mark()
+            ack = await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)
+            assert ack.result == dialect.MAV_RESULT_FAILED
+            texts = [m.text for _, m in w.client.since(mark, "STATUSTEXT")]
+            assert "Command failed: drone not connected" in texts
+            assert w.client.since(mark, "MISSION_ACK") == []  # the disk has not answered
 
 
 async def test_conf_063_failed_storing_is_reported_and_the_next_upload_succeeds(

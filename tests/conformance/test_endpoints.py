@@ -283,6 +283,50 @@ async def test_serial_line_that_was_full_is_served_without_errors(caplog: pytest
     assert [record.getMessage() for record in caplog.records if record.levelname == "ERROR"] == []
 
 
+def page_request(method: str, body: bytes) -> bytes:
+    """A request that the page of any web site can make a browser send, with a body of the page's choice."""
+    head = f"{method} / HTTP/1.1\r\nHost: 127.0.0.1:5760\r\nOrigin: https://example.org\r\nContent-Length: {len(body)}"
+    return head.encode() + b"\r\n\r\n" + body
+
+
+@pytest.mark.parametrize(
+    "split",
+    [
+        pytest.param((), id="whole"),
+        pytest.param((1, 3), id="first bytes alone"),
+        pytest.param((20, 110), id="body alone"),
+    ],
+)
+@pytest.mark.parametrize("first", ["POST", "OPTIONS", "TLS"])
+async def test_web_page_in_a_browser_commands_nothing_over_tcp(first: str, split: tuple[int, ...]) -> None:
+    async with world() as w:
+        arm = stock.MAVLink_command_long_message(1, 1, ARM, 0, 1, 0, 0, 0, 0, 0, 0).pack(stock.MAVLink(None, 255, 190))
+        data = b"\x16\x03\x01\x02\x00" + bytes(120) + 3 * arm if first == "TLS" else page_request(first, 3 * arm)
+        reader, writer = await asyncio.open_connection(w.address, 5760)
+        for begin, end in itertools.pairwise((0, *split, len(data))):
+            writer.write(data[begin:end])
+            await asyncio.sleep(0.1)
+        mark = w.client.mark()
+        for _ in range(2):
+            await w.client.heartbeat(lambda beat: True, since=w.client.mark())
+        assert [beat for _, beat in w.client.since(mark, "HEARTBEAT") if beat.base_mode & ARMED] == []
+        with suppress(ConnectionError):
+            while await reader.read(1 << 16):  # until the gateway ends the connection
+                pass
+        writer.close()
+        assert w.gateway.counters()["refused_browsers"] == 1
+        assert w.gateway.status().endpoints[0].refused == {"HTTP or TLS of a browser, not MAVLink": 1}
+
+
+async def test_client_of_tcp_that_begins_with_other_bytes_is_served() -> None:
+    """As behind a serial server, which may begin in the middle of a frame or with a greeting."""
+    async with world() as w:
+        for beginning in (b"A", b"OK\r\n", b"ABC\x00", b"\x16", b"\x16\x00", b"X" * 40):
+            client = await w.connect(250)
+            client.send_raw(beginning)
+            await still_works(client)
+
+
 async def test_garbage_on_every_mavlink_port() -> None:
     host, stranger = loopback(), loopback()
     peer = await UdpClient(254).open(host)

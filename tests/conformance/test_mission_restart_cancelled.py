@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 
 import pytest
+from support.fault_scenarios import home_being_undone, somebody_else, until
 from support.flavours import both
 from support.missions import ACTIVE, MISSION_MODE, PAUSED, first, on_the_way, put, state, takeoff, way, whole
 from support.world import World, world
@@ -107,7 +109,7 @@ async def test_paused_mission_sends_mission_current_once(flavour: str) -> None:
 
 @both
 async def test_withdrawn_start_reported_late_under_another_name_is_suspended(flavour: str) -> None:
-    """The drone layer cannot attribute the name to the start that it has withdrawn; the mission pauses it."""
+    """A name that the drone has not reported before is that of the start that it may still execute."""
     async with world(flavour=flavour, web=True) as w:
         await on_the_way(w, 2)
         mark, seen = w.client.mark(), len(commanded(w, "Mavlink.Start"))
@@ -122,23 +124,25 @@ async def test_withdrawn_start_reported_late_under_another_name_is_suspended(fla
             since=mark,
         )
         w.drone.faults.untold = frozenset()
-        pauses = len(commanded(w, "Mavlink.Pause"))
+        stops = len(commanded(w, "Mavlink.Stop"))
         w.drone.inject(common.MavlinkFilePlayingStateChanged(PlayingState.PLAYING, "renamed", MavlinkType.FLIGHT_PLAN))
-        await w.drone.wait_log(lambda e: len(commanded(w, "Mavlink.Pause")) > pauses, 5.0)
+        await w.drone.wait_log(lambda e: len(commanded(w, "Mavlink.Stop")) > stops, 5.0)
 
 
 class SilentPlan:
     """A mission whose restart was cancelled and that was started again, while the drone reports nothing of its plan."""
 
-    def __init__(self, w: World, mark: int, uid: str) -> None:
+    def __init__(self, w: World, mark: int, older: str, newer: str) -> None:
         self.w = w
         self.mark = mark
         """Before the second start."""
-        self.uid = uid
+        self.older = older
+        """The drone's name of the file of the cancelled start."""
+        self.newer = newer
 
-    def report(self, *states: PlayingState) -> None:
+    def report(self, uid: str, *states: PlayingState) -> None:
         for one in states:
-            self.w.drone.inject(common.MavlinkFilePlayingStateChanged(one, self.uid, MavlinkType.FLIGHT_PLAN))
+            self.w.drone.inject(common.MavlinkFilePlayingStateChanged(one, uid, MavlinkType.FLIGHT_PLAN))
 
     def states(self) -> list[int]:
         return [whole(m).mission_state for _, m in self.w.client.since(self.mark, "MISSION_CURRENT")]
@@ -173,21 +177,22 @@ async def started_twice(w: World) -> SilentPlan:
     await w.drone.wait_log(lambda e: len(commanded(w, "Mavlink.Start")) > starts + 1, 20.0)
     w.drone.faults.untold = frozenset()
     files = [e.args["filepath"] for e in w.drone.log if e.kind == "command" and e.name.endswith("Mavlink.Start")]
-    assert files[-1] == files[-2]
-    return SilentPlan(w, mark, files[-1])
+    assert files[-1] != files[-2], "reports of the two starts differ by the name alone"
+    return SilentPlan(w, mark, files[-2], files[-1])
 
 
 @both
 async def test_reports_of_a_cancelled_start_are_not_those_of_the_next(flavour: str) -> None:
-    """The drone reports the cancelled start, its end and the second start once that one was received."""
-    async with world(flavour=flavour, web=True) as w:
+    """The drone reports the cancelled start and its end, however late, and then the second start."""
+    async with world(speed=1.0, flavour=flavour, web=True) as w:
         plan = await started_twice(w)
-        plan.report(PlayingState.PLAYING, PlayingState.STOPPED)
-        for _ in range(2):  # one a second: longer than a start in doubt waits
-            await w.client.heartbeat(lambda beat: True, since=w.client.mark())
-        assert plan.results() == []
-        assert ACTIVE not in plan.states()
-        plan.report(PlayingState.PLAYING)
+        for report in (PlayingState.PLAYING, PlayingState.STOPPED):
+            plan.report(plan.older, report)
+            for _ in range(2):  # one a second
+                await w.client.heartbeat(lambda beat: True, since=w.client.mark())
+            assert plan.results() == []
+            assert ACTIVE not in plan.states()
+        plan.report(plan.newer, PlayingState.PLAYING)
         await state(w, ACTIVE, since=plan.mark)
         for _ in range(2):
             await w.client.heartbeat(lambda beat: True, since=w.client.mark())
@@ -205,7 +210,9 @@ async def test_start_behind_a_cancelled_one_that_never_began_is_shown_as_flown(
     """The only PLAYING is the second start's; the drone may have repeated before that it flies no plan."""
     async with world(flavour=flavour, web=True) as w:
         plan = await started_twice(w)
-        plan.report(*[] if end is None else [end], PlayingState.PLAYING)
+        if end is not None:
+            plan.report(plan.older, end)
+        plan.report(plan.newer, PlayingState.PLAYING)
         await state(w, ACTIVE, since=plan.mark)
         for _ in range(4):  # one a second: longer than any wait for a report
             beat = await w.client.heartbeat(lambda beat: True, since=w.client.mark())
@@ -220,7 +227,7 @@ async def test_start_behind_a_cancelled_one_that_never_began_is_shown_as_flown(
 async def test_hold_while_a_start_is_in_doubt_stops_the_drone(flavour: str) -> None:
     async with world(flavour=flavour, web=True) as w:
         plan = await started_twice(w)
-        plan.report(PlayingState.PLAYING)
+        plan.report(plan.older, PlayingState.PLAYING)
         hold = (1.0, 4.0, 3.0) if flavour == "px4" else (1.0, 17.0)
         ack = await w.client.command(mav_enums.MAV_CMD_DO_SET_MODE, *hold)
         assert ack.result == mav_enums.MAV_RESULT_ACCEPTED
@@ -231,3 +238,40 @@ async def test_hold_while_a_start_is_in_doubt_stops_the_drone(flavour: str) -> N
         assert plan.states()[-1] == PAUSED
         assert [e.args["state"] for e in w.drone.log if e.name == "plan"][-1] != "playing"
         assert mav_enums.MAV_RESULT_ACCEPTED not in plan.results()
+
+
+async def test_paused_mission_that_another_controller_stops_in_the_wait_is_not_begun_again() -> None:
+    """The start of a plan that is no longer paused would fly it from its first line."""
+    async with world(speed=1.0, web=True) as w:
+        await on_the_way(w, 2)
+        assert (await w.client.command(mav_enums.MAV_CMD_DO_SET_MODE, 1, 4, 3)).result == mav_enums.MAV_RESULT_ACCEPTED
+        await home_being_undone(w)
+        mark, starts = w.client.mark(), len(commanded(w, "Mavlink.Start"))
+        w.client.send_command(mav_enums.MAV_CMD_MISSION_START)
+        await asyncio.sleep(0.5)
+        somebody_else(w, common.Stop())
+        assert (mav_enums.MAV_CMD_MISSION_START, mav_enums.MAV_RESULT_TEMPORARILY_REJECTED) in await until(
+            w.client, mark, 2
+        )
+        assert len(commanded(w, "Mavlink.Start")) == starts
+        assert (await w.client.command(mav_enums.MAV_CMD_MISSION_START)).result == mav_enums.MAV_RESULT_ACCEPTED
+        await state(w, ACTIVE, seq=2, since=mark)
+
+
+async def test_mission_whose_resumption_was_withdrawn_is_continued_from_another_file() -> None:
+    """A late report of the withdrawn start has the same name as one of a second start would have."""
+    async with world(speed=1.0, web=True) as w:
+        await on_the_way(w, 2)
+        assert (await w.client.command(mav_enums.MAV_CMD_DO_SET_MODE, 1, 4, 3)).result == mav_enums.MAV_RESULT_ACCEPTED
+        w.drone.faults.untold = frozenset({common.MavlinkFilePlayingStateChanged.NAME})
+        mark, starts = w.client.mark(), len(commanded(w, "Mavlink.Start"))
+        w.client.send_command(mav_enums.MAV_CMD_MISSION_START)
+        await w.drone.wait_log(lambda e: len(commanded(w, "Mavlink.Start")) > starts, 10.0)
+        w.client.send(newer.MAVLink_command_cancel_message(1, 1, mav_enums.MAV_CMD_MISSION_START))
+        assert (mav_enums.MAV_CMD_MISSION_START, mav_enums.MAV_RESULT_CANCELLED) in await until(w.client, mark, 1)
+        w.drone.faults.untold = frozenset()
+        assert (await w.client.command(mav_enums.MAV_CMD_MISSION_START)).result == mav_enums.MAV_RESULT_ACCEPTED
+        files = [e.args["filepath"] for e in w.drone.log if e.kind == "command" and e.name.endswith("Mavlink.Start")]
+        assert len({*files}) == 2
+        assert files[-1] not in files[:-1]
+        await state(w, ACTIVE, seq=2, since=mark)

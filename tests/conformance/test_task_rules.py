@@ -24,6 +24,7 @@ from support.fault_scenarios import (
     SET_MODE,
     TAKEOFF_CMD,
     goto,
+    home_being_undone,
     return_by_itself,
     somebody_else,
     until,
@@ -35,12 +36,12 @@ from support.params import write
 from support.setpoints import POSITION_ONLY, VELOCITY_ONLY, attitude, earth, heard, local, said, streaming
 from support.world import HOME, World, world
 
-from anafi_mav.arsdk.messages import ardrone3, rth
+from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.skyctrl import Source
 from anafi_mav.sim.world.faults import Impairment
 
 PAUSE, YAW, ORBIT = dialect.MAV_CMD_DO_PAUSE_CONTINUE, dialect.MAV_CMD_CONDITION_YAW, dialect.MAV_CMD_DO_ORBIT
-ALTITUDE, SET_HOME = dialect.MAV_CMD_DO_CHANGE_ALTITUDE, dialect.MAV_CMD_DO_SET_HOME
+ALTITUDE = dialect.MAV_CMD_DO_CHANGE_ALTITUDE
 INT32 = dialect.MAV_PARAM_TYPE_INT32
 FORCE = 21196
 PITCH_STICK = 3
@@ -182,13 +183,6 @@ async def test_return_does_not_end_a_landing_that_begins_before_it_is_flown() ->
 
 
 # What waits for the end of what it replaces, and for how long.
-
-
-async def home_being_undone(w: World) -> None:
-    """Begin to set the home; whatever replaces that has to wait for 5 s until it is undone."""
-    w.drone.faults.untold = frozenset({rth.CustomLocation.NAME, rth.PreferredHomeType.NAME})
-    w.client.send_command(SET_HOME, 0, frame=0, x=48.88, y=2.37, z=0.0)
-    await w.drone.wait_log(lambda e: e.kind == "command" and e.name.startswith("rth.set"), 5.0)
 
 
 WAITS: dict[str, tuple[str, tuple[int, ...], str, float, float]] = {

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from anafi_mav import geo, mav_enums
+from anafi_mav.arsdk.messages import rth
 from anafi_mav.arsdk.messages.rth import StateReason
 from anafi_mav.sim.world.faults import Impairment
 from support.mav import NAN, Client
@@ -103,3 +104,10 @@ def deaf(w: World, seconds: float) -> None:
     """The drone hears nothing for a while, and goes on telling how it flies: the link looks alive."""
     w.drone.faults.up = Impairment(loss=1.0)
     asyncio.get_running_loop().call_later(seconds, setattr, w.drone.faults, "up", Impairment())
+
+
+async def home_being_undone(w: World) -> None:
+    """Begin to set the home; whatever replaces that has to wait for 5 s until it is undone."""
+    w.drone.faults.untold = frozenset({rth.CustomLocation.NAME, rth.PreferredHomeType.NAME})
+    w.client.send_command(mav_enums.MAV_CMD_DO_SET_HOME, 0, frame=0, x=48.88, y=2.37, z=0.0)
+    await w.drone.wait_log(lambda e: e.kind == "command" and e.name.startswith("rth.set"), 5.0)

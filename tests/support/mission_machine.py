@@ -52,7 +52,7 @@ GONE, TROUBLE = DroneReport(), DroneReport(is_in_trouble=True)
 
 def loaded() -> MissionMachine:
     machine = MissionMachine()
-    machine.upload(ITEMS, 7, NOW)
+    machine.upload(ITEMS, 7)
     return machine
 
 
@@ -76,7 +76,7 @@ def starting(
 def flying(prepared: Prepared = START, machine: MissionMachine | None = None) -> MissionMachine:
     """The drone flies the first file, or the gateway the first item."""
     machine, attempt = starting(prepared, machine)
-    machine.playing(prepared.uid)
+    machine.playing(prepared.uid, attempt)
     machine.confirmed(attempt)
     return machine
 
@@ -98,16 +98,13 @@ def in_state(state: State) -> MissionMachine:
                 machine.armed("client")
         case State.TAKING_OVER:
             taking_over(machine=machine)
-        case State.STARTING | State.CANCELLING:
-            _, attempt = starting(machine=machine)
-            if state is State.CANCELLING:
-                machine.withdrawn(attempt, None, NOW)
-        case State.FLYING_FILE | State.PAUSED:
+        case State.STARTING:
             starting(machine=machine)
-            machine.playing("a")
+        case State.FLYING_FILE | State.PAUSED:
+            _, attempt = starting(machine=machine)
+            machine.playing("a", attempt)
             if state is State.PAUSED:
-                machine.control_lost(NOW)
-                machine.halted(stopped=False, report=GONE, now=NOW)
+                machine.control_lost()
         case State.FLYING_ITEM:
             flying(TURNS_FIRST, machine)
         case State.ENDING | State.COMPLETE:
@@ -123,13 +120,12 @@ def in_state(state: State) -> MissionMachine:
 def calls(machine: MissionMachine) -> dict[Event, Callable[[], list[Effect]]]:
     """Return a call for each event, as it would usually follow."""
     attempt = machine.phase.attempt or machine.attempt()
-    file = machine.phase.prepared or machine.progress.left or machine.progress
-    uid = machine.phase.uid or file.uid
-    new = machine.phase.attempt is None or machine.state in (State.CANCELLING, State.STARTING, State.FLYING_FILE)
+    known = machine.progress.left or machine.progress
+    new = machine.phase.attempt is None or machine.state in (State.STARTING, State.FLYING_FILE)
     start = machine.attempt(0) if new else attempt
     return {
-        Event.UPLOADED: lambda: machine.upload((*ITEMS, item(16)), 8, NOW),
-        Event.CLEARED: lambda: machine.upload((), 0, NOW),
+        Event.UPLOADED: lambda: machine.upload((*ITEMS, item(16)), 8),
+        Event.CLEARED: lambda: machine.upload((), 0),
         Event.UPLOADED_AGAIN: machine.upload_again,
         Event.CHOSEN: lambda: machine.choose(1),
         Event.ENGAGED: lambda: machine.await_arm("client", NOW),
@@ -137,16 +133,16 @@ def calls(machine: MissionMachine) -> dict[Event, Callable[[], list[Effect]]]:
         Event.PREPARED: lambda: machine.prepared(start, LAST),
         Event.GRANTED: lambda: machine.granted(attempt),
         Event.CONFIRMED: lambda: machine.confirmed(attempt),
-        Event.FAILED: lambda: machine.failed(attempt, FAILURE, NOW),
-        Event.WITHDRAWN: lambda: machine.withdrawn(attempt, None, NOW),
-        Event.PLAYING: lambda: machine.playing(uid),
-        Event.OTHER_PLAYING: lambda: machine.playing("other"),
+        Event.FAILED: lambda: machine.failed(attempt, FAILURE),
+        Event.PLAYING: lambda: machine.playing("a", machine.phase.attempt),
+        Event.RESUMED: lambda: machine.playing(known.uid, None),
+        Event.OTHER_PLAYING: lambda: machine.playing("other", None),
         Event.HALTED: lambda: machine.halted(stopped=True, report=GONE, now=NOW),
         Event.EXECUTED: lambda: machine.executed(machine.progress.line + 1),
         Event.SKIPPED: lambda: machine.skipped(machine.progress.line + 1),
         Event.ITEM_FLOWN: lambda: machine.item_flown(attempt),
         Event.REPORTED: lambda: machine.reported(TROUBLE),
-        Event.CONTROL_LOST: lambda: machine.control_lost(NOW),
+        Event.CONTROL_LOST: machine.control_lost,
         Event.TIMEOUT: lambda: machine.timeout(GONE),
         Event.LINK_DOWN: machine.link_down,
         Event.LINK_UP: lambda: machine.link_up(None, machine.progress.uid, plays=True, in_air=True),
@@ -166,9 +162,9 @@ class RandomFlight:
         if (attempt := begin.phase.attempt) is not None:
             works = {
                 State.PREPARING: Prepare(attempt),
-                State.TAKING_OVER: Acquire(attempt, resumes=False),
-                State.STARTING: StartFile(attempt, "a", -1),
-                State.FLYING_FILE: StartFile(attempt, "a", -1),
+                State.TAKING_OVER: Acquire(attempt, START),
+                State.STARTING: StartFile(attempt, START),
+                State.FLYING_FILE: StartFile(attempt, START),
                 State.FLYING_ITEM: FlyItem(attempt, 3),
             }
             self._works += [works[begin.state]] if begin.state in works else []
@@ -185,15 +181,16 @@ class RandomFlight:
         chance, machine, now = self._chance, self.machine, self.now
         match event:
             case Event.UPLOADED:
-                return machine.upload(ITEMS, 7, now)
+                return machine.upload(ITEMS, 7)
             case Event.CHOSEN:
                 return machine.choose(chance.randrange(6)) if machine.mission.items else []
             case Event.ENGAGED:
                 return machine.await_arm("client", now)
             case Event.ARMED:
                 return machine.armed(chance.choice(["client", "other"]), storing=chance.random() < 0.2)
-            case Event.PLAYING | Event.OTHER_PLAYING:
-                return machine.playing(chance.choice(["a", "b", "other"]))
+            case Event.PLAYING | Event.RESUMED | Event.OTHER_PLAYING:
+                begun = [work.attempt for work in self._works if isinstance(work, StartFile)]
+                return machine.playing(chance.choice(["a", "b", "other"]), chance.choice([None, *begun]))
             case Event.HALTED:
                 report = DroneReport(pilot=chance.random() < 0.1)
                 return machine.halted(stopped=chance.random() < 0.7, report=report, now=now)
@@ -204,27 +201,25 @@ class RandomFlight:
             case Event.REPORTED:
                 return machine.reported(chance.choice(REPORTS), chance.choice([None, GpsLocationChanged]))
             case Event.CONTROL_LOST:
-                return machine.control_lost(now)
+                return machine.control_lost()
             case Event.TIMEOUT:
                 return machine.timeout(chance.choice(REPORTS))
             case Event.LINK_UP:
                 uid, plays = chance.choice(["a", "b", "other", None]), chance.random() < 0.5
                 return machine.link_up(machine.progress.kept, uid, plays=plays, in_air=chance.random() < 0.5)
-            case Event.PREPARED | Event.GRANTED | Event.CONFIRMED | Event.ITEM_FLOWN | Event.FAILED | Event.WITHDRAWN:
+            case Event.PREPARED | Event.GRANTED | Event.CONFIRMED | Event.ITEM_FLOWN | Event.FAILED:
                 return self._result(event)
         return calls(machine)[event]()
 
     def _result(self, event: Event) -> list[Effect]:
         """Report the result of work: mostly of the newest, sometimes of a start that a client has just requested."""
-        chance, machine, now = self._chance, self.machine, self.now
+        chance, machine = self._chance, self.machine
         if not self._works or chance.random() < 0.3:
             attempt = machine.attempt(chance.choice([None, 1]))
             return machine.prepared(attempt, chance.choice(STARTS)) if machine.mission.items else []
         work = self._works.pop(-1 if chance.random() < 0.8 else 0)
         if event is Event.FAILED:
-            return machine.failed(work.attempt, FAILURE, now)
-        if event is Event.WITHDRAWN:
-            return machine.withdrawn(work.attempt, chance.choice([None, FAILURE]), now)
+            return machine.failed(work.attempt, chance.choice([None, FAILURE]))
         match work:
             case Prepare():
                 course = work.attempt.course

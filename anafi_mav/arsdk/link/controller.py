@@ -8,7 +8,7 @@ import logging
 import os
 import socket
 from collections.abc import Callable, Sequence
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.link import handshake, watchdog
@@ -25,6 +25,13 @@ CONTROLLER_NAME = "anafi-mav"
 CONTROLLER_TYPE = "computer"
 
 ParsedT = TypeVar("ParsedT")
+
+CheckDevice: TypeAlias = Callable[[DeviceInfo], None]
+"""Receives the description of a device before the handshake; an `AnafiMavError` that it raises ends the attempt."""
+
+
+def accept_any(device: DeviceInfo) -> None:
+    """Accept each device: the `CheckDevice` of a client that wants no particular one."""
 
 
 class ControllerSession(Session):
@@ -159,6 +166,7 @@ async def connect(
     local_address: str | None = None,
     interface: str | None = None,
     on_message: OnMessage,
+    check_device: CheckDevice = accept_any,
     ping_after: float = 0.5,
     silence_limit: float | None = 2.5,
     fades: bool = False,
@@ -171,7 +179,7 @@ async def connect(
     `on_message` may be called before this returns; `fades`: see `Transport`.
 
     Raises `LinkLost` when nothing answers within `timeout` seconds, `HandshakeRefused` when the drone refuses,
-    `RemoteProtocolError` when what answers is no drone.
+    `RemoteProtocolError` when what answers is no drone, and what `check_device` raises.
     """
     handshake.check_versions(versions)
     opening = _connect(
@@ -182,6 +190,7 @@ async def connect(
         local_address,
         interface,
         on_message,
+        check_device,
         ping_after,
         silence_limit,
         fades,
@@ -204,6 +213,7 @@ async def _connect(
     local_address: str | None,
     interface: str | None,
     on_message: OnMessage,
+    check_device: CheckDevice,
     ping_after: float,
     silence_limit: float | None,
     fades: bool,
@@ -211,6 +221,7 @@ async def _connect(
     reader, writer = await _open(host, discovery_port, local_address, interface)
     try:
         device = await _read(reader, handshake.parse_discovery, f"{host}:{discovery_port}")
+        check_device(device)
         names = writer.get_extra_info("sockname"), writer.get_extra_info("peername")
         if None in names:
             raise LinkLost(f"{host}:{discovery_port} closed the connection")

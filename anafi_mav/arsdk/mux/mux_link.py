@@ -13,7 +13,13 @@ from collections.abc import Callable
 from typing import Any, cast
 
 from anafi_mav.arsdk.link import controller, handshake
-from anafi_mav.arsdk.link.controller import CONTROLLER_NAME, CONTROLLER_TYPE, ControllerSession
+from anafi_mav.arsdk.link.controller import (
+    CONTROLLER_NAME,
+    CONTROLLER_TYPE,
+    CheckDevice,
+    ControllerSession,
+    accept_any,
+)
 from anafi_mav.arsdk.link.device import MAX_CONNECTIONS, DeviceSession, Mutable, OnSession
 from anafi_mav.arsdk.link.handshake import ConnectRequest, DeviceInfo
 from anafi_mav.arsdk.link.interface import open_connection
@@ -192,6 +198,7 @@ async def connect(
     local_address: str | None = None,
     interface: str | None = None,
     on_message: OnMessage,
+    check_device: CheckDevice = accept_any,
     ping_after: float = 0.5,
     silence_limit: float | None = 2.5,
     fades: bool = False,
@@ -207,6 +214,7 @@ async def connect(
     try:
         stream = MuxStream(reader, writer)
         device = await _introduced(stream, port)
+        check_device(device)
         request = json.dumps({"proto_v_min": versions[0], "proto_v_max": versions[1]})
         texts = (CONTROLLER_NAME, CONTROLLER_TYPE, device.serial, request)
         stream.write(mux.BACKEND, mux.encode_pomp(mux.CONN_REQ, [("%s", text) for text in texts]))
@@ -279,6 +287,7 @@ async def connect_either(
     local_address: str | None = None,
     interface: str | None = None,
     on_message: OnMessage,
+    check_device: CheckDevice = accept_any,
     fades: bool = False,
     timeout: float = 3.0,
     **options: Any,
@@ -293,6 +302,7 @@ async def connect_either(
             local_address=local_address,
             interface=interface,
             on_message=on_message,
+            check_device=check_device,
             fades=fades,
             timeout=timeout,
             **options,
@@ -302,7 +312,13 @@ async def connect_either(
             raise
         refused = error
     attempt = connect(
-        host, port=mux_port, local_address=local_address, interface=interface, on_message=on_message, fades=fades
+        host,
+        port=mux_port,
+        local_address=local_address,
+        interface=interface,
+        on_message=on_message,
+        check_device=check_device,
+        fades=fades,
     )
     try:
         return await asyncio.wait_for(attempt, timeout)

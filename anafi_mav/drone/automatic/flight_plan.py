@@ -6,7 +6,6 @@ drone says which by what it reports (feature flight_plan).
 
 from __future__ import annotations
 
-import asyncio
 import re
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
@@ -22,7 +21,7 @@ from anafi_mav.arsdk.messages.flight_plan import Indicator, SupportedCapabilitie
 from anafi_mav.drone.element import Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
 from anafi_mav.drone.rest import Rest
-from anafi_mav.drone.sent_commands import PLAN_MEMORY, STOP_REPORT, Phase, SentCommand, Slot
+from anafi_mav.drone.sent_commands import PLAN_MEMORY, Phase, SentCommand, Slot
 from anafi_mav.drone.settings import Commanding
 from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported, RemoteProtocolError
@@ -141,9 +140,23 @@ class FlightPlan(Commanding[FlightPlanState]):
             self._commander.send_stop_if_connected(common.Stop())
 
     @property
+    def flown(self) -> SentCommand | str | None:
+        """The plan that plays, as our start of it, or as the id of another controller's plan.
+
+        None: no plan plays.
+        """
+        sent = self._commander.sent.in_effect(Slot.PLAN)
+        return sent or (self.state.uid if self.state.playing == PlayingState.PLAYING else None)
+
+    @property
     def plays_withdrawn(self) -> bool:
         """True when the drone has reported that it plays a plan whose start was withdrawn."""
-        return self._commander.sent.withdrawn_in_effect(Slot.PLAN) is not None
+        sent = self._commander.sent.in_effect(Slot.PLAN)
+        return sent is not None and sent.phase is Phase.WITHDRAWN
+
+    def is_undecided(self, uid: str) -> bool:
+        """Return True when an earlier start of this plan may still begin; `start` refuses it then."""
+        return self._commander.sent.is_undecided(uid, loop_time())
 
     @property
     def version(self) -> int:
@@ -213,23 +226,26 @@ class FlightPlan(Commanding[FlightPlanState]):
         *,
         continue_on_disconnect: bool | None = None,
         timeout: float = START_TIMEOUT,
+        cause: object = None,
     ) -> None:
         """Fly an uploaded plan, or resume the paused one; returns when it plays.
 
         `item` (from 0) is where it begins, `continue_on_disconnect` flies on without a link: Ai only. Raises
         `CommandRejected` with what the drone lacks, `CommandTimeout`. A start that times out or is cancelled is
-        withdrawn, also when the drone begins the plan only then.
+        withdrawn, also when the drone begins the plan only then. Until that is decided (20 s at most) another start of
+        the same plan raises `CommandRejected`: the drone's report names the plan alone, so it could confirm the wrong
+        one. The same file uploaded again is another plan. `cause`: see `flown`.
         """
         self._available()
         command = self._start(uid, item, type, continue_on_disconnect)
-        sent = SentCommand(Slot.PLAN, uid, common.Stop(), plan_before=self.state.uid)
+        if self.is_undecided(uid):
+            raise CommandRejected("an earlier start may still begin")
+        sent = SentCommand(Slot.PLAN, uid, common.Stop(), plan_before=self.state.uid, cause=cause)
         begun = loop_time()
 
         def judge(message: Any) -> bool | AnafiMavError | None:
             if sent.phase is Phase.REFUSED:
                 return CommandRejected(self._why())
-            if sent.awaited and (older := self._commander.sent.withdrawn_in_effect(Slot.PLAN)) is not None:
-                self._confirm_later(sent, older)
             if sent.awaited and isinstance(message, common.StartingErrorEvent):
                 seconds = max(0.0, min(begun + timeout - loop_time(), DOUBT_TIMEOUT))
                 sent.answer.expire_after(seconds, CommandTimeout(command.NAME, seconds))
@@ -242,20 +258,6 @@ class FlightPlan(Commanding[FlightPlanState]):
             if self.state.unavailable:
                 raise CommandRejected(self._why()) from None
             raise
-
-    def _confirm_later(self, sent: SentCommand, older: SentCommand) -> None:
-        """Let a start wait for the end of an older, withdrawn one, to which PLAYING was attributed.
-
-        Without that end the drone never flew the older one, and the plan that plays is the newer's.
-        """
-
-        def decide() -> None:
-            if sent.phase is Phase.QUEUED:
-                self._confirm_later(sent, older)
-            elif self._commander.sent.confirm_despite(older, sent):
-                sent.answer.succeed(True)
-
-        asyncio.get_running_loop().call_later(STOP_REPORT, decide)
 
     def _start(self, uid: str, item: int, type: MavlinkType | None, goes_on: bool | None) -> Message:
         kind = type

@@ -13,6 +13,7 @@ from collections.abc import Callable, Coroutine, Hashable, Mapping
 from dataclasses import replace
 from typing import Any
 
+from anafi_mav import texts
 from anafi_mav.clock import Alarm
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported
 from anafi_mav.mavlink import dialect
@@ -139,13 +140,16 @@ class CommandService(Service):
         self._history.forget_clients(lambda client: channel_of(client) is channel)
 
     def link_down(self) -> None:
-        """Send FAILED to each client that waits for an acknowledgement.
+        """Send FAILED and a text to each client that waits for an acknowledgement.
 
-        The tasks end with the host's.
+        The tasks end with the host's. They wait for something else than the drone, whose loss has ended the others: a
+        start of a mission that is being stored waits for the disk.
         """
         for running in tuple(self._running.values()):
-            if running.answer is not None:
-                self._finish(*running.answer, dialect.MAV_RESULT_FAILED)
+            if running.answer is not None and running.answer[1].result == dialect.MAV_RESULT_IN_PROGRESS:
+                inbound, execution = running.answer
+                self.host.text(Severity.WARNING, texts.COMMAND_WITHOUT_DRONE, inbound.channel)
+                self._finish(inbound, execution, dialect.MAV_RESULT_FAILED, texts.COMMAND_WITHOUT_DRONE)
         self._history.forget()
         self.host.payload_history.forget()
 

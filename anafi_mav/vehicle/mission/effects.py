@@ -69,16 +69,15 @@ class Acquire:
     """Acquire control and hover; then `granted`."""
 
     attempt: MissionAttempt
-    resumes: bool
+    prepared: Prepared
 
 
 @dataclass(frozen=True)
 class StartFile:
-    """Command the drone to fly a file; then `confirmed`."""
+    """Command the drone to fly a file; then `playing` and `confirmed`."""
 
     attempt: MissionAttempt
-    uid: str
-    line: int
+    prepared: Prepared
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,8 @@ class FilesOnDrone:
         middle of the newest file, when the leg is the end of that file. The other models, and legs before which a
         setting was changed that still holds, get a file of their own. `mission` is the very object that the leg is
         of: the file of another mission has the same lines for other items, so it is never continued in its middle.
+
+        A file of which a start may still begin is uploaded again: the drone's reports name the file alone.
         """
         if self._newest is not None and self._plan.starts_anywhere:
             whole, name, of = self._newest
@@ -53,7 +55,7 @@ class FilesOnDrone:
             await self._plan.get(name)
         except CommandRejected:
             return False
-        return True
+        return not self._plan.is_undecided(name)  # a start may have been withdrawn meanwhile
 
 
 def _ends_with(whole: FlightPlanFile, line: int, leg: FlightPlanFile) -> bool:

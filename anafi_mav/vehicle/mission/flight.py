@@ -16,7 +16,8 @@ from anafi_mav import texts
 from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import events
 from anafi_mav.drone.events import AlertState, FlyingState, ForcedLandingReason, Message, PlayError, PlayingState
-from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost
+from anafi_mav.drone.sent_commands import SentCommand
+from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import FlightPlanFile
 from anafi_mav.vehicle.base.aircraft import Aircraft
@@ -89,6 +90,8 @@ class MissionFlight(PlainTask):
         self._outlet: MissionOutlet | None = None
         self._background: asyncio.Task[None] | None = None
         """Runs the machine's work when no command of a client does."""
+        self._flown: SentCommand | str | None = None
+        """The flight of a plan that the drone reported last: reports are repeated."""
 
     def attach(self, outlet: MissionOutlet) -> None:
         """Report to clients and memory from now on."""
@@ -104,7 +107,7 @@ class MissionFlight(PlainTask):
     def take(self, items: Sequence[Item], identity: int) -> None:
         """Fly another mission from now on, or (no items) none. One that is flown is stopped."""
         if identity != self.machine.mission.identity:
-            self._handle(self.machine.upload(items, identity, self._now))
+            self._handle(self.machine.upload(items, identity))
 
     def taken_again(self) -> None:
         """The same mission was uploaded once more: a flight continues, else it is a new mission."""
@@ -272,15 +275,12 @@ class MissionFlight(PlainTask):
             attempt = work.attempt
             try:
                 effects = await self._result_of(work, by)
-            except CommandTimeout as error:
-                self._handle(self.machine.withdrawn(attempt, _failure(error), self._now))
-                raise
             except AnafiMavError as error:
-                self._handle(self.machine.failed(attempt, _failure(error), self._now))
+                self._handle(self.machine.failed(attempt, _failure(error)))
                 self._require_same(attempt)
                 raise
             except BaseException:
-                self._handle(self.machine.withdrawn(attempt, None, self._now))
+                self._handle(self.machine.failed(attempt, None))
                 raise
             work = self._perform(effects)
             if isinstance(work, FlyItem):
@@ -297,10 +297,10 @@ class MissionFlight(PlainTask):
                 held = machine.holds(attempt)  # not if a new mission was stored meanwhile, which has its own attempt
                 effects = machine.prepared(attempt, await self._prepare(attempt)) if held else []
             case Acquire():
-                effects = await self._acquire(attempt, by, resumes=work.resumes)
+                effects = await self._acquire(work, by)
             case StartFile():
-                await self._start(work.uid, work.line)
-                return machine.confirmed(attempt, self._vehicle.drone.flight_plan.state.item)
+                await self._start(work)
+                return machine.confirmed(attempt)
             case FlyItem():
                 await fly_step(self._vehicle, attempt.mission.items[work.item])
                 return machine.item_flown(attempt)
@@ -340,9 +340,10 @@ class MissionFlight(PlainTask):
         paused = plan.playing == PlayingState.PAUSED and plan.uid == progress.uid
         whole = progress.leg is not None and progress.course.later is None
         same = machine.rest is State.PAUSED and attempt.item == progress.current and attempt.jumps == progress.jumps
-        return same and whole and paused and self._vehicle.in_air
+        decided = not self._vehicle.drone.flight_plan.is_undecided(progress.uid)
+        return same and whole and paused and decided and self._vehicle.in_air
 
-    async def _acquire(self, attempt: MissionAttempt, by: Right | None, *, resumes: bool) -> list[Effect]:
+    async def _acquire(self, work: Acquire, by: Right | None) -> list[Effect]:
         """Acquire control, and hover; return the effects of the grant.
 
         Without a client the mission has control since its mode was chosen. A mission that was replaced meanwhile
@@ -352,32 +353,35 @@ class MissionFlight(PlainTask):
         if by is None and control.active is not self:
             raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
         async with contextlib.nullcontext() if by is None else control.acquire(self, by=by):
-            await self._stop(resumes=resumes)
+            await self._stop(work.prepared)
             if by is None and control.active is not self:
                 raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
-            if not (effects := self.machine.granted(attempt)):
-                self._require_same(attempt)
+            if not (effects := self.machine.granted(work.attempt)):
+                self._require_same(work.attempt)
                 raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
         return effects
 
-    async def _stop(self, *, resumes: bool) -> None:
+    async def _stop(self, prepared: Prepared) -> None:
         """End the moves, a commanded return and another plan; check the drone again."""
         vehicle, plan = self._vehicle, self._vehicle.drone.flight_plan
         if vehicle.in_air:
             await vehicle.drone.piloting.stop()
             await vehicle.drone.piloting.cancel_return_home()
-        if not resumes and plan.state.playing not in (None, PlayingState.STOPPED):
+        if not prepared.resumes and plan.state.playing not in (None, PlayingState.STOPPED):
             await plan.stop()
+        if prepared.resumes and plan.state.playing != PlayingState.PAUSED:  # it would begin the file again
+            raise Refused(texts.MISSION, texts.MISSION_STOPPED)
         self._require_freedom()
         if not vehicle.armed:
             raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
 
-    async def _start(self, uid: str, line: int) -> None:
+    async def _start(self, work: StartFile) -> None:
         """Command the drone to fly a file, or to resume it; returns when it does."""
         plan = self._vehicle.drone.flight_plan
         goes_on = plan.state.returns_on_disconnect is False if plan.starts_anywhere else None
+        uid, line = work.prepared.uid, work.prepared.line + 1 if plan.starts_anywhere else 0
         try:
-            await plan.start(uid, line + 1 if plan.starts_anywhere else 0, continue_on_disconnect=goes_on)
+            await plan.start(uid, line, continue_on_disconnect=goes_on, cause=work.attempt)
         except CommandRejected as error:
             raise DroneRefused(refusal(plan.state, error)) from error
 
@@ -410,23 +414,15 @@ class MissionFlight(PlainTask):
         }
 
     def _on_playing(self, message: events.MavlinkFilePlayingStateChanged, now: float) -> None:
+        plan, before = self._vehicle.drone.flight_plan, self._flown
+        flown = self._flown = plan.flown
         match message.state:
-            case PlayingState.PLAYING:
-                withdrawn = self._vehicle.drone.flight_plan.plays_withdrawn
-                self._handle(self.machine.playing(message.filepath, is_withdrawn=withdrawn))
-                self._require_control()
-            case PlayingState.PAUSED | PlayingState.STOPPED:
+            case PlayingState.PLAYING if flown != before and not plan.plays_withdrawn:
+                attempt = flown.cause if isinstance(flown, SentCommand) else None
+                self._handle(self.machine.playing(message.filepath, attempt))
+            case PlayingState.PAUSED | PlayingState.STOPPED if flown is None:
                 stopped = message.state == PlayingState.STOPPED
                 self._handle(self.machine.halted(stopped=stopped, report=self._report(), now=self._now))
-
-    def _require_control(self) -> None:
-        """Suspend a mission that the drone begins while another task, or none, is active."""
-        if self._vehicle.control.active is self:
-            return
-        if self.machine.flying:
-            self._perform(self.machine.control_lost(self._now))
-        elif self.machine.has_withdrawn_start:
-            self._suspend(starting=True)
 
     def _on_position(self, message: Message, now: float) -> None:
         if self.machine.state is State.ENDING:
@@ -461,7 +457,7 @@ class MissionFlight(PlainTask):
     def end(self) -> list[asyncio.Task[None]]:
         """Another flight task is active now: the mission is paused."""
         ended = self._cancel_background()
-        if effects := self.machine.control_lost(self._now):
+        if effects := self.machine.control_lost():
             self._perform(effects)
         return ended
 
@@ -474,7 +470,7 @@ class MissionFlight(PlainTask):
 
     def link_up(self, record: MissionRecord | None) -> None:
         """The drone is connected again, or to a new gateway: look if it flies our mission."""
-        plan = self._vehicle.drone.flight_plan.state
+        plan, self._flown = self._vehicle.drone.flight_plan.state, self._vehicle.drone.flight_plan.flown
         plays, in_air = plan.playing == PlayingState.PLAYING, self._vehicle.in_air
         self._handle(self.machine.link_up(record, plan.uid, plays=plays, in_air=in_air))
 

@@ -4,10 +4,10 @@ Everything that changes the flight of a mission is an event here: clients' reque
 of what `MissionFlight`, the shell, does for the machine, and time. Each event method returns the effects that the
 shell has to perform, in their order. `TRANSITIONS` is the law: an event that a state has no row for changes nothing.
 
-A start is an `MissionAttempt`, a value that is compared by identity. What becomes of it (prepared, granted, confirmed,
-failed) is reported with the attempt, and counts only while that attempt is the machine's: what an older attempt still
-reports changes nothing. A start that is withdrawn leaves the state CANCELLING, in which a late report that the drone
-plays that file belongs to the withdrawn start, and to no other controller.
+A start is an `MissionAttempt`, a value that is compared by identity. What becomes of it (prepared, granted, playing,
+confirmed, failed) is reported with the attempt, and counts only while that attempt is the machine's: what an older
+attempt still reports changes nothing. What another controller starts has no attempt: ARSDK reports the name of the file
+alone, so the mission's own file is recognised by that.
 
 In the states of a start, `MissionPhase.rest` is the state of the mission meanwhile, and after the start has failed.
 """
@@ -22,7 +22,6 @@ from dataclasses import dataclass, replace
 from typing import Concatenate, ParamSpec, TypeAlias
 
 from anafi_mav import geo, mav_enums, texts
-from anafi_mav.drone.automatic.flight_plan import START_TIMEOUT
 from anafi_mav.drone.events import AltitudeChanged, GpsLocationChanged, Message
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import FlightPlanFile, GatewayStep
@@ -82,7 +81,6 @@ class State(enum.Enum):
     PREPARING = "that client has armed, and the files are translated and uploaded"
     TAKING_OVER = "the files are on the drone, and control is acquired"
     STARTING = "the drone is commanded to fly a file, and has not confirmed it"
-    CANCELLING = "a start or a flight is withdrawn, and the drone has not confirmed that"
     FLYING_FILE = "the drone flies a file"
     FLYING_ITEM = "the gateway flies an item, or loads the next file"
     ENDING = "the drone has stopped its file without a report of the last line"
@@ -100,9 +98,9 @@ class Event(enum.Enum):
     PREPARED = "the files of a start are on the drone"
     GRANTED = "control is acquired"
     CONFIRMED = "the command that starts the file is confirmed"
-    FAILED = "a start or an item fails"
-    WITHDRAWN = "a start or an item is cancelled, or its confirmation is overdue"
-    PLAYING = "the drone reports that it flies this file"
+    FAILED = "a start or an item fails, is cancelled, or is not confirmed in time"
+    PLAYING = "the drone reports that it flies the file of this start"
+    RESUMED = "the drone reports that another controller lets it fly the mission's file"
     OTHER_PLAYING = "the drone reports that it flies another plan"
     HALTED = "the drone reports its plan as paused or stopped"
     EXECUTED = "the drone reports an executed line"
@@ -135,7 +133,7 @@ TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
         E.CHOSEN: (S.READY,),
         E.ENGAGED: (S.AWAIT_ARM,),
         E.PREPARED: (S.TAKING_OVER,),
-        E.PLAYING: (S.FLYING_FILE,),
+        E.RESUMED: (S.FLYING_FILE,),
         E.OTHER_PLAYING: (S.READY,),
         E.LINK_DOWN: (S.READY,),
         E.LINK_UP: (S.READY, S.FLYING_FILE, S.PAUSED, S.COMPLETE),
@@ -148,7 +146,7 @@ TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
         E.ENGAGED: (S.AWAIT_ARM,),
         E.ARMED: (S.PREPARING,),
         E.PREPARED: (S.TAKING_OVER,),
-        E.PLAYING: (S.FLYING_FILE,),
+        E.RESUMED: (S.FLYING_FILE,),
         E.OTHER_PLAYING: (S.AWAIT_ARM,),
         E.CONTROL_LOST: _REST,
         E.TIMEOUT: _REST,
@@ -160,60 +158,41 @@ TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
         E.UPLOADED_AGAIN: (S.PREPARING,),
         E.PREPARED: (S.TAKING_OVER,),
         E.FAILED: _REST,
-        E.WITHDRAWN: _REST,
         E.OTHER_PLAYING: (S.PREPARING,),
         E.CONTROL_LOST: _REST,
         E.LINK_DOWN: _REST,
     },
     S.TAKING_OVER: {
-        E.UPLOADED: (S.READY, S.CANCELLING),
-        E.CLEARED: (S.NO_MISSION, S.CANCELLING),
+        E.UPLOADED: (S.READY,),
+        E.CLEARED: (S.NO_MISSION,),
         E.UPLOADED_AGAIN: (S.TAKING_OVER,),
         E.PREPARED: (S.TAKING_OVER,),
         E.GRANTED: (S.STARTING, S.FLYING_ITEM),
-        E.FAILED: (*_REST, S.CANCELLING),
-        E.WITHDRAWN: (*_REST, S.CANCELLING),
-        E.PLAYING: (S.TAKING_OVER,),
-        E.HALTED: (S.TAKING_OVER,),
+        E.FAILED: _REST,
         E.LINK_DOWN: _REST,
     },
     S.STARTING: {
-        E.UPLOADED: (S.CANCELLING,),
-        E.CLEARED: (S.CANCELLING,),
+        E.UPLOADED: (S.READY,),
+        E.CLEARED: (S.NO_MISSION,),
         E.UPLOADED_AGAIN: (S.STARTING,),
         E.PREPARED: (S.TAKING_OVER,),
-        E.CONFIRMED: (S.FLYING_FILE,),
         E.FAILED: _REST,
-        E.WITHDRAWN: (S.CANCELLING,),
         E.PLAYING: (S.FLYING_FILE,),
-        E.CONTROL_LOST: (S.CANCELLING,),
+        E.CONTROL_LOST: _REST,
         E.LINK_DOWN: _REST,
     },
-    S.CANCELLING: {
-        E.UPLOADED: (S.CANCELLING,),
-        E.CLEARED: (S.CANCELLING,),
-        E.UPLOADED_AGAIN: (S.CANCELLING,),
-        E.CHOSEN: (S.CANCELLING,),
-        E.ENGAGED: (S.AWAIT_ARM,),
-        E.PREPARED: (S.TAKING_OVER,),
-        E.PLAYING: (S.CANCELLING,),
-        E.OTHER_PLAYING: (S.CANCELLING,),
-        E.HALTED: (S.CANCELLING, *_ANY_REST),
-        E.TIMEOUT: _ANY_REST,
-        E.LINK_DOWN: _ANY_REST,
-    },
     S.FLYING_FILE: {
-        E.UPLOADED: (S.CANCELLING,),
-        E.CLEARED: (S.CANCELLING,),
+        E.UPLOADED: (S.READY,),
+        E.CLEARED: (S.NO_MISSION,),
         E.UPLOADED_AGAIN: (S.FLYING_FILE,),
         E.PREPARED: (S.TAKING_OVER,),
         E.CONFIRMED: (S.FLYING_FILE,),
-        E.WITHDRAWN: (S.CANCELLING,),
+        E.FAILED: (S.PAUSED,),
         E.OTHER_PLAYING: (S.PAUSED,),
         E.HALTED: (*_NEXT, S.ENDING),
         E.EXECUTED: (S.FLYING_FILE,),
         E.SKIPPED: (S.FLYING_FILE,),
-        E.CONTROL_LOST: (S.CANCELLING,),
+        E.CONTROL_LOST: (S.PAUSED,),
         E.LINK_DOWN: (S.PAUSED,),
     },
     S.FLYING_ITEM: {
@@ -222,7 +201,6 @@ TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
         E.UPLOADED_AGAIN: (S.FLYING_ITEM,),
         E.PREPARED: (S.STARTING, S.FLYING_ITEM, S.TAKING_OVER),
         E.FAILED: (S.PAUSED,),
-        E.WITHDRAWN: (S.PAUSED,),
         E.OTHER_PLAYING: (S.PAUSED,),
         E.ITEM_FLOWN: (S.FLYING_ITEM, S.COMPLETE),
         E.CONTROL_LOST: (S.PAUSED,),
@@ -233,7 +211,7 @@ TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
         E.CLEARED: (S.NO_MISSION,),
         E.UPLOADED_AGAIN: (S.ENDING,),
         E.PREPARED: (S.TAKING_OVER,),
-        E.PLAYING: (S.FLYING_FILE,),
+        E.RESUMED: (S.FLYING_FILE,),
         E.OTHER_PLAYING: (S.PAUSED,),
         E.EXECUTED: (S.ENDING, *_NEXT),
         E.SKIPPED: (S.ENDING,),
@@ -249,7 +227,7 @@ TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
         E.CHOSEN: (S.PAUSED,),
         E.ENGAGED: (S.AWAIT_ARM,),
         E.PREPARED: (S.TAKING_OVER,),
-        E.PLAYING: (S.FLYING_FILE,),
+        E.RESUMED: (S.FLYING_FILE,),
         E.OTHER_PLAYING: (S.PAUSED,),
         E.EXECUTED: (S.PAUSED, S.COMPLETE),
         E.LINK_DOWN: (S.PAUSED,),
@@ -287,7 +265,7 @@ class MissionPhase:
     rest: State
     """What the mission is during a start, and when it fails; in the other states the state itself."""
     attempt: MissionAttempt | None = None
-    """The start or continuation under way; in CANCELLING the withdrawn one, None: a flight."""
+    """The start or continuation under way."""
     prepared: Prepared | None = None
     client: Hashable = None
     """AWAIT_ARM: who has to arm."""
@@ -297,12 +275,6 @@ class MissionPhase:
     """The start has interrupted the flight of the mission."""
     again: bool = False
     """The same mission was uploaded during the start: if it fails, nothing of that mission has been flown."""
-    uid: str = ""
-    """The file that the drone must not fly any longer, until it has confirmed that."""
-    is_start_withdrawn: bool = False
-    """The start of that file is withdrawn, and the drone may still begin it; False: its flight is ended."""
-    played: bool = False
-    """The drone has reported that it flies that file, and not yet that it does not."""
     target: WayPoint | None = None
     """ENDING: the last way point; None when the plan's last line lands or returns."""
     missing: frozenset[type[Message]] = frozenset()
@@ -392,12 +364,7 @@ class MissionMachine:
     @property
     def is_paused(self) -> bool:
         """Paused, and no start is under way."""
-        return self.rest is S.PAUSED and self.state in (S.PAUSED, S.CANCELLING)
-
-    @property
-    def has_withdrawn_start(self) -> bool:
-        """The drone may still report that it flies a file whose start is withdrawn."""
-        return self.phase.is_start_withdrawn and self.state in (S.CANCELLING, S.TAKING_OVER)
+        return self.state is S.PAUSED
 
     @property
     def needs_gimbal(self) -> bool:
@@ -421,28 +388,25 @@ class MissionMachine:
 
     # Requests of clients.
 
-    def upload(self, items: Sequence[Item], identity: int, now: float) -> list[Effect]:
+    def upload(self, items: Sequence[Item], identity: int) -> list[Effect]:
         """Another mission was uploaded, or the mission was deleted. One that is flown is stopped."""
         mission = Mission(items, identity)
-        return self._uploaded(mission, now) if mission.items else self._cleared(mission, now)
+        return self._uploaded(mission) if mission.items else self._cleared(mission)
 
     @_on(E.UPLOADED)
-    def _uploaded(self, mission: Mission, now: float) -> _Steps:
-        yield from self._replace(mission, S.READY, texts.MISSION_REPLACED, now)
+    def _uploaded(self, mission: Mission) -> _Steps:
+        yield from self._replace(mission, S.READY, texts.MISSION_REPLACED)
 
     @_on(E.CLEARED)
-    def _cleared(self, mission: Mission, now: float) -> _Steps:
-        yield from self._replace(mission, S.NO_MISSION, texts.MISSION_CLEARED, now)
+    def _cleared(self, mission: Mission) -> _Steps:
+        yield from self._replace(mission, S.NO_MISSION, texts.MISSION_CLEARED)
 
-    def _replace(self, mission: Mission, rest: State, why: OperatorText, now: float) -> _Steps:
-        phase, flew, unconfirmed, paused = self.phase, self.flying, self._unconfirmed(now), self._paused_text(why)
+    def _replace(self, mission: Mission, rest: State, why: OperatorText) -> _Steps:
+        phase, flew, paused = self.phase, self.flying, self._paused_text(why)
         known = self.mission.identity != 0  # else it has just been read, and the stored record has not been looked at
         self.mission, self.progress = mission, MissionProgress()
         if known:
             yield Persist(None)
-        if phase.state is S.CANCELLING:
-            self.phase = replace(phase, rest=rest)
-            return
         attempt = phase.attempt
         if phase.state is S.PREPARING and attempt is not None and attempt.awaits_upload and mission.items:
             attempt = replace(self.attempt(), unattended=True)
@@ -453,7 +417,7 @@ class MissionMachine:
             yield paused
         elif attempt is not None and attempt.unattended:
             yield SendText(Severity.WARNING, texts.MISSION_NOT_STARTED.fill(reason=why))
-        self._be(rest, unconfirmed)
+        self._be(rest)
         if flew or phase.state is S.STARTING:
             yield Suspend(starting=phase.state is S.STARTING)
         if phase.state not in _ANY_REST:
@@ -466,7 +430,7 @@ class MissionMachine:
         Otherwise it is a new mission, of which nothing has been flown.
         """
         phase = self.phase
-        if phase.state is S.CANCELLING or not (self.flying or phase.attempt is not None):
+        if not (self.flying or phase.attempt is not None):
             if self.mission.items:
                 self._renew()
                 self._rest_at(S.READY)
@@ -512,9 +476,8 @@ class MissionMachine:
 
     def holds(self, attempt: MissionAttempt) -> bool:
         """True while what becomes of this attempt counts."""
-        if self.phase.attempt is attempt:
-            return self.state is not S.CANCELLING
-        return attempt.course is None and not attempt.unattended and attempt.mission is self.mission
+        asked = attempt.course is None and not attempt.unattended and attempt.mission is self.mission
+        return asked or self.phase.attempt is attempt
 
     def prepared(self, attempt: MissionAttempt, prepared: Prepared) -> list[Effect]:
         """The parts of an attempt are laid out, and its first file is on the drone."""
@@ -528,18 +491,15 @@ class MissionMachine:
             return
         if self.flying or phase.state is S.STARTING:
             yield Suspend(starting=phase.state is S.STARTING)
-        ended = self._unconfirmed(math.inf) or MissionPhase(S.CANCELLING, self.rest)
-        self.phase = replace(
-            ended,
-            state=S.TAKING_OVER,
-            rest=S.PAUSED if self.flying else self.rest,
-            attempt=attempt,
-            prepared=prepared,
+        self.phase = MissionPhase(
+            S.TAKING_OVER,
+            S.PAUSED if self.flying else self.rest,
+            attempt,
+            prepared,
             interrupts=self.flying or phase.interrupts,
             again=phase.again and phase.attempt is attempt,
-            until=math.inf,
         )
-        yield Acquire(attempt, prepared.resumes)
+        yield Acquire(attempt, prepared)
 
     def granted(self, attempt: MissionAttempt) -> list[Effect]:
         """Control is acquired, and the drone hovers or stands."""
@@ -558,7 +518,7 @@ class MissionMachine:
         head = prepared.course.parts[0]
         if isinstance(head, FlightPlanFile):
             self.phase = replace(self.phase, state=S.STARTING, attempt=attempt, prepared=prepared)
-            yield StartFile(attempt, prepared.uid, prepared.line)
+            yield StartFile(attempt, prepared)
             return
         self.progress = replace(self.progress.at_item(head.item), course=prepared.course, jumps=attempt.jumps)
         self.phase = MissionPhase(S.FLYING_ITEM, S.FLYING_ITEM, attempt)
@@ -566,64 +526,36 @@ class MissionMachine:
             yield Announce(head.item, resumes=False, stepped=True)
         yield FlyItem(attempt, head.item)
 
-    def confirmed(self, attempt: MissionAttempt, line: int | None = None) -> list[Effect]:
-        """The command that starts the file was confirmed.
-
-        `line` is the one that the drone executed last. It counts when PLAYING was attributed to an older start until
-        now, and the lines executed since were, too.
-        """
-        return self._confirmed(attempt, line) if self.phase.attempt is attempt else []
+    def confirmed(self, attempt: MissionAttempt) -> list[Effect]:
+        """The command that starts the file was confirmed, after `playing`."""
+        return self._confirmed(attempt) if self.phase.attempt is attempt else []
 
     @_on(E.CONFIRMED)
-    def _confirmed(self, attempt: MissionAttempt, line: int | None) -> _Steps:
-        is_first_report = self.state is S.STARTING
-        self._begin_file()
+    def _confirmed(self, attempt: MissionAttempt) -> _Steps:
         prepared = self.phase.prepared
         self._be(S.FLYING_FILE)
-        if is_first_report and line is not None:
-            yield from self._execute(line)
         if attempt.course is None and prepared is not None:
             yield Announce(_head_item(prepared), prepared.resumes, prepared.course.stepped)
 
-    def _begin_file(self) -> None:
-        """Note that the drone flies the file of the start."""
-        attempt, prepared = self.phase.attempt, self.phase.prepared
-        if self.state is S.STARTING and attempt is not None and prepared is not None:
-            leg = prepared.course.parts[0]
-            assert isinstance(leg, FlightPlanFile), "STARTING begins a file"
-            jumps = self.progress.jumps if prepared.resumes else attempt.jumps
-            progress = self.progress.in_file(prepared.uid, leg, prepared.line)
-            self.progress = replace(progress, course=prepared.course, jumps=jumps)
-            self.phase = MissionPhase(S.FLYING_FILE, S.FLYING_FILE, attempt, prepared)
+    def failed(self, attempt: MissionAttempt, failure: Failure | None) -> list[Effect]:
+        """The work of an attempt has failed, or was cancelled (None).
 
-    def failed(self, attempt: MissionAttempt, failure: Failure, now: float) -> list[Effect]:
-        """The work of an attempt has failed, and nothing of it will begin."""
-        return self._failed(failure, now) if self.phase.attempt is attempt else []
+        `drone` stops what the drone begins of it late.
+        """
+        return self._failed(failure) if self.phase.attempt is attempt else []
 
     @_on(E.FAILED)
-    def _failed(self, failure: Failure, now: float) -> _Steps:
-        yield from self._end(failure, None if self.state is S.STARTING else self._unconfirmed(now))
+    def _failed(self, failure: Failure | None) -> _Steps:
+        yield from self._end(failure)
         yield Release()
 
-    def withdrawn(self, attempt: MissionAttempt, failure: Failure | None, now: float) -> list[Effect]:
-        """The work of an attempt was cancelled (None), or not confirmed in time.
-
-        The drone may begin it late.
-        """
-        return self._withdrawn(failure, now) if self.phase.attempt is attempt else []
-
-    @_on(E.WITHDRAWN)
-    def _withdrawn(self, failure: Failure | None, now: float) -> _Steps:
-        yield from self._end(failure, self._unconfirmed(now))
-        yield Release()
-
-    def _end(self, failure: Failure | None, unconfirmed: MissionPhase | None) -> _Steps:
+    def _end(self, failure: Failure | None = None) -> _Steps:
         """End a start, a flight or a wait: a flown mission is paused, another is as before."""
         phase, rest, flew = self.phase, self.rest, self.flying
         if phase.again and not flew:
             self._renew()
             rest = S.READY
-        self._be(S.PAUSED if flew else rest, unconfirmed)
+        self._be(S.PAUSED if flew else rest)
         if failure is not None and phase.attempt is not None and phase.attempt.unattended:
             yield SendText(Severity.ERROR, failure.text)
         if flew or phase.interrupts:
@@ -644,40 +576,35 @@ class MissionMachine:
 
     # Reports of the drone.
 
-    def playing(self, uid: str, *, is_withdrawn: bool = False) -> list[Effect]:
-        """The drone reports that it flies the plan of this name.
+    def playing(self, uid: str, attempt: MissionAttempt | None) -> list[Effect]:
+        """The drone has begun to fly the plan of this name.
 
-        `is_withdrawn`: by a start that was withdrawn. Only a state that waits for the end of that file reacts.
+        `attempt` has started it; None: another controller.
         """
-        phase, known = self.phase, self._paused_file()
-        if is_withdrawn and not (phase.state in (S.CANCELLING, S.TAKING_OVER) and uid == phase.uid):
-            return []
-        if phase.state in (S.CANCELLING, S.TAKING_OVER):
-            own = uid == phase.uid
-        elif phase.state is S.STARTING:
-            own = phase.prepared is not None and uid == phase.prepared.uid
-        elif self.flying:
-            own = uid == self.progress.uid
-        else:
-            own = known is not None and uid == known.uid
-        return self._playing() if own else self._other_playing()
+        if attempt is not None and attempt is self.phase.attempt:
+            return self._playing(attempt)
+        known = self._paused_file()
+        return self._other_playing() if known is None or uid != known.uid else self._resumed(known)
 
     @_on(E.PLAYING)
-    def _playing(self) -> _Steps:
-        match self.state:
-            case S.STARTING:
-                self._begin_file()
-            case S.CANCELLING | S.TAKING_OVER:
-                self.phase = replace(self.phase, played=True)
-            case S.ENDING:
-                self._be(S.FLYING_FILE)
-            case _:  # not by us, but it flies, and a client that looks at the mission has to see that
-                known = self._paused_file()
-                assert known is not None, "else it is another plan"
-                self.progress = replace(known, left=None, kept=self.progress.kept)
-                self._be(S.FLYING_FILE)
-                yield Select()
-                yield SendText(Severity.NOTICE, texts.MISSION_RESUMED_ELSEWHERE)
+    def _playing(self, attempt: MissionAttempt) -> _Steps:
+        prepared = self.phase.prepared
+        assert prepared is not None, "STARTING has it"
+        leg = prepared.course.parts[0]
+        assert isinstance(leg, FlightPlanFile), "STARTING begins a file"
+        jumps = self.progress.jumps if prepared.resumes else attempt.jumps
+        progress = self.progress.in_file(prepared.uid, leg, prepared.line)
+        self.progress = replace(progress, course=prepared.course, jumps=jumps)
+        self.phase = MissionPhase(S.FLYING_FILE, S.FLYING_FILE, attempt, prepared)
+        yield from ()
+
+    @_on(E.RESUMED)
+    def _resumed(self, known: MissionProgress) -> _Steps:
+        """Show the mission as flown: a client that looks at it has to see that."""
+        self.progress = replace(known, left=None, kept=self.progress.kept)
+        self._be(S.FLYING_FILE)
+        yield Select()
+        yield SendText(Severity.NOTICE, texts.MISSION_RESUMED_ELSEWHERE)
 
     @_on(E.OTHER_PLAYING)
     def _other_playing(self) -> _Steps:
@@ -691,14 +618,7 @@ class MissionMachine:
     def halted(self, *, stopped: bool, report: DroneReport, now: float) -> _Steps:
         """The drone reports its plan as paused, or as `stopped`."""
         progress = self.progress
-        if self.state in (S.TAKING_OVER, S.CANCELLING):
-            if not self.phase.played:
-                return
-            if self.state is S.CANCELLING:
-                self._be(self.rest)
-            else:
-                self.phase = replace(self.phase, uid="", is_start_withdrawn=False, played=False)
-        elif progress.leg_done:
+        if progress.leg_done:
             yield from self._part_over()
         elif stopped and self.ending and progress.at_last_line:
             yield from self._await_end(None, report, now)
@@ -746,13 +666,13 @@ class MissionMachine:
             yield from self._look(report, last=True)
 
     @_on(E.CONTROL_LOST)
-    def control_lost(self, now: float) -> _Steps:
+    def control_lost(self) -> _Steps:
         """Another flight task, a landing or a return is active.
 
         In TAKING_OVER it is our own acquisition. Another one cancels that work, and its end is an event.
         """
         state, flew = self.state, self.flying
-        yield from self._end(None, self._unconfirmed(now))
+        yield from self._end()
         if flew or state is S.STARTING:
             yield Suspend(starting=state is S.STARTING)
 
@@ -770,10 +690,8 @@ class MissionMachine:
                 yield SendText(Severity.WARNING, texts.MISSION_NOT_STARTED.fill(reason=why))
             case S.ENDING if phase.missing and not phase.waits_for_position:
                 self.phase = replace(phase, waits_for_position=True, until=phase.until + POSITION_WAIT - END_WAIT)
-            case S.ENDING:
-                yield from self._look(report, last=True)
             case _:
-                self._be(self.rest)
+                yield from self._look(report, last=True)
 
     @_on(E.LINK_DOWN)
     def link_down(self) -> _Steps:
@@ -813,16 +731,13 @@ class MissionMachine:
 
     # Steps of several events.
 
-    def _be(self, state: State, unconfirmed: MissionPhase | None = None) -> None:
-        """Enter a state that has no further facts.
-
-        `unconfirmed`: not before the drone has confirmed the end of a file.
-        """
-        self.phase = MissionPhase(state, state) if unconfirmed is None else replace(unconfirmed, rest=state)
+    def _be(self, state: State) -> None:
+        """Enter a state that has no further facts."""
+        self.phase = MissionPhase(state, state)
 
     def _paused_file(self) -> MissionProgress | None:
-        """Return the progress in a paused file, which another controller may resume."""
-        in_file = self.rest is S.PAUSED and self.progress.leg is not None
+        """Return the progress in a stopped file, which another controller may resume."""
+        in_file = self.rest in (S.PAUSED, S.ENDING) and self.progress.leg is not None
         return self.progress if in_file else self.progress.left
 
     def _renew(self) -> None:
@@ -835,21 +750,6 @@ class MissionMachine:
             self._be(rest)
         else:
             self.phase = replace(self.phase, rest=rest)
-
-    def _unconfirmed(self, now: float) -> MissionPhase | None:
-        """Return the phase after the start or the flight of the present file is withdrawn.
-
-        Until the drone has confirmed that, what it reports of the file is of that start or flight. None: no file.
-        """
-        phase = self.phase
-        withdrawn = MissionPhase(S.CANCELLING, phase.rest, phase.attempt, until=now + START_TIMEOUT)
-        if phase.state is S.STARTING and phase.prepared is not None:
-            return replace(withdrawn, uid=phase.prepared.uid, is_start_withdrawn=True)
-        if phase.state is S.FLYING_FILE:
-            return replace(withdrawn, attempt=None, uid=self.progress.uid, played=True)
-        if phase.state in (S.TAKING_OVER, S.CANCELLING) and phase.uid:
-            return replace(withdrawn, uid=phase.uid, is_start_withdrawn=phase.is_start_withdrawn, played=phase.played)
-        return None
 
     def _paused_text(self, why: OperatorText | None) -> SendText:
         item = self.progress.current + FIRST_LABEL

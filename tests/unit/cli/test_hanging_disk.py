@@ -10,12 +10,12 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.hanging_disk import hanging, hanging_file
 from support.mav import Client
 from support.product import product
-from support.world import loopback
+from support.world import loopback, world
 
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.disk_writer import HANGS
 from anafi_mav.gateway import Gateway
-from anafi_mav.state_lock import STATE_WRITER, read_holder
+from anafi_mav.state_lock import STATE_WRITER, read_holder, state_folder
 
 
 async def test_hanging_log_file_stops_neither_a_command_nor_the_end(tmp_path: Path) -> None:
@@ -36,6 +36,17 @@ async def test_hanging_log_file_stops_neither_a_command_nor_the_end(tmp_path: Pa
             assert await p.end() == 0
     finally:
         os.close(reading)
+
+
+async def test_drones_connect_beside_a_hanging_state_folder() -> None:
+    """What is stored about a drone, and the lock file's line about it, are the business of a thread."""
+    with hanging(STATE_WRITER):
+        async with world() as w:
+            said = "".join(m.text for _, m in w.client.since(0, "STATUSTEXT"))
+            assert "the disk does not answer; no plans, new ones not kept" in said
+        holder = read_holder(state_folder(None))
+        assert holder is not None
+        assert holder.drones == ()  # they would be written by now
 
 
 async def test_state_folder_on_a_hanging_disk_stays_locked_behind_the_end(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ NAME = "expected 1 to 32 letters, digits, '-', '_' or '.', beginning with a lett
 SYSID = "expected a whole number from 1 to 250"
 KEYS = ", ".join(Config.__struct_fields__)
 ENDPOINT = "expected a URL like udpout://127.0.0.1:14550, or a mapping with a url and options"
-KEYS_OF_A_DRONE = "name, sysid, address, interface, sim, discovery_port, http_port, rtsp_port, allow_kill"
+KEYS_OF_A_DRONE = "name, sysid, serial, address, interface, sim, discovery_port, http_port, rtsp_port, allow_kill"
 
 
 def problem(text: str | bytes) -> str:
@@ -260,6 +260,9 @@ MISTAKES = {
     # Things that must differ, or agree
     two("name: a, sysid: 7, sim: {}", "name: b, sysid: 7, sim: {}"): "drones[1].sysid: expected a sysid of its own, 7 is already at drones[0].sysid",
     "sysids: 1-80\n" + two("name: a, sysid: 80, sim: {}", "name: b, sysid: 81, sim: {}"): "drones[1].sysid: expected one of sysids, 1-80, got 81",
+    two("name: a, sysid: 1, serial: PI040416AA0A000001, address: h", "name: b, sysid: 2, serial: PI040416AA0A000001, address: i"): "drones[1].serial: expected a serial of its own, 'PI040416AA0A000001' is already at drones[0].serial",
+    one("sysid: 1, serial: PI-04, address: h"): "drones[0].serial: expected 5 to 32 letters and digits, got 'PI-04'",
+    one("sysid: 1, serial: PI040416AA0A000001, sim: {}"): "drones[0].serial: expected none for a simulated drone, whose serial number follows from its address",
     "sysids: 80": "sysids: expected a range like 1-80, got 80",
     two("name: a, sysid: 1, sim: {}", "name: a, sysid: 2, sim: {}"): "drones[1].name: expected a name of its own, 'a' is already at drones[0].name",
     two("name: a, sysid: 1, address: h", "name: b, sysid: 2, address: h"): "drones[1].address: expected an address and discovery_port of its own, 'h:44445' is already at drones[0].address",

@@ -230,93 +230,69 @@ def test_late_playing_before_a_newer_start_is_not_undone(sent: SentCommands) -> 
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "about"),
+    ("reports", "undecided"),
     [
-        ("", "PLAYING STOPPED PLAYING", "older older newer"),
-        ("", "PLAYING PAUSED STOPPED PLAYING", "older older - newer"),
-        ("", "PLAYING PLAYING STOPPED STOPPED PLAYING", "older older older - newer"),  # each is sent twice
-        ("", "STOPPED PLAYING STOPPED PLAYING", "- older older newer"),  # the first one is of the flight before
-        ("PLAYING", "STOPPED PLAYING", "older newer"),
-        ("PLAYING", "PLAYING STOPPED PLAYING", "older older newer"),
-        ("PLAYING STOPPED", "STOPPED PLAYING", "- newer"),
-        ("PLAYING STOPPED", "PLAYING", "newer"),
-        ("ERROR", "PLAYING", "newer"),
-        ("", "ERROR PLAYING", "older newer"),
+        ((), True),
+        ((STOPPED,), True),  # of the command against it, or of the flight before
+        ((PLAYING,), True),  # its report may be repeated until its end is reported
+        ((PLAYING, STOPPED), False),
+        ((PLAYING, PAUSED), False),
+        ((ERROR,), False),
     ],
-    ids=lambda words: words.replace(" ", "-") or "nothing",
+    ids=["nothing", "stopped", "playing", "playing-stopped", "playing-paused", "error"],
 )
-def test_reports_of_a_plan_started_twice_are_attributed_in_their_order(
-    sent: SentCommands, before: str, after: str, about: str
+def test_withdrawn_start_is_undecided_until_its_end_is_reported(
+    sent: SentCommands, reports: tuple[object, ...], undecided: bool
 ) -> None:
-    """The first start is withdrawn; the drone reports it `before` and `after` the second one is sent."""
-    older, newer, reports = plan(), plan(), {"ERROR": ERROR, **{one.name: playing(one) for one in PlayingState}}
-    sent.place(older, 0.0)
-    older.apply(Event.DELIVERED)
-    older.apply(Event.WITHDRAWN, 1.0)
-    for name in before.split():
-        assert sent.attribute(reports[name], 1.0) is older
-    sent.place(newer, 1.1)
-    commands = {"older": older, "newer": newer, "-": None}
-    for name, wanted in zip(after.split(), about.split(), strict=True):
-        assert sent.attribute(reports[name], 1.2) is commands[wanted]
-        assert newer.phase is (C if wanted == "newer" else Q)
-        assert not sent.is_unwanted(older, 1.2)
-    if newer.phase is C:
-        assert sent.withdrawn_in_effect(Slot.PLAN) is None
-        assert sent.attribute(playing(STOPPED), 1.3) is newer
-        assert newer.phase is E
+    one = withdrawn_plan(sent)
+    one.delivered = True
+    for report in reports:
+        sent.attribute(playing(report) if isinstance(report, PlayingState) else ERROR, 1.1)
+    assert sent.is_undecided("a", 1.2) is undecided
+    assert not sent.is_undecided("b", 1.2)
+    assert not sent.is_undecided("a", 1.0 + PLAN_MEMORY)
 
 
-def test_two_withdrawn_starts_are_reported_before_the_third(sent: SentCommands) -> None:
-    first, second, third = plan(), plan(), plan()
-    for one in (first, second):
+@pytest.mark.parametrize(
+    ("event", "undecided"),
+    [(None, True), (Event.DELIVERED, True), (Event.EXECUTED, False), (Event.REFUSED, False), (Event.ABANDONED, True)],
+)
+def test_start_is_undecided_until_it_is_answered(sent: SentCommands, event: Event | None, undecided: bool) -> None:
+    one = plan()
+    sent.place(one, 0.0)
+    if event is not None:
+        one.apply(event, 1.0)
+    assert sent.is_undecided("a", 1.1) is undecided
+
+
+@pytest.mark.parametrize(("now", "is_its"), [(20.9, True), (21.0, False)])
+def test_unknown_plan_name_is_that_of_the_newest_withdrawn_start(sent: SentCommands, now: float, is_its: bool) -> None:
+    one = plan()
+    sent.place(one, 0.0)
+    one.apply(Event.WITHDRAWN, 21.0 - PLAN_MEMORY)
+    assert (sent.attribute(playing(PLAYING, "renamed"), now) is one) is is_its
+    assert sent.is_unwanted(one, now) is is_its
+
+
+def test_plan_that_the_drone_names_otherwise_is_known_by_that_name_until_its_end(sent: SentCommands) -> None:
+    one = plan()
+    sent.place(one, 0.0)
+    for state, phase in ((PLAYING, C), (PLAYING, C), (PAUSED, E)):
+        assert sent.attribute(playing(state, "renamed"), 0.1) is one
+        assert one.phase is phase
+    assert sent.attribute(playing(PLAYING, "renamed"), 0.2) is None
+
+
+@pytest.mark.parametrize("withdrawn", [False, True])
+def test_start_is_in_effect_from_its_report_to_its_end(sent: SentCommands, withdrawn: bool) -> None:
+    one = withdrawn_plan(sent) if withdrawn else plan()
+    if not withdrawn:
         sent.place(one, 0.0)
-        one.apply(Event.WITHDRAWN, 1.0)
-    sent.place(third, 1.1)
-    about = [sent.attribute(playing(state), 1.2) for state in (PLAYING, STOPPED, PLAYING, STOPPED, PLAYING)]
-    assert [*map(id, about)] == [*map(id, (first, first, second, second, third))]
-    assert (first.phase, second.phase, third.phase) == (E, E, C)
-
-
-@pytest.mark.parametrize(("now", "is_newers"), [(20.9, False), (21.0, True)])
-def test_withdrawn_start_claims_no_report_after_its_memory(sent: SentCommands, now: float, is_newers: bool) -> None:
-    older, newer = plan(), plan()
-    sent.place(older, 0.0)
-    older.apply(Event.WITHDRAWN, 21.0 - PLAN_MEMORY)
-    sent.place(newer, 20.5)
-    assert sent.attribute(playing(PLAYING), now) is (newer if is_newers else older)
-
-
-def test_playing_without_an_end_is_the_newer_starts_after_all(sent: SentCommands) -> None:
-    """The drone never executed the withdrawn start."""
-    older, newer = plan(), plan()
-    sent.place(older, 0.0)
-    older.apply(Event.WITHDRAWN, 1.0)
-    sent.place(newer, 1.1)
-    assert sent.attribute(playing(PLAYING), 1.2) is older
-    assert sent.withdrawn_in_effect(Slot.PLAN) is older
-    assert sent.confirm_despite(older, newer)
-    assert (older.phase, newer.phase) == (E, C)
-    assert sent.withdrawn_in_effect(Slot.PLAN) is None
-    assert sent.attribute(playing(PLAYING), 3.0) is newer
-    assert sent.attribute(playing(STOPPED), 3.1) is newer
-
-
-@pytest.mark.parametrize("event", [STOPPED, PAUSED, Event.WITHDRAWN, Event.ABANDONED])
-def test_newer_start_is_not_confirmed_by_what_has_ended_or_is_not_awaited(
-    sent: SentCommands, event: PlayingState | Event
-) -> None:
-    older, newer = plan(), plan()
-    sent.place(older, 0.0)
-    older.apply(Event.WITHDRAWN, 1.0)
-    sent.place(newer, 1.1)
-    sent.attribute(playing(PLAYING), 1.2)
-    if isinstance(event, Event):
-        newer.apply(event, 1.3)
-    else:
-        sent.attribute(playing(event), 1.3)
-    assert not sent.confirm_despite(older, newer)
-    assert newer.phase is not C
+    assert sent.in_effect(Slot.PLAN) is None
+    sent.attribute(playing(PLAYING), 1.1)
+    assert sent.in_effect(Slot.PLAN) is one
+    sent.attribute(playing(STOPPED), 1.2)
+    assert sent.in_effect(Slot.PLAN) is None
 
 
 def test_withdrawn_start_that_has_ended_begins_no_second_time(sent: SentCommands) -> None:
@@ -333,7 +309,7 @@ def test_plan_of_another_controller_ends_a_withdrawn_one(sent: SentCommands) -> 
     one = withdrawn_plan(sent)
     assert sent.attribute(playing(PLAYING), 1.1) is one
     assert sent.attribute(playing(PLAYING, "another's"), 1.2) is None
-    assert sent.withdrawn_in_effect(Slot.PLAN) is None
+    assert sent.in_effect(Slot.PLAN) is None
 
 
 def test_stopped_of_the_older_plan_leaves_the_newer_playing(sent: SentCommands) -> None:

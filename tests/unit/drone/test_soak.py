@@ -79,13 +79,17 @@ async def test_drone_after_stop_neither_moves_nor_reports(seed: int) -> None:
     chance = random.Random(seed)
     async with connected("4k", speed=3.0) as pair:
         drone, real = pair
-        uid = await drone.flight_plan.upload(V1)
+
+        async def fly_plan() -> None:
+            uid = await drone.flight_plan.upload(V1)
+            await drone.flight_plan.start(uid, timeout=chance.choice([0.3, 2.0]))
+
         verbs: list[Callable[[], Awaitable[Any]]] = [
             lambda: drone.piloting.move_to(HOME[0] + 0.0006, HOME[1], 8.0, timeout=chance.choice([0.3, 2.0])),
             lambda: drone.piloting.move_by(
                 chance.uniform(-20.0, 20.0), 0.0, 0.0, 0.0, timeout=chance.choice([0.3, 8.0])
             ),
-            lambda: drone.flight_plan.start(uid, timeout=chance.choice([0.3, 2.0])),
+            fly_plan,
             lambda: drone.poi.start(HOME[0] + 0.0003, HOME[1], 2.0, timeout=chance.choice([0.3, 2.0])),
             lambda: drone.piloting.return_home(timeout=chance.choice([0.3, 2.0])),
             lambda: drone.animations.horizontal_panorama(),

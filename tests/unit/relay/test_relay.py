@@ -239,6 +239,17 @@ async def test_garbage_of_a_viewer_ends_its_connection_only() -> None:
         await eye.look(3)
 
 
+async def test_web_page_in_a_browser_gets_no_picture() -> None:
+    """A page of any web site can make a browser send this: a body of RTSP, with a description that it could read."""
+    async with studio() as held, viewer(held.relay.port) as client:
+        body = f"DESCRIBE {client.base}{LIVE} RTSP/1.0\r\nCSeq: 1\r\n\r\n".encode()
+        head = f"POST / HTTP/1.1\r\nHost: 127.0.0.1:{held.relay.port}\r\nContent-Length: {len(body)}\r\n\r\n"
+        client.writer.write(head.encode() + body)
+        answer = await asyncio.wait_for(client.reader.read(), LIMIT)
+        assert answer.startswith(b"RTSP/1.0 505 ")  # which is no HTTP: the page cannot read it
+        assert b"v=0" not in answer
+
+
 @pytest.mark.parametrize("transport", ["UDP", "TCP"])
 async def test_playing_viewer_that_reads_no_responses_is_aborted(
     transport: str, monkeypatch: pytest.MonkeyPatch

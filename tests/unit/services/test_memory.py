@@ -40,27 +40,27 @@ def same(one: tuple[PlanItem, ...], other: tuple[PlanItem, ...]) -> bool:
 async def test_memory_returns_stored_values_after_reopening(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "state"
     memory = Memory(folder)
-    assert memory.load(SERIAL) is None
+    assert await memory.load(SERIAL) is None
     memory.put(1, ITEMS)
     memory.put(2, ())
     memory.settings["fence"] = {"action": "LAND", "floor": 2.5}
     assert await memory.save() is None
     assert files(folder) == [f"{SERIAL}.json"]
     again = Memory(folder)
-    assert again.load(SERIAL) is None
+    assert await again.load(SERIAL) is None
     assert set(again.plans) == {1}
     assert same(again.plans[1], ITEMS)
     assert opaque_id(again.plans[1]) == opaque_id(ITEMS)
     assert again.settings == {"fence": {"action": "LAND", "floor": 2.5}}
     # Another drone has another file.
     other = Memory(folder)
-    assert other.load("PI000000000000002") is None
+    assert await other.load("PI000000000000002") is None
     assert (other.plans, other.settings) == ({}, {})
 
 
 async def test_newest_of_many_saves_is_stored(tmp_path: Path) -> None:
     memory = Memory(tmp_path)
-    memory.load(SERIAL)
+    await memory.load(SERIAL)
     saves = []
     for number in range(50):
         memory.settings["number"] = number
@@ -68,14 +68,14 @@ async def test_newest_of_many_saves_is_stored(tmp_path: Path) -> None:
         await asyncio.sleep(0)
     assert await asyncio.gather(*saves) == [None] * 50
     again = Memory(tmp_path)
-    again.load(SERIAL)
+    await again.load(SERIAL)
     assert again.settings["number"] == 49
     assert len(files(tmp_path)) == 1  # nothing is left of the writing
 
 
 async def test_save_on_a_hanging_disk_is_a_problem_until_it_is_written(tmp_path: Path) -> None:
     memory = Memory(tmp_path)
-    memory.load(SERIAL)
+    await memory.load(SERIAL)
     memory.settings["number"] = 7
     with hanging(STATE_WRITER):
         problem = await memory.save()
@@ -85,8 +85,40 @@ async def test_save_on_a_hanging_disk_is_a_problem_until_it_is_written(tmp_path:
     await asyncio.sleep(0.0)
     assert memory.problem is None
     again = Memory(tmp_path)
-    again.load(SERIAL)
+    await again.load(SERIAL)
     assert again.settings == {"number": 7}
+
+
+async def test_load_on_a_hanging_disk_ends_and_the_file_is_kept(tmp_path: Path) -> None:
+    stored = Memory(tmp_path)
+    await stored.load(SERIAL)
+    stored.settings["number"] = 7
+    assert await stored.save() is None
+    memory = Memory(tmp_path)
+    with hanging(STATE_WRITER):
+        line = await memory.load(SERIAL)
+        assert line is not None
+        assert line.endswith("the disk does not answer; no plans, new ones not kept")
+        assert (memory.plans, memory.settings) == ({}, {})
+    # What is set meanwhile does not replace what was never read.
+    memory.settings["number"] = 8
+    assert await memory.save() == memory.problem == line
+    again = Memory(tmp_path)
+    assert await again.load(SERIAL) is None
+    assert again.settings == {"number": 7}
+
+
+async def test_load_that_is_cancelled_leaves_the_drone_before_it(tmp_path: Path) -> None:
+    memory = Memory(tmp_path)
+    await memory.load("PI000000000000002")
+    memory.settings["number"] = 7
+    with hanging(STATE_WRITER):
+        loading = asyncio.ensure_future(memory.load(SERIAL))
+        await asyncio.sleep(0.1)
+        loading.cancel()
+        await asyncio.wait([loading])
+    assert await memory.save() is None
+    assert (files(tmp_path), memory.settings) == (["PI000000000000002.json"], {"number": 7})
 
 
 def files(folder: Path) -> list[str]:
@@ -127,7 +159,7 @@ async def test_a_bad_file_is_one_line_and_is_kept(tmp_path: Path, data: bytes) -
     for number in (1, 2):
         file.write_bytes(data)
         memory = Memory(tmp_path)
-        line = memory.load(SERIAL)
+        line = await memory.load(SERIAL)
         assert line is not None
         assert line.startswith(f"{file}: ")
         assert line.endswith(f"put aside as {SERIAL}.unreadable-{number}")
@@ -136,14 +168,14 @@ async def test_a_bad_file_is_one_line_and_is_kept(tmp_path: Path, data: bytes) -
         memory.put(1, ITEMS)
         assert await memory.save() is None
         assert (tmp_path / f"{SERIAL}.unreadable-{number}").read_bytes() == data
-    assert Memory(tmp_path).load(SERIAL) is None
+    assert await Memory(tmp_path).load(SERIAL) is None
 
 
-def test_the_good_one_is_good(tmp_path: Path) -> None:
+async def test_the_good_one_is_good(tmp_path: Path) -> None:
     """So that each of the bad ones is bad for what its name says."""
     (tmp_path / f"{SERIAL}.json").write_text(json.dumps(valid()))
     memory = Memory(tmp_path)
-    assert memory.load(SERIAL) is None
+    assert await memory.load(SERIAL) is None
     assert same(
         memory.plans[1],
         (PlanItem(mav_enums.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, 0, (1.0, math.nan, math.inf, 0.0), 1, 2, 3.0),),
@@ -154,19 +186,19 @@ async def test_unreadable_memory_file_is_not_replaced(tmp_path: Path) -> None:
     """A folder in its place stands for a file that this user may not read: the tests may run as root."""
     (tmp_path / f"{SERIAL}.json").mkdir()
     memory = Memory(tmp_path)
-    line = memory.load(SERIAL)
+    line = await memory.load(SERIAL)
     assert line is not None
     assert "new ones not kept" in line
     memory.put(1, ITEMS)
     assert await memory.save() == memory.problem == line  # whoever uploads is notified each time
-    assert memory.load(SERIAL) is None
+    assert await memory.load(SERIAL) is None
     assert memory.plans[1] == ITEMS  # and has it until the gateway ends, also after a loss of the link
     assert (tmp_path / f"{SERIAL}.json").is_dir()
 
 
 async def test_uncreatable_folder_is_reported(tmp_path: Path) -> None:
     memory = Memory(tmp_path / "state")
-    assert memory.load(SERIAL) is None
+    assert await memory.load(SERIAL) is None
     (tmp_path / "state").write_text("")  # somebody else's file
     memory.put(1, ITEMS)
     line = await memory.save()
@@ -178,7 +210,7 @@ async def test_uncreatable_folder_is_reported(tmp_path: Path) -> None:
 @pytest.mark.parametrize("serial", ["", "../../etc/passwd", "a/b", "x" * 65, "a\nb", ".", "é"])
 async def test_serial_number_unusable_as_file_name_is_not_stored(tmp_path: Path, serial: str) -> None:
     memory = Memory(tmp_path)
-    assert memory.load(serial) is None
+    assert await memory.load(serial) is None
     memory.put(1, ITEMS)
     assert await memory.save() is None
     assert files(tmp_path) == []
@@ -186,7 +218,7 @@ async def test_serial_number_unusable_as_file_name_is_not_stored(tmp_path: Path,
 
 async def test_without_a_folder(tmp_path: Path) -> None:
     memory = Memory(None)
-    assert memory.load(SERIAL) is None
+    assert await memory.load(SERIAL) is None
     memory.put(1, ITEMS)
     assert await memory.save() is None
 

@@ -16,7 +16,7 @@ from anafi_mav.arsdk.messages import flight_plan as modern
 from anafi_mav.arsdk.messages.common import FlightPlanComponent, MavlinkType, PlayingState
 from anafi_mav.drone import Drone
 from anafi_mav.drone.automatic.flight_plan import DOUBT_TIMEOUT
-from anafi_mav.drone.sent_commands import STOP_REPORT
+from anafi_mav.drone.sent_commands import SentCommand
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
 
 V2 = V1.replace(b"\t3\t93\t2.0\t0.0\t0.0\t0.0\t0.0\t0.0\t0.0", b"\t2\t93\t2.0\t-1\t-1\t-1\tnan\tnan\tnan").replace(
@@ -133,8 +133,8 @@ async def test_unanswered_plan_start_is_withdrawn(device: ScriptedDevice) -> Non
         common.ComponentStateListChanged(FlightPlanComponent.CAMERA_AVAILABLE, 0),
     ]
     with pytest.raises(CommandRejected, match="calibration, camera available"):
-        await drone.flight_plan.start("abc", timeout=0.2)
-    starting = asyncio.ensure_future(drone.flight_plan.start("abc"))
+        await drone.flight_plan.start("def", timeout=0.2)
+    starting = asyncio.ensure_future(drone.flight_plan.start("ghi"))
     await device.until(common.Start, 3)
     await drone.close()
     with pytest.raises(LinkLost):
@@ -174,18 +174,16 @@ async def test_late_error_of_a_withdrawn_start_leaves_the_newer(device: Scripted
     heard = asyncio.ensure_future(drone.expect(common.ComponentStateListChanged))
     older.cancel()
     await heard
-    newer = asyncio.ensure_future(drone.flight_plan.start("abc"))
+    newer = asyncio.ensure_future(drone.flight_plan.start("def"))
     await device.until(common.Start, 2)
     device.say(common.StartingErrorEvent())
-    device.say(common.MavlinkFilePlayingStateChanged(PlayingState.PLAYING, "abc", MavlinkType.FLIGHT_PLAN))
+    device.say(common.MavlinkFilePlayingStateChanged(PlayingState.PLAYING, "def", MavlinkType.FLIGHT_PLAN))
     await newer
     await drone.close()
 
 
-@pytest.mark.parametrize("ended", [True, False], ids=["older-began", "older-never-began"])
-async def test_playing_behind_a_withdrawn_start_confirms_the_newer_once_no_end_follows(
-    device: ScriptedDevice, ended: bool
-) -> None:
+async def test_plan_of_a_withdrawn_start_is_not_started_again_until_that_is_decided(device: ScriptedDevice) -> None:
+    """Its PLAYING would be taken for the newer start's: the drone reports the name of the plan alone."""
     drone = device.drone()
     await drone.connect()
 
@@ -198,31 +196,36 @@ async def test_playing_behind_a_withdrawn_start_confirms_the_newer_once_no_end_f
     with pytest.raises(CommandTimeout):
         await drone.flight_plan.start("abc", timeout=0.2)
     await device.until(common.Stop)
-    newer = asyncio.ensure_future(drone.flight_plan.start("abc"))
+    for state in (PlayingState.STOPPED, PlayingState.PLAYING):  # the first answers the command against it
+        with pytest.raises(CommandRejected, match="an earlier start may still begin"):
+            await drone.flight_plan.start("abc")
+        await report(state)
+    assert drone.flight_plan.plays_withdrawn
+    assert drone.flight_plan.is_undecided("abc")
+    await report(PlayingState.STOPPED)
+    assert len(device.got(common.Start)) == 1
+    newer = asyncio.ensure_future(drone.flight_plan.start("abc", cause="the newer"))
     await device.until(common.Start, 2)
     await report(PlayingState.PLAYING)
-    assert not newer.done()
-    assert drone.flight_plan.plays_withdrawn
-    if ended:
-        await report(PlayingState.STOPPED)
-        assert not drone.flight_plan.plays_withdrawn
-        await asyncio.sleep(2.0 * STOP_REPORT)  # nothing happens within this time
-        assert not newer.done()
-        await report(PlayingState.PLAYING)
     await newer
+    flown = drone.flight_plan.flown
+    assert isinstance(flown, SentCommand)
+    assert flown.cause == "the newer"
     assert not drone.flight_plan.plays_withdrawn
-    drone.flight_plan.suspend()
-    await device.until(common.Pause)
+    await report(PlayingState.STOPPED)
+    assert drone.flight_plan.flown is None
+    await report(PlayingState.PLAYING)
+    assert drone.flight_plan.flown == "abc"  # started by another controller
     await drone.close()
 
 
-async def test_start_cancelled_while_playing_is_in_doubt_stops_the_plan(device: ScriptedDevice) -> None:
+async def test_start_cancelled_while_an_older_one_plays_stops_the_plan(device: ScriptedDevice) -> None:
     drone = device.drone()
     await drone.connect()
     with pytest.raises(CommandTimeout):
         await drone.flight_plan.start("abc", timeout=0.2)
     await device.until(common.Stop)
-    newer = asyncio.ensure_future(drone.flight_plan.start("abc"))
+    newer = asyncio.ensure_future(drone.flight_plan.start("def"))
     await device.until(common.Start, 2)
     device.script[common.Stop] = lambda _: []
     heard = asyncio.ensure_future(drone.expect(common.MavlinkFilePlayingStateChanged))

@@ -11,7 +11,6 @@ from support.mission_machine import (
     ITEMS,
     LAST,
     NOW,
-    START,
     RandomFlight,
     calls,
     flying,
@@ -21,8 +20,7 @@ from support.mission_machine import (
     taking_over,
 )
 
-from anafi_mav import texts
-from anafi_mav.vehicle.mission.effects import Effect, Release, Select, SendText, Work
+from anafi_mav.vehicle.mission.effects import Effect, Release, Select, Work
 from anafi_mav.vehicle.mission.machine import FLYING, TRANSITIONS, Event, State
 
 S, E = State, Event
@@ -47,7 +45,7 @@ EXPECTED: dict[State, dict[Event, tuple[State, str]]] = {
         E.CHOSEN: (S.READY, ""),
         E.ENGAGED: (S.AWAIT_ARM, "Select"),
         E.PREPARED: (S.TAKING_OVER, "Acquire"),
-        E.PLAYING: (S.FLYING_FILE, "Select SendText Persist"),
+        E.RESUMED: (S.FLYING_FILE, "Select SendText Persist"),
         E.OTHER_PLAYING: (S.READY, "SendText"),
         E.LINK_DOWN: (S.READY, ""),
         E.LINK_UP: (S.READY, ""),
@@ -60,7 +58,7 @@ EXPECTED: dict[State, dict[Event, tuple[State, str]]] = {
         E.ENGAGED: (S.AWAIT_ARM, "Select"),
         E.ARMED: (S.PREPARING, "Prepare"),
         E.PREPARED: (S.TAKING_OVER, "Acquire"),
-        E.PLAYING: (S.FLYING_FILE, "Select SendText Persist"),
+        E.RESUMED: (S.FLYING_FILE, "Select SendText Persist"),
         E.OTHER_PLAYING: (S.AWAIT_ARM, "SendText"),
         E.CONTROL_LOST: (S.READY, ""),
         E.TIMEOUT: (S.READY, "Release SendText"),
@@ -72,7 +70,6 @@ EXPECTED: dict[State, dict[Event, tuple[State, str]]] = {
         E.UPLOADED_AGAIN: (S.PREPARING, "SendText"),
         E.PREPARED: (S.TAKING_OVER, "Acquire"),
         E.FAILED: (S.READY, "SendText Release"),
-        E.WITHDRAWN: (S.READY, "Release"),
         E.OTHER_PLAYING: (S.PREPARING, "SendText"),
         E.CONTROL_LOST: (S.READY, ""),
         E.LINK_DOWN: (S.READY, ""),
@@ -84,48 +81,30 @@ EXPECTED: dict[State, dict[Event, tuple[State, str]]] = {
         E.PREPARED: (S.TAKING_OVER, "Acquire"),
         E.GRANTED: (S.STARTING, "Select StartFile"),
         E.FAILED: (S.READY, "Release"),
-        E.WITHDRAWN: (S.READY, "Release"),
-        E.PLAYING: (S.TAKING_OVER, ""),
-        E.HALTED: (S.TAKING_OVER, ""),
         E.LINK_DOWN: (S.READY, ""),
     },
     S.STARTING: {
-        E.UPLOADED: (S.CANCELLING, "Persist Suspend Release"),
-        E.CLEARED: (S.CANCELLING, "Persist Suspend Release"),
+        E.UPLOADED: (S.READY, "Persist Suspend Release"),
+        E.CLEARED: (S.NO_MISSION, "Persist Suspend Release"),
         E.UPLOADED_AGAIN: (S.STARTING, "SendText"),
         E.PREPARED: (S.TAKING_OVER, "Suspend Acquire"),
-        E.CONFIRMED: (S.FLYING_FILE, "Announce Persist"),
         E.FAILED: (S.READY, "Release"),
-        E.WITHDRAWN: (S.CANCELLING, "Release"),
         E.PLAYING: (S.FLYING_FILE, "Persist"),
-        E.CONTROL_LOST: (S.CANCELLING, "Suspend"),
-        E.LINK_DOWN: (S.READY, ""),
-    },
-    S.CANCELLING: {
-        E.UPLOADED: (S.CANCELLING, "Persist"),
-        E.CLEARED: (S.CANCELLING, "Persist"),
-        E.UPLOADED_AGAIN: (S.CANCELLING, "Persist"),
-        E.CHOSEN: (S.CANCELLING, ""),
-        E.ENGAGED: (S.AWAIT_ARM, "Select"),
-        E.PREPARED: (S.TAKING_OVER, "Acquire"),
-        E.PLAYING: (S.CANCELLING, ""),
-        E.OTHER_PLAYING: (S.CANCELLING, "SendText"),
-        E.HALTED: (S.CANCELLING, ""),
-        E.TIMEOUT: (S.READY, ""),
+        E.CONTROL_LOST: (S.READY, "Suspend"),
         E.LINK_DOWN: (S.READY, ""),
     },
     S.FLYING_FILE: {
-        E.UPLOADED: (S.CANCELLING, "Persist SendText Suspend Release"),
-        E.CLEARED: (S.CANCELLING, "Persist SendText Suspend Release"),
+        E.UPLOADED: (S.READY, "Persist SendText Suspend Release"),
+        E.CLEARED: (S.NO_MISSION, "Persist SendText Suspend Release"),
         E.UPLOADED_AGAIN: (S.FLYING_FILE, "SendText"),
         E.PREPARED: (S.TAKING_OVER, "Suspend Acquire Persist"),
         E.CONFIRMED: (S.FLYING_FILE, "Announce"),
-        E.WITHDRAWN: (S.CANCELLING, "SendText Release Persist"),
+        E.FAILED: (S.PAUSED, "SendText Release Persist"),
         E.OTHER_PLAYING: (S.PAUSED, "SendText Release Persist"),
         E.HALTED: (S.PAUSED, "SendText Release Persist"),
         E.EXECUTED: (S.FLYING_FILE, "Reached Persist"),
         E.SKIPPED: (S.FLYING_FILE, "SendText"),
-        E.CONTROL_LOST: (S.CANCELLING, "SendText Suspend Persist"),
+        E.CONTROL_LOST: (S.PAUSED, "SendText Suspend Persist"),
         E.LINK_DOWN: (S.PAUSED, ""),
     },
     S.FLYING_ITEM: {
@@ -134,7 +113,6 @@ EXPECTED: dict[State, dict[Event, tuple[State, str]]] = {
         E.UPLOADED_AGAIN: (S.FLYING_ITEM, "SendText"),
         E.PREPARED: (S.TAKING_OVER, "Suspend Acquire"),
         E.FAILED: (S.PAUSED, "SendText Release"),
-        E.WITHDRAWN: (S.PAUSED, "SendText Release"),
         E.OTHER_PLAYING: (S.PAUSED, "SendText Release"),
         E.ITEM_FLOWN: (S.FLYING_ITEM, "Reached Prepare"),
         E.CONTROL_LOST: (S.PAUSED, "SendText Suspend"),
@@ -145,7 +123,7 @@ EXPECTED: dict[State, dict[Event, tuple[State, str]]] = {
         E.CLEARED: (S.NO_MISSION, "Persist SendText Suspend Release"),
         E.UPLOADED_AGAIN: (S.ENDING, "SendText"),
         E.PREPARED: (S.TAKING_OVER, "Suspend Acquire Persist"),
-        E.PLAYING: (S.FLYING_FILE, ""),
+        E.RESUMED: (S.FLYING_FILE, "Select SendText"),
         E.OTHER_PLAYING: (S.PAUSED, "SendText Release Persist"),
         E.EXECUTED: (S.COMPLETE, "Reached Persist SendText Release"),
         E.SKIPPED: (S.ENDING, "SendText"),
@@ -161,7 +139,7 @@ EXPECTED: dict[State, dict[Event, tuple[State, str]]] = {
         E.CHOSEN: (S.PAUSED, "Persist"),
         E.ENGAGED: (S.AWAIT_ARM, "Select"),
         E.PREPARED: (S.TAKING_OVER, "Acquire"),
-        E.PLAYING: (S.FLYING_FILE, "Select SendText"),
+        E.RESUMED: (S.FLYING_FILE, "Select SendText"),
         E.OTHER_PLAYING: (S.PAUSED, "SendText"),
         E.EXECUTED: (S.PAUSED, ""),
         E.LINK_DOWN: (S.PAUSED, ""),
@@ -191,8 +169,9 @@ def test_machine_pair_of_state_and_event_has_defined_result(state: State) -> Non
         if event in EXPECTED[state]:
             assert (machine.state, names(effects)) == EXPECTED[state][event], event
             assert machine.state in TRANSITIONS[state][event], event
-        elif event is E.PLAYING and state in (S.NO_MISSION, S.COMPLETE):
-            assert (machine.state, names(effects)) == (state, "SendText")  # no file of this mission is known
+        elif event in (E.PLAYING, E.RESUMED) and effects:  # no such start, or no such file
+            other = (EXPECTED[state].get(E.RESUMED), EXPECTED[state].get(E.OTHER_PLAYING))
+            assert (machine.state, names(effects)) in other, event
         else:
             assert (effects, (machine.phase, machine.progress, machine.mission)) == ([], before), event
 
@@ -200,7 +179,7 @@ def test_machine_pair_of_state_and_event_has_defined_result(state: State) -> Non
 HELD = {S.AWAIT_ARM, S.PREPARING, S.STARTING, *FLYING}
 """States in which mode Mission is shown."""
 
-DEADLINES = {S.AWAIT_ARM, S.CANCELLING, S.ENDING}
+DEADLINES = {S.AWAIT_ARM, S.ENDING}
 ATTEMPTED = {S.PREPARING, S.TAKING_OVER, S.STARTING, S.FLYING_ITEM}
 
 SEQUENCES, EVENTS = 100_000, 4
@@ -233,77 +212,30 @@ def test_machine_keeps_every_promise_in_random_sequences() -> None:
             assert bool(machine.mission.items) is (machine.rest is not S.NO_MISSION), where
             assert 0 <= machine.progress.current < max(len(machine.mission.items), 1), where
             assert sum(isinstance(effect, Work) for effect in effects) <= 1, where
-            if before is S.CANCELLING and event is E.PLAYING and phase.uid == machine.phase.uid:
-                shown = [effect for effect in effects if isinstance(effect, SendText)]
-                assert all(effect.text == texts.OTHER_PLAN for effect in shown), where
     quiet = {(S.NO_MISSION, E.CLEARED), (S.READY, E.LINK_UP)}
     assert {(state, event) for state, row in TRANSITIONS.items() for event in row} - reached <= quiet
 
 
-def test_withdrawn_start_playing_late_stays_silent() -> None:
+def test_withdrawn_start_leaves_the_mission_as_it_was() -> None:
     machine, attempt = starting()
-    machine.withdrawn(attempt, None, NOW)
-    assert machine.has_withdrawn_start
-    assert machine.playing("a") == []
-    assert (machine.state, machine.rest) == (S.CANCELLING, S.READY)
-    assert machine.halted(stopped=True, report=GONE, now=NOW) == []
+    assert names(machine.failed(attempt, None)) == "Release"
     assert machine.state is S.READY
-    assert names(machine.playing("a")) == "SendText"  # this one is another controller's
+    assert names(machine.playing("a", None)) == "SendText"  # another controller's: this mission has no such file
 
 
-@pytest.mark.parametrize("state", S)
-def test_playing_of_a_withdrawn_start_changes_nothing_but_the_wait_for_its_end(state: State) -> None:
-    machine = in_state(state)
-    before = (machine.state, machine.rest, machine.progress)
-    for uid in ("a", "b"):
-        assert machine.playing(uid, is_withdrawn=True) == []
-        assert (machine.state, machine.rest, machine.progress) == before
-    assert machine.phase.played is (state is S.CANCELLING)
-
-
-def test_start_confirmed_without_its_playing_counts_the_lines_executed_since() -> None:
-    """PLAYING was attributed to an older start of the same file, and was this one's after all."""
+def test_playing_during_a_start_is_known_by_its_attempt_not_by_its_name() -> None:
     machine, attempt = starting()
-    assert machine.playing("a", is_withdrawn=True) == machine.executed(1) == []
-    assert machine.state is S.STARTING
-    assert names(machine.confirmed(attempt, 1)) == "Reached Announce Persist"
-    assert (machine.state, machine.progress.line, machine.progress.current) == (S.FLYING_FILE, 1, 2)
-
-
-def test_start_confirmed_after_its_playing_counts_no_line_again() -> None:
-    machine, attempt = starting()
-    machine.playing("a")
-    machine.confirmed(attempt, 1)
-    assert machine.progress.line == -1
-
-
-def test_withdrawn_start_playing_late_stays_silent_when_the_start_after_it_is_withdrawn_too() -> None:
-    machine, _ = starting()
-    second = machine.attempt()
-    machine.prepared(second, START)
-    assert machine.has_withdrawn_start
-    machine.withdrawn(second, None, NOW)
-    assert machine.state is S.CANCELLING
-    assert machine.playing("a") == []
-    machine.halted(stopped=True, report=GONE, now=NOW)
-    assert machine.state is S.READY
-
-
-def test_withdrawn_start_playing_during_the_next_start_stays_silent_after_its_end() -> None:
-    machine, _ = starting()
-    second = machine.attempt()
-    machine.prepared(second, START)
-    assert machine.playing("a") == []
-    machine.halted(stopped=True, report=GONE, now=NOW)
-    assert not machine.has_withdrawn_start
-    machine.withdrawn(second, None, NOW)
-    assert machine.state is S.READY
+    for other in (None, machine.attempt()):
+        assert machine.playing("a", other) == []
+        assert machine.state is S.STARTING
+    assert names(machine.playing("renamed", attempt)) == "Persist"
+    assert (machine.state, machine.progress.uid) == (S.FLYING_FILE, "a")
 
 
 def test_restart_withdrawn_during_acquisition_pauses_and_releases() -> None:
     machine, attempt = taking_over(machine=flying())
     machine.halted(stopped=False, report=GONE, now=NOW)
-    effects = machine.withdrawn(attempt, None, NOW)
+    effects = machine.failed(attempt, None)
     assert names(effects) == "SendText Release"
     assert machine.state is S.PAUSED
 
@@ -315,22 +247,20 @@ def test_older_attempt_reporting_late_changes_nothing() -> None:
     assert phase.attempt is newer
     for effects in (
         machine.confirmed(older),
-        machine.failed(older, FAILURE, NOW),
-        machine.withdrawn(older, None, NOW),
+        machine.failed(older, FAILURE),
+        machine.failed(older, None),
         machine.granted(older),
     ):
         assert effects == []
     assert machine.phase is phase
 
 
-def test_paused_mission_reported_playing_twice_stays_paused() -> None:
-    """The report may be repeated, until the drone has confirmed the pause."""
+def test_paused_mission_that_another_controller_resumes_is_shown_as_flown() -> None:
     machine = flying()
-    machine.control_lost(NOW)
-    assert machine.playing("a") == []
-    assert (machine.state, machine.rest) == (S.CANCELLING, S.PAUSED)
-    machine.halted(stopped=False, report=GONE, now=NOW)
-    assert names(machine.playing("a")) == "Select SendText"
+    machine.control_lost()
+    assert machine.state is S.PAUSED
+    assert names(machine.playing("a", None)) == "Select SendText"
+    assert machine.state is S.FLYING_FILE
 
 
 def test_mission_uploaded_while_armed_start_waits_for_it_is_flown() -> None:
@@ -338,14 +268,14 @@ def test_mission_uploaded_while_armed_start_waits_for_it_is_flown() -> None:
     machine.await_arm("client", NOW)
     machine.armed("client", storing=True)
     older = machine.phase.attempt
-    assert names(machine.upload(ITEMS[:3], 8, NOW)) == "Persist Prepare"
+    assert names(machine.upload(ITEMS[:3], 8)) == "Persist Prepare"
     attempt = machine.phase.attempt
     assert machine.state is S.PREPARING
     assert attempt is not None
     assert attempt.mission is machine.mission
     assert older is not None
-    assert machine.failed(older, FAILURE, NOW) == []
-    assert names(machine.failed(attempt, FAILURE, NOW)) == "SendText Release"
+    assert machine.failed(older, FAILURE) == []
+    assert names(machine.failed(attempt, FAILURE)) == "SendText Release"
     assert machine.state is S.READY
 
 
@@ -369,7 +299,7 @@ def test_mission_of_parts_is_flown_to_its_end() -> None:
     following = machine.phase.attempt
     assert following is not None
     machine.prepared(following, LAST)
-    machine.playing("b")
+    machine.playing("b", following)
     assert names(machine.confirmed(following)) == ""
     for line in range(2):
         machine.executed(line)

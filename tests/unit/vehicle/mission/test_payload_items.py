@@ -86,7 +86,7 @@ def test_jump_within_the_repeated_items_is_followed() -> None:
 def test_paused_mission_frees_gimbal_and_camera() -> None:
     items, later = [item(UP), item(AIM), item(PHOTO), item(WAY)], Course((GatewayStep(2, (2,)), GatewayStep(3, (3,))))
     machine = MissionMachine()
-    machine.upload(items, 7, 0.0)
+    machine.upload(items, 7)
     seen = [(machine.needs_gimbal, machine.needs_camera)]
 
     def fly(first: int, course: Course) -> None:
@@ -100,7 +100,7 @@ def test_paused_mission_frees_gimbal_and_camera() -> None:
 
     steps = (
         lambda: fly(0, Course((GatewayStep(0, (0,)),))),
-        lambda: machine.control_lost(0.0),
+        machine.control_lost,
         lambda: fly(2, later),
         finish,
     )

@@ -63,12 +63,12 @@ def test_turns_of_loops_are_counted() -> None:
 
 def test_chosen_item_restarts_loops_and_end_clears_them() -> None:
     machine = MissionMachine()
-    machine.upload([*ITEMS[:3], JUMP], 7, 0.0)
+    machine.upload([*ITEMS[:3], JUMP], 7)
     leg = FlightPlanFile(b"", (1, 2), ((1,), (2, 3)))
     attempt = machine.attempt(1)
     machine.prepared(attempt, Prepared(Course((leg,)), "name"))
     machine.granted(attempt)
-    machine.playing("name")
+    machine.playing("name", attempt)
     machine.executed(1)
     assert machine.progress.jumps == {3: 1}
     assert machine.attempt().jumps == {3: 1}
@@ -103,12 +103,12 @@ def test_omitted_item_is_skipped_but_lineless_items_count() -> None:
 def flown(*lines: int) -> MissionMachine:
     """The mission is flown, and these lines are executed."""
     machine = MissionMachine()
-    machine.upload(ITEMS, 7, 0.0)
+    machine.upload(ITEMS, 7)
     assert (machine.rest, machine.progress.current, machine.first) == (State.READY, 0, 0)
     attempt = machine.attempt()
     machine.prepared(attempt, Prepared(Course((LEG,)), "name"))
     machine.granted(attempt)
-    machine.playing("name")
+    machine.playing("name", attempt)
     for line in lines:
         machine.executed(line)
     return machine
@@ -116,8 +116,7 @@ def flown(*lines: int) -> MissionMachine:
 
 def paused(*lines: int) -> MissionMachine:
     machine = flown(*lines)
-    machine.control_lost(0.0)
-    machine.halted(stopped=False, report=DroneReport(), now=0.0)
+    machine.control_lost()
     assert machine.state is State.PAUSED
     return machine
 
@@ -126,7 +125,7 @@ def test_paused_mission_completes_no_item() -> None:
     machine = paused(1)
     assert machine.executed(2) == []
     assert (machine.state, machine.progress.current) == (State.PAUSED, 1)
-    machine.playing("name")
+    machine.playing("name", None)
     assert Reached(1) in machine.executed(2)
 
 
@@ -152,9 +151,9 @@ def test_choosing_an_item() -> None:
 
 def test_another_mission() -> None:
     machine = paused(3)
-    machine.upload(ITEMS[:2], 8, 0.0)
+    machine.upload(ITEMS[:2], 8)
     assert (machine.state, machine.progress.current, machine.progress.leg) == (State.READY, 0, None)
-    machine.upload((), 0, 0.0)
+    machine.upload((), 0)
     assert machine.state is State.NO_MISSION
 
 
