@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
     speed = options.speed(arguments.speed)
     start = options.number("--start", arguments.start, "a number of seconds")
     endpoints = arguments.endpoint or [DEFAULT_ENDPOINT]
-    count = interrupts.run(_play(tlogs, traces if arguments.trace else [], endpoints, speed, start))
+    count = interrupts.run(play(tlogs, traces if arguments.trace else [], endpoints, speed, start))
     say(f"{count} frames played")
     return 0
 
@@ -73,13 +73,18 @@ def run(arguments: argparse.Namespace) -> int:
 def files_of(path: Path) -> tuple[list[Path], list[Path]]:
     """Return the parts of a session's tlog and of its trace. Raises `ConfigError`."""
     if path.is_dir():
-        tlogs = sorted(path.glob("gateway.*.tlog"))
-        traces = sorted(path.glob("arsdk.*.jsonl"))
+        tlogs = sorted(path.glob("gateway.*.tlog"), key=_in_order)
+        traces = sorted(path.glob("arsdk.*.jsonl"), key=_in_order)
     else:
         tlogs, traces = ([path] if path.is_file() else []), []
     if not tlogs:
         raise ConfigError("SESSION", f"expected the folder of a recorded session or a .tlog file, got {path}")
     return tlogs, traces
+
+
+def _in_order(part: Path) -> tuple[int, str]:
+    """Return the key by which part 10000 follows part 9999."""
+    return len(part.name), part.name
 
 
 def read_tlogs(paths: Sequence[Path]) -> Iterator[TlogEntry]:
@@ -119,7 +124,7 @@ class VehicleFrames:
         return frame if frame.sysid in self._vehicles else None
 
 
-async def _play(
+async def play(
     tlogs: Sequence[Path], traces: Sequence[Path], endpoints: Sequence[str], speed: float, start: float
 ) -> int:
     """Send everything at its time; return the number of frames."""

@@ -84,7 +84,7 @@ async def test_replay_of_a_file_of_other_bytes_can_be_ended(tmp_path: Path) -> N
     """It is searched for frames in a thread; the event loop, which sees Ctrl-C, goes on."""
     path = tmp_path / "film.tlog"
     path.write_bytes(bytes(3_000_000))
-    playing = asyncio.ensure_future(replay._play([path], [], ["udpout://127.0.0.1:9"], 1.0, 0.0))
+    playing = asyncio.ensure_future(replay.play([path], [], ["udpout://127.0.0.1:9"], 1.0, 0.0))
     for _ in range(20):
         await asyncio.sleep(0)
     assert not playing.done()
@@ -97,3 +97,10 @@ def test_replay_names_a_file_that_cannot_be_read(tmp_path: Path, capsys: pytest.
     (tmp_path / "gateway.0001.tlog").mkdir()
     assert main(["replay", str(tmp_path), "--endpoint", "udpout://127.0.0.1:9"]) == 1
     assert capsys.readouterr().err == f"anafi-mav: {tmp_path}/gateway.0001.tlog: cannot be read: Is a directory\n"
+
+
+def test_parts_of_a_session_follow_each_other_by_number(tmp_path: Path) -> None:
+    names = [f"gateway.{number:04d}.tlog" for number in (9999, 10000, 998)]
+    for name in names:
+        (tmp_path / name).touch()
+    assert [path.name for path in files_of(tmp_path)[0]] == [names[2], names[0], names[1]]
