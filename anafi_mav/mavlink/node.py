@@ -332,7 +332,10 @@ class Node:
         return False
 
     def _has_name_of_other(self, channel: Channel, received: ReceivedFrame) -> bool:
-        """Return True for a frame in the name of a system of ours, or of one behind a channel with more access."""
+        """Return True for a frame in the name of a system of ours.
+
+        Or in that of one behind a channel with more access.
+        """
         return self._router.is_ours(received.sysid) or any(
             other.access > channel.access for other in self._router.heard_on(received.sysid)
         )
