@@ -16,7 +16,7 @@ from typing import Any
 
 import msgspec
 
-from anafi_mav.cli import heap, interrupts, log, options, run_check, start_warnings
+from anafi_mav.cli import interrupts, log, options, run_check, start_warnings
 from anafi_mav.cli.addresses import SHARED, Ports, Reservations, spot
 from anafi_mav.cli.child import SimulatorProcess
 from anafi_mav.cli.scenarios import load as load_scenario
@@ -115,7 +115,6 @@ def _serve(arguments: argparse.Namespace) -> int:
     config = configuration(arguments.config, arguments.drone, arguments.endpoint, arguments.allow_kill)
     for warning in start_warnings.warnings_of(config):
         complain(f"warning: {warning.text}", warning.style)
-    heap.settle()
     problems = asyncio.run(_run(config, arguments.sim_log.absolute() if arguments.sim_log else None))
     for problem in problems:
         complain(f"not kept: {problem}")
