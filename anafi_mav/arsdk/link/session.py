@@ -268,6 +268,8 @@ class Session(asyncio.DatagramProtocol):
         if endpoint is None or self.lost.done():
             return
         guard = self._guard
+        if guard is None and self._timer is not None and self._transport.is_idle:
+            return  # nearly always after telemetry, which puts the next ping off
         if guard is not None and not guard.may_send():
             self._flush_due = True
             self._loop.call_later(STALL_PAUSE, self._flush)

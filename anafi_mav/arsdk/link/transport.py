@@ -428,6 +428,17 @@ class Transport:
         queue = self._queues[_ACK_ID[self.role]]
         queue.seq = (queue.seq + skip) & self._seq_mask
 
+    @property
+    def is_idle(self) -> bool:
+        """True while nothing waits to be sent, acknowledged or returned by `expire`.
+
+        Only pings become due then.
+        """
+        for queue in self._queues.values():
+            if queue.flight or queue.waiting:
+                return False
+        return not (self._replies or self._noack or self._pending)
+
     def outgoing(self, now: float) -> list[bytes]:
         """The datagrams to send now; they are forgotten here, repetitions come by themselves."""
         if self._down:
