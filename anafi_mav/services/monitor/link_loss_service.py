@@ -86,7 +86,7 @@ class LinkLossService(Service):
             self.host.run_action(LinkLossService, self._act(policy.action), is_order=False)
 
     async def _act(self, action: LossAction) -> None:
-        """Carry an action out; one that fails is tried again later, unless something newer is commanded."""
+        """Carry an action out; one that fails is tried again, unless something newer is commanded."""
         try:
             await self._perform(action)
         except AnafiMavError as error:
