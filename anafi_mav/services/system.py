@@ -206,6 +206,8 @@ class System:
         self.download_folder = download_folder
         self.uris = uris
         self.active = False
+        self.absence: OperatorText | None = None
+        """Text to senders of commands about why the drone is not connected, where there is more to say."""
         self._node = node
         self._started = started
         self._texts = TextNumbers()
@@ -590,8 +592,9 @@ class System:
             return
         if inbound.is_permitted and self._on_command is not None:
             self._on_command(inbound)
-        for text in self._texts.messages(Severity.WARNING, texts.COMMAND_WITHOUT_DRONE):
-            self._node.send(text, sysid=self.sysid, compid=AUTOPILOT, to=inbound.channel)
+        for text in (texts.COMMAND_WITHOUT_DRONE, self.absence):
+            for part in self._texts.messages(Severity.WARNING, text) if text is not None else ():
+                self._node.send(part, sysid=self.sysid, compid=AUTOPILOT, to=inbound.channel)
         if message.get_msgId() in COMMANDS:
             compid = message.target_component or self.owner(message).compid
             answer = _answer(inbound, dialect.MAV_RESULT_FAILED)

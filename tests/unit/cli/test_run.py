@@ -7,6 +7,7 @@ import os
 import select
 import signal
 import socket
+import subprocess
 import sys
 import time
 from collections.abc import AsyncIterator
@@ -503,3 +504,13 @@ def test_help(words: list[str], capsys: Any) -> None:
         main(words)
     assert caught.value.code == 0
     assert "anafi-mav" in capsys.readouterr().out
+
+
+def test_gateway_without_simulated_drones_does_not_load_the_simulator() -> None:
+    program = (
+        "import sys; from anafi_mav.cli.run import place; from anafi_mav.config import Config, DroneConfig; "
+        "assert place(Config(drones=[DroneConfig(name='a', sysid=1, address='192.168.42.1')]), None)[1] is None; "
+        "print([name for name in sys.modules if name.startswith('anafi_mav.sim')])"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.strip() == "[]"
