@@ -138,8 +138,9 @@ class Expectation(Generic[T]):
         if self._timer is not None:
             self._timer.cancel()
         self._commander.forget(self)
-        if self.future.done() and not self.future.cancelled():
-            self.future.exception()  # nobody may be waiting any more; asyncio would complain
+        if self.future.cancel() or self.future.cancelled():
+            return  # an error that it is given later needs no reader
+        self.future.exception()  # nothing may wait for it any longer; asyncio would complain
 
 
 class Commander:
