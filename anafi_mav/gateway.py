@@ -694,8 +694,8 @@ class _FabricSystems:
     def is_started(self) -> bool:
         return bool(self._gateway.systems)
 
-    def refused_id(self, sysid: int) -> bool:
+    def report_id(self, sysid: int, *, is_taken: bool) -> bool:
         supervised = self._gateway.supervised(sysid)
         if supervised is not None:
-            supervised.system.announce(Severity.CRITICAL, texts.SYSTEM_ID_TAKEN.fill(sysid=sysid))
+            supervised.system.set_notice(texts.SYSTEM_ID_TAKEN.fill(sysid=sysid), is_true=is_taken)
         return supervised is not None

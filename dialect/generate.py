@@ -3,7 +3,8 @@
 pymavlink carries its definitions as XML inside the package and a generator, mavgen, that turns them into a Python
 module. mavgen refuses a second definition of a message, so the overlay is merged into copies of the XML files first.
 The enums of that module become a module of their own, without mavgen's descriptions, which are most of their size:
-`plans` needs the numbers but not the messages, and neither module needs pymavlink at run time.
+`plans` needs the numbers but not the messages, and neither module needs pymavlink at run time. What is the same in all
+messages of a class becomes attributes of that class: the gateway makes thousands of messages a second.
 Run ``python dialect/generate.py`` to make both modules in place; the build hook does the same for wheels. With
 ``--c FOLDER`` it writes a set of C headers instead; ``FOLDER/anafi/mavlink.h`` is the one to include.
 """
@@ -15,6 +16,7 @@ import ast
 import contextlib
 import copy
 import io
+import re
 import sys
 import tempfile
 import xml.etree.ElementTree as ET
@@ -37,6 +39,43 @@ DIALECT = Path("mavlink", "dialect.py")
 
 BEGIN, END = "\n# enums\n", "\n# message IDs\n"
 """mavgen's comments before and after its enums."""
+
+SENDERS = re.compile(r"\n    def \w+_encode\(")
+"""Begin of mavgen's methods that make and send each message, the rest of its module. They are not used, and take more
+memory than the messages."""
+
+BASE = """    instance_offset = -1
+
+    def __init__(self, msgId: int, name: str) -> None:
+"""
+"""In mavgen's class of all messages: what the classes of single messages inherit goes before the constructor."""
+
+SHARED = """    instance_offset = -1
+
+    _payload: Optional[Union[bytes, bytearray]] = None
+    _msgbuf = bytearray(b"")
+    _crc: Optional[int] = None
+    _signed = False
+    _link_id: Optional[int] = None
+    _instances: Optional[Dict[str, str]] = None
+
+    def __init_subclass__(cls) -> None:
+        cls._header = MAVLink_header(cls.id)
+        cls._fieldnames = cls.fieldnames
+        cls._type = cls.msgname
+        cls._instance_field = cls.instance_field
+        cls._instance_offset = cls.instance_offset
+
+    def __init__(self, msgId: int, name: str) -> None:
+"""
+
+CONSTRUCTOR = re.compile(
+    r"        MAVLink_message\.__init__\(self, (MAVLink_\w+_message)\.id, \1\.msgname\)\n"
+    r"        self\._fieldnames = \1\.fieldnames\n"
+    r"        self\._instance_field = \1\.instance_field\n"
+    r"        self\._instance_offset = \1\.instance_offset\n"
+)
+"""What mavgen sets in each message although it is the same for all messages of the class."""
 
 ENUMS_HEAD = '''"""MAVLink's enums: numbers, names, and the commands that have a location. Generated, do not edit.
 
@@ -85,7 +124,24 @@ def split(text: str) -> tuple[str, str]:
     if not begin or not end:
         raise OverlayError("mavgen's module has no enums")
     star = "\nfrom anafi_mav.mav_enums import *  # the numbers and names of all enums\n"
-    return _enums_module(ast.parse(section)), f"{before}{star}{end}{after}"
+    return _enums_module(ast.parse(section)), f"{_with_shared_attributes(before)}{star}{end}{_lightened(after)}"
+
+
+def _with_shared_attributes(base: str) -> str:
+    """Return mavgen's part with the class of all messages, which gives its subclasses what their messages share."""
+    before, constructor, after = base.partition(BASE)
+    if not constructor:
+        raise OverlayError("mavgen writes the class of all messages in another way")
+    return f"{before}{SHARED}{after}"
+
+
+def _lightened(messages: str) -> str:
+    """Return mavgen's part with the messages without what each of them sets, and without the methods that send them."""
+    messages, count = CONSTRUCTOR.subn("", messages)
+    begin = SENDERS.search(messages)
+    if begin is None or count != messages.count("_message(MAVLink_message):"):
+        raise OverlayError("mavgen writes its messages in another way")
+    return messages[: begin.start()]
 
 
 def _enums_module(section: ast.Module) -> str:

@@ -6,31 +6,32 @@ import argparse
 import asyncio
 import contextlib
 import logging
+import math
 import os
 import signal
-from collections import Counter
-from collections.abc import Callable, Coroutine, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from anafi_mav.cli import interrupts, log, options, run_check, start_warnings
-from anafi_mav.cli.addresses import SHARED, Ports, Reservations, spot
+from anafi_mav.cli import event_loop, interrupts, log, run_check, start_warnings
+from anafi_mav.cli.addresses import Reservations, spot
 from anafi_mav.cli.child import SimulatorProcess
-from anafi_mav.cli.scenarios import load as load_scenario
 from anafi_mav.cli.service_manager import ServiceManager
 from anafi_mav.cli.terminal import complain, say
-from anafi_mav.config import Config, DroneConfig, SimConfig, from_mapping, load
+from anafi_mav.config import Config, from_mapping, load
 from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import Gateway, state_in_use
-from anafi_mav.sim.world import quirks
-from anafi_mav.sim.world.model import MODELS
 from anafi_mav.state_lock import read_holder, state_folder
 
 READY_LIMIT = 15.0
 """s after which "ready" is said though a drone has not answered: its connection takes 3 s at most, its settings and
 its states 5 s each."""
+
+ASKED_FOR = 60.0
+"""s after a SIGINT in which a second one ends the gateway though drones fly. One of an hour later may be a mistake,
+too."""
 
 CLOSE_LIMIT = 9.0
 """s for the last hover (5 s until the drone has confirmed it, 2 s of centred sticks) and the closing of the sockets; a
@@ -110,7 +111,7 @@ def _serve(arguments: argparse.Namespace) -> int:
     config = configuration(arguments.config, arguments.drone, arguments.endpoint, arguments.allow_kill)
     for warning in start_warnings.warnings_of(config):
         complain(f"warning: {warning.text}", warning.style)
-    problems = asyncio.run(_run(config, arguments.sim_log.absolute() if arguments.sim_log else None))
+    problems = event_loop.run(_run(config, arguments.sim_log.absolute() if arguments.sim_log else None))
     for problem in problems:
         complain(f"not kept: {problem}")
     return 1 if problems else 0
@@ -132,7 +133,7 @@ def configuration(
     return msgspec.structs.replace(config, allow_kill=True) if allow_kill else config
 
 
-class _Interrupts:
+class StopSignals:
     """Signal handling: SIGINT, SIGTERM and SIGHUP set `stop`.
 
     While drones fly a second SIGINT is required.
@@ -141,7 +142,8 @@ class _Interrupts:
     def __init__(self) -> None:
         self.stop = asyncio.Event()
         self.flying: Callable[[], list[str]] = list
-        self._told = False
+        self._asked = -math.inf
+        """Time of the SIGINT that was answered with the drones in the air, s."""
 
     def install(self) -> None:
         interrupts.listen(self.receive, "SIGINT", "SIGTERM")
@@ -154,22 +156,26 @@ class _Interrupts:
 
         A first SIGINT shows it.
         """
-        return [] if self._told else self.flying()
+        return [] if self._has_asked else self.flying()
 
     def receive(self, number: signal.Signals) -> None:
-        sentences = self.flying() if number == signal.SIGINT and not self._told else []
+        sentences = self.flying() if number == signal.SIGINT and not self._has_asked else []
         if not sentences:
             self.stop.set()
             return
-        self._told = True
+        self._asked = asyncio.get_running_loop().time()
         for sentence in sentences:
             say(sentence, "yellow")
-        say("Ctrl-C once more ends the gateway all the same", "yellow")
+        say(f"Ctrl-C once more within {ASKED_FOR:.0f} s ends the gateway all the same", "yellow")
+
+    @property
+    def _has_asked(self) -> bool:
+        return asyncio.get_running_loop().time() - self._asked < ASKED_FOR
 
 
 async def _run(config: Config, sim_log: Path | None) -> list[str]:
     """Run the gateway; return what was wrong with its state folder at the end."""
-    signals = _Interrupts()
+    signals = StopSignals()
     signals.install()
     folder = state_folder(config.state)
     holder = read_holder(folder)
@@ -254,86 +260,8 @@ def place(config: Config, reservations: Reservations) -> tuple[Config, dict[str,
 
     Returns the configuration for the gateway, which knows addresses only, and the fleet for the simulator, if any.
     """
-    simulated = {index: drone.sim for index, drone in enumerate(config.drones) if drone.sim is not None}
-    if not simulated:
+    if all(drone.sim is None for drone in config.drones):
         return config, None
-    real = {drone.address for drone in config.drones}
-    places: dict[int, tuple[str, Ports]] = {}
-    # Addresses that the user wrote down come first, so that none of them is chosen for another drone.
-    for index, sim in sorted(simulated.items(), key=lambda item: item[1].address is None):
-        key_path, port = f"drones[{index}].sim", config.drones[index].discovery_port
-        if sim.address is None:
-            places[index] = reservations.choose(key_path, port, sim.http_port, sim.rtsp_port, avoid=real)
-        else:
-            places[index] = (
-                sim.address,
-                reservations.take_configured(f"{key_path}.address", sim.address, port, sim.http_port, sim.rtsp_port),
-            )
-    drones = tuple(
-        _placed(drone, *places[index]) if index in places else drone for index, drone in enumerate(config.drones)
-    )
-    shared = {address for address, count in Counter(address for address, _ in places.values()).items() if count > 1}
-    for index, sim in simulated.items():
-        if sim.scenario is not None and places[index][0] in shared:
-            problem = f"expected none: the drone shares {SHARED} with others, and a scenario is for an address"
-            raise ConfigError(f"drones[{index}].sim.scenario", problem)
-        quirks.named(sim.firmware_quirks, f"drones[{index}].sim.firmware_quirks")
-    first = next(iter(simulated.values()))
-    fleet = {
-        "speed": first.speed,
-        "seed": next((sim.seed for sim in simulated.values() if sim.seed is not None), None),
-        "drones": [_entry(config.drones[index], sim, *places[index]) for index, sim in simulated.items()],
-        "scenarios": _scenarios(simulated, {index: address for index, (address, _) in places.items()}),
-    }
-    return msgspec.structs.replace(config, drones=drones), fleet
+    from anafi_mav.cli import simulated_drones  # with the simulator: a tenth of the gateway's memory
 
-
-def _placed(drone: DroneConfig, address: str, ports: Ports) -> DroneConfig:
-    """A simulated drone as the gateway sees it: one like any other."""
-    return msgspec.structs.replace(
-        drone, address=address, discovery_port=ports.discovery, http_port=ports.http, rtsp_port=ports.rtsp, sim=None
-    )
-
-
-def _entry(drone: DroneConfig, sim: SimConfig, address: str, ports: Ports) -> dict[str, Any]:
-    """A drone as `anafi-mav sim --fleet` reads it.
-
-    One with ports of its own has any free ports for its datagrams, and a serial number of its system id: that of its
-    address would be another drone's too.
-    """
-    own_ports = ports.discovery != drone.discovery_port
-    free = {"handshake_port": 0, "c2d_port": 0, "serial": f"{MODELS[sim.model].serial_prefix}{drone.sysid:06d}"}
-    return {
-        **(free if own_ports else {}),
-        "name": drone.name,
-        "model": sim.model,
-        "address": address,
-        "home": sim.home,
-        "discovery_port": ports.discovery,
-        "http_port": ports.http,
-        "rtsp_port": ports.rtsp,
-        "versions": (1, sim.protocol),
-        "telemetry_rate": sim.telemetry_rate,
-        "skycontroller": sim.skycontroller,
-        "storage": options.size("storage", sim.storage) if isinstance(sim.storage, str) else sim.storage,
-        "wind": {} if sim.wind is None else _without_none(msgspec.structs.asdict(sim.wind)),
-        "firmware_quirks": sim.firmware_quirks,
-    }
-
-
-def _without_none(values: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in values.items() if value is not None}
-
-
-def _scenarios(simulated: Mapping[int, SimConfig], addresses: Mapping[int, str]) -> dict[str, str]:
-    """Return the scenario files by address.
-
-    Each file is read now, so that a mistake is reported before anything is started.
-    """
-    paths: dict[str, str] = {}
-    for index, sim in simulated.items():
-        if sim.scenario is None:
-            continue
-        load_scenario(f"drones[{index}].sim.scenario", Path(sim.scenario), set(addresses.values()))
-        paths[addresses[index]] = str(Path(sim.scenario).absolute())
-    return paths
+    return simulated_drones.place(config, reservations)

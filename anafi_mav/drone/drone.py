@@ -177,10 +177,7 @@ class Drone:
             self.video,
             self.piloting,
         )
-        self._routes: dict[type[Message], list[tuple[Element[Any], Reducer]]] = {}
-        for element in self._elements:
-            for message, reducer in element.REDUCERS.items():
-                self._routes.setdefault(message, []).append((element, reducer))
+        self._routes = _routes([element.REDUCERS for element in self._elements])
         self._reactions: dict[type[Message], Callable[[Any, float], object]] = {
             **self.piloting.reactions(),
             **self.controller.reactions(),
@@ -779,16 +776,24 @@ class Drone:
 
     # -- the hot path
 
-    def _receive(self, message: Message | UnknownMessage, now: float) -> None:
-        if isinstance(message, UnknownMessage):
-            self._counters["unknown message"] += 1
-            return
+    def _return_state(self, message: Message) -> Message:
+        """Return the state of a return as `rth.State`, unless the drone reports that itself."""
         if isinstance(message, rth.State):
             self._reports_rth_state = True
         elif isinstance(message, ardrone3.NavigateHomeStateChanged) and not self._reports_rth_state:
-            message = modern(message)
+            return modern(message)
+        return message
+
+    def _receive(self, message: Message | UnknownMessage, now: float) -> None:
+        # Not by isinstance, which takes as long for these classes as a reducer.
+        if type(message) is UnknownMessage:
+            self._counters["unknown message"] += 1
+            return
+        if type(message) in _OF_RETURN:
+            message = self._return_state(message)
         kind = type(message)
-        for element, reducer in self._routes.get(kind, ()):
+        for place, reducer in self._routes.get(kind, ()):
+            element = self._elements[place]
             element.state = reducer(element.state, message)
         reaction = self._reactions.get(kind)
         if reaction is not None:
@@ -803,6 +808,29 @@ class Drone:
                 log.exception("%s: a subscriber failed on %s", self.name, message.NAME)
         if message_log.isEnabledFor(logging.DEBUG):
             message_log.debug("%s: %r", self.name, without_secrets(message))
+
+
+Routes: TypeAlias = Mapping[type[Message], Sequence[tuple[int, Reducer]]]
+"""The reducers of each event, with the place of their element among all elements."""
+
+_known_routes: dict[tuple[int, ...], tuple[Sequence[Mapping[type[Message], Reducer]], Routes]] = {}
+"""By the identities of the elements' tables: all drones share the one entry, which was 40 kB of each."""
+
+
+def _routes(tables: Sequence[Mapping[type[Message], Reducer]]) -> Routes:
+    """Return the reducers of each event, from the tables of all elements."""
+    key = tuple(map(id, tables))
+    if key not in _known_routes:
+        routes: dict[type[Message], list[tuple[int, Reducer]]] = {}
+        for place, table in enumerate(tables):
+            for message, reducer in table.items():
+                routes.setdefault(message, []).append((place, reducer))
+        _known_routes[key] = tables, routes
+    return _known_routes[key][1]
+
+
+_OF_RETURN = frozenset({rth.State, ardrone3.NavigateHomeStateChanged})
+"""The state of a return, and its legacy twin."""
 
 
 def _ignore(message: Message | UnknownMessage, now: float) -> None:

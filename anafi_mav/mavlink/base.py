@@ -176,19 +176,21 @@ class Outbox:
 
     A fleet's telemetry is thousands of small frames a second. At most `limit` bytes go at once; the frame that would
     exceed them begins the next lot. With a limit of 0 nothing is gathered: each frame leaves alone and at once. An
-    answer
-    to what has just been read does not wait for the next iteration: reading is done `with` the outbox, and at the end
-    of
-    that block everything leaves.
+    answer to what has just been read does not wait for the next iteration: reading is done `with` the outbox, and at
+    the end of that block everything leaves. With a `pause`, what follows a lot within that time (s) leaves at its end,
+    or when the limit is reached.
     """
 
-    def __init__(self, write: Callable[[bytes], None], limit: int) -> None:
+    def __init__(self, write: Callable[[bytes], None], limit: int, pause: float = 0.0) -> None:
         self._write = write
         self._limit = limit
+        self._pause = pause
         self._frames: list[bytes] = []
         self._size = 0
         self._due: asyncio.Handle | None = None
         self._held = False
+        self._next = 0.0
+        """End of the pause after the last lot (s, loop time)."""
 
     def __enter__(self) -> None:
         self._held = True
@@ -208,7 +210,9 @@ class Outbox:
         self._frames.append(raw)
         self._size += len(raw)
         if self._due is None and not self._held:
-            self._due = asyncio.get_running_loop().call_soon(self.flush)
+            loop = asyncio.get_running_loop()
+            is_paused = self._pause > 0.0 and loop.time() < self._next
+            self._due = loop.call_at(self._next, self.flush) if is_paused else loop.call_soon(self.flush)
 
     def flush(self) -> None:
         """Let everything leave now."""
@@ -220,6 +224,8 @@ class Outbox:
 
     def _give(self) -> None:
         frames, self._frames, self._size = self._frames, [], 0
+        if self._pause:
+            self._next = asyncio.get_running_loop().time() + self._pause
         self._write(frames[0] if len(frames) == 1 else b"".join(frames))
 
 

@@ -51,8 +51,12 @@ class _Stream:
         return True
 
 
+_OFF = _Stream(None, None)
+"""A message that is not streamed: one object for all."""
+
+
 class _Lane(Generic[ChannelT]):
-    """One message on all channels, and when it is due next on one of them."""
+    """One message on the channels that stream it, and when it is due next on one of them."""
 
     __slots__ = ("streams", "until")
 
@@ -61,17 +65,26 @@ class _Lane(Generic[ChannelT]):
         self.until = -_NEVER
 
 
+class _Group(Generic[ChannelT]):
+    """Messages that are asked about together; those that are streamed on a channel."""
+
+    __slots__ = ("lanes", "until")
+
+    def __init__(self, lanes: list[tuple[int, _Lane[ChannelT]]]) -> None:
+        self.lanes = lanes
+        self.until = -_NEVER
+        """None of them is due before: this alone answers most questions of a fast drone."""
+
+
 class _Audience(Generic[ChannelT]):
     """Channels that are asked about together, and what is known of them."""
 
-    __slots__ = ("channels", "lanes", "quiet")
+    __slots__ = ("channels", "groups", "lanes")
 
     def __init__(self, channels: Sequence[ChannelT]) -> None:
         self.channels = channels
         self.lanes: dict[int, _Lane[ChannelT]] = {}
-        self.quiet: dict[tuple[int, ...], float] = {}
-        """Messages asked about together -> until when none of them is due: this alone answers most questions of a
-        fast drone."""
+        self.groups: dict[tuple[int, ...], _Group[ChannelT]] = {}
 
 
 class Streams(Generic[ChannelT]):
@@ -125,12 +138,12 @@ class Streams(Generic[ChannelT]):
         A list of channels that has changed must be another object, as `Node.channels` is.
         """
         audience = self._audience(channels)
-        if now < audience.quiet.get(ids, -_NEVER):
+        group = audience.groups.get(ids) or self._new_group(audience, ids)
+        if now < group.until:
             return []
         found: list[tuple[int, list[ChannelT]]] = []
         soonest = _NEVER
-        for id in ids:
-            lane = audience.lanes.get(id) or self._new_lane(audience, id)
+        for id, lane in group.lanes:
             if now >= lane.until:
                 due, until = [], _NEVER
                 for channel, stream in lane.streams:
@@ -143,10 +156,15 @@ class Streams(Generic[ChannelT]):
                     found.append((id, due))
             if lane.until < soonest:
                 soonest = lane.until
-        if len(audience.quiet) >= MAX_GROUPS:
-            audience.quiet.clear()
-        audience.quiet[ids] = soonest
+        group.until = soonest
         return found
+
+    def is_streamed(self, channels: Sequence[ChannelT], id: int) -> bool:
+        """Return True if a message is streamed on one of these channels.
+
+        About their list see `due_on`.
+        """
+        return bool(self._lane(self._audience(channels), id).streams)
 
     def due(self, channel: ChannelT, id: int, now: float) -> bool:
         """True when a message may leave now on this channel; it then counts as sent."""
@@ -166,7 +184,7 @@ class Streams(Generic[ChannelT]):
         """Something about this message has changed."""
         for audience in self._audiences:
             audience.lanes.pop(id, None)
-            audience.quiet.clear()
+            audience.groups.clear()
 
     def _audience(self, channels: Sequence[ChannelT]) -> _Audience[ChannelT]:
         for audience in self._audiences:
@@ -176,8 +194,18 @@ class Streams(Generic[ChannelT]):
         self._audiences = [audience, *self._audiences[: MAX_AUDIENCES - 1]]
         return audience
 
-    def _new_lane(self, audience: _Audience[ChannelT], id: int) -> _Lane[ChannelT]:
-        lane = audience.lanes[id] = _Lane([(channel, self._stream(channel, id)) for channel in audience.channels])
+    def _new_group(self, audience: _Audience[ChannelT], ids: tuple[int, ...]) -> _Group[ChannelT]:
+        if len(audience.groups) >= MAX_GROUPS:
+            audience.groups.clear()
+        lanes = ((id, self._lane(audience, id)) for id in ids)
+        group = audience.groups[ids] = _Group([(id, lane) for id, lane in lanes if lane.streams])
+        return group
+
+    def _lane(self, audience: _Audience[ChannelT], id: int) -> _Lane[ChannelT]:
+        lane = audience.lanes.get(id)
+        if lane is None:
+            streams = [(channel, self._stream(channel, id)) for channel in audience.channels]
+            lane = audience.lanes[id] = _Lane([one for one in streams if one[1].interval is not None])
         return lane
 
     def _stream(self, channel: ChannelT, id: int) -> _Stream:
@@ -186,7 +214,8 @@ class Streams(Generic[ChannelT]):
             streams = self._channels.setdefault(channel, {})
         stream = streams.get(id)
         if stream is None:
-            stream = streams[id] = _Stream(self._default(channel, id), self._pace(channel))
+            interval = self._default(channel, id)
+            stream = streams[id] = _OFF if interval is None else _Stream(interval, self._pace(channel))
         return stream
 
     def _default(self, channel: ChannelT, id: int) -> float | None:

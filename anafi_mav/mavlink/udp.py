@@ -39,6 +39,11 @@ ONE_FRAME = 0
 frame of a datagram and loses the others."""
 
 
+PAUSE = 0.005
+"""s between two datagrams of several frames, unless they are full. A datagram takes the kernel 10 us and more,
+whatever is in it, and telemetry may take 20 ms."""
+
+
 def _datagram_limit(url: EndpointUrl) -> int:
     return url.options.datagram_bytes if url.options.frames == "many" else ONE_FRAME
 
@@ -101,7 +106,7 @@ class UdpOut(Endpoint):
 
     def __init__(self, url: EndpointUrl, sink: Sink, clock: Clock) -> None:
         super().__init__(url, sink, clock)
-        self._outbox = Outbox(self._write, _datagram_limit(url))
+        self._outbox = Outbox(self._write, _datagram_limit(url), PAUSE)
         self.channel = shaped_channel(url.text, self._outbox.add, url.options, datagrams=True)
         self._transport: asyncio.DatagramTransport | None = None
         self._reopening: asyncio.Task[None] | None = None
@@ -248,7 +253,7 @@ class UdpIn(Listener):
             if not self._is_allowed(address[0]):
                 return
             # Not a peer before it has sent something true: garbage must not open channels.
-            outbox = Outbox(self._writer(address), _datagram_limit(self.parsed))
+            outbox = Outbox(self._writer(address), _datagram_limit(self.parsed), PAUSE)
             name = f"{self.url} from {self._shown(address)}"
             channel = shaped_channel(name, outbox.add, self.parsed.options, datagrams=True)
             self._protect(channel)

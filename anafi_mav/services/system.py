@@ -198,6 +198,8 @@ class System:
         self.failsafe_limits = failsafe_limits
         self.position_of = position_of
         self.payload_history = PayloadHistory()
+        self.notices: dict[OperatorText, None] = {}
+        """Texts that are true whatever the drone does: a client that connects later gets them with its banner."""
         self.drone = drone
         self.clock = clock
         self.memory = Memory(state)
@@ -407,6 +409,14 @@ class System:
         """Send a STATUSTEXT about the drone's link to every client, also while that link is down."""
         for message in self._texts.messages(severity, text):
             self._node.send(message, sysid=self.sysid, compid=AUTOPILOT, to=self.channels)
+
+    def set_notice(self, text: OperatorText, *, is_true: bool) -> None:
+        """Send a critical text to every client, and to those that connect later while it is true."""
+        if is_true:
+            self.notices[text] = None
+            self.announce(Severity.CRITICAL, text)
+        else:
+            self.notices.pop(text, None)
 
     def warn_throttled(self, text: OperatorText) -> None:
         """Send a warning on a frequent event, at most every `STATUS_EVERY` seconds.

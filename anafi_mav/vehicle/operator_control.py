@@ -132,6 +132,9 @@ class Tick:
     """The system that was the operator and is silent; 0: none."""
 
 
+_NOTHING = Tick()
+
+
 class OperatorControl:
     """The operator of one aircraft, its secondaries, and the requests that wait."""
 
@@ -229,7 +232,7 @@ class OperatorControl:
     def tick(self, now: float) -> Tick:
         """Return the consequences of the time until now."""
         if self.is_free:
-            return Tick()
+            return _NOTHING
         if now - self._heard.get(self.operator, now) >= SILENT:
             lost = self.operator
             self._leave(Event.SILENCE)

@@ -46,6 +46,9 @@ SCRIPT = str(Path(__file__).resolve())
 ENDPOINTS = 3
 WEB_PORT = 18088
 CLIENT = 14550
+FRAMES = {"many": "frames=many&datagram_bytes=1400", "one": "frames=one"}
+"""Options of the endpoints."""
+
 LEAST = 0.99
 """Share of the rates that the generator has to reach."""
 
@@ -105,8 +108,8 @@ class Row:
         addresses = consecutive(first, drones)
         ports = [CLIENT + 1 + number for number in range(ENDPOINTS)]
         config = {
-            "endpoints": [f"udpout://{stations}:{port}?frames={frames}" for port in ports]
-            + [f"udpout://{stations}:{CLIENT}?frames={frames}&systems=1"],
+            "endpoints": [f"udpout://{stations}:{port}?{FRAMES[frames]}" for port in ports]
+            + [f"udpout://{stations}:{CLIENT}?{FRAMES[frames]}&systems=1"],
             "drones": [
                 {"name": f"d{number}", "sysid": number, "address": address}
                 for number, address in enumerate(addresses, 1)

@@ -21,7 +21,7 @@ import struct
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, NamedTuple, Protocol, TypeVar, get_args, get_origin
+from typing import Annotated, Any, ClassVar, NamedTuple, Protocol, TypeVar, final, get_args, get_origin
 
 import msgspec
 
@@ -125,6 +125,7 @@ class Message(msgspec.Struct, frozen=True):
     DIRECTION: ClassVar[Direction]
 
 
+@final
 class UnknownMessage(msgspec.Struct, frozen=True):
     """A message that is not declared here.
 

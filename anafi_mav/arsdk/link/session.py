@@ -23,6 +23,7 @@ from anafi_mav.arsdk.link.transport import (
     Event,
     Garbage,
     LinkDown,
+    Rank,
     ReceivedMessage,
     Silent,
     Speaks,
@@ -136,12 +137,12 @@ class Session(asyncio.DatagramProtocol):
         """See `Transport.counters`."""
         return self._transport.counters
 
-    def send(self, message: Message | UnknownMessage) -> int:
+    def send(self, message: Message | UnknownMessage, rank: Rank = Rank.NORMAL) -> int:
         """Send a message at the end of this event-loop iteration; the token is for `cancel`.
 
         Raises `LocalProtocolError` when it cannot be encoded. On a link that is lost it does nothing.
         """
-        token = self._transport.send(message, self._loop.time())
+        token = self._transport.send(message, self._loop.time(), rank)
         self._flush_soon()
         return token
 
@@ -267,6 +268,8 @@ class Session(asyncio.DatagramProtocol):
         if endpoint is None or self.lost.done():
             return
         guard = self._guard
+        if guard is None and self._timer is not None and self._transport.is_idle:
+            return  # nearly always after telemetry, which puts the next ping off
         if guard is not None and not guard.may_send():
             self._flush_due = True
             self._loop.call_later(STALL_PAUSE, self._flush)

@@ -29,6 +29,7 @@ from anafi_mav.drone.payload.camera_enums import (
 )
 from anafi_mav.drone.payload.camera_modern import ModernCamera
 from anafi_mav.drone.payload.camera_state import (
+    UNREPORTED,
     CamerasState,
     CameraState,
     CaptureProgress,
@@ -109,7 +110,7 @@ class Camera(Commanding[CamerasState]):
 
     def __getitem__(self, id: int) -> CameraState:
         """The state of this camera, an empty one when the drone has not reported it."""
-        return self.state.cameras.get(id, CameraState())
+        return self.state.cameras.get(id, UNREPORTED)
 
     # -- pictures
 

@@ -64,6 +64,7 @@ from anafi_mav.drone.payload.camera_enums import (
 )
 from anafi_mav.drone.payload.camera_state import (
     MAX_OPTIONS,
+    UNREPORTED,
     CamerasState,
     CameraState,
     CaptureProgress,
@@ -147,7 +148,7 @@ def _photo_option(state: CamerasState, m: wire.PhotoCapabilities) -> CamerasStat
 
 
 def _camera(state: CamerasState, id: int) -> CameraState:
-    return state.cameras.get(id, CameraState())
+    return state.cameras.get(id, UNREPORTED)
 
 
 def _exposure(state: CamerasState, m: wire.ExposureSettings) -> CamerasState:

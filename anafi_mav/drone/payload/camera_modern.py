@@ -46,6 +46,7 @@ from anafi_mav.drone.payload.camera_enums import (
 )
 from anafi_mav.drone.payload.camera_state import (
     MAX_OPTIONS,
+    UNREPORTED,
     CamerasState,
     CameraState,
     CaptureProgress,
@@ -76,7 +77,7 @@ def _list(state: CamerasState, m: wire.CameraList) -> CamerasState:
 def _state(state: CamerasState, m: wire.State) -> CamerasState:
     id = m.camera_id or 0
     changes: dict[str, Any] = {"feature": FEATURE}
-    now = state.cameras.get(id, CameraState())
+    now = state.cameras.get(id, UNREPORTED)
     if m.active is not None:
         state = replace(state, active=state.active | {id} if m.active else state.active - {id})
     if m.photo is not None:

@@ -220,6 +220,10 @@ class CameraState(msgspec.Struct, frozen=True):
         return Range(self.zoom_speed, *self.zoom_speed_bounds)
 
 
+UNREPORTED = CameraState()
+"""A camera that the drone has not reported."""
+
+
 class CamerasState(msgspec.Struct, frozen=True):
     """All cameras by id."""
 
@@ -245,8 +249,10 @@ class CamerasState(msgspec.Struct, frozen=True):
 def changed(state: CamerasState, id: int, **changes: Any) -> CamerasState:
     """Return the state with these fields of one camera; the same state if none changes."""
     known = state.cameras.get(id)
-    camera = replace(CameraState() if known is None else known, **changes)
-    return state if camera == known else replace(state, cameras=with_item(state.cameras, id, camera, 0))
+    if known is not None and all(getattr(known, name) == value for name, value in changes.items()):
+        return state
+    camera = replace(UNREPORTED if known is None else known, **changes)
+    return replace(state, cameras=with_item(state.cameras, id, camera, 0))
 
 
 class CaptureProgress(enum.Enum):

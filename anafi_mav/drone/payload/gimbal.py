@@ -125,6 +125,10 @@ class GimbalState(msgspec.Struct, frozen=True):
         return angle >= high - ARRIVED_DEG if direction > 0.0 else angle <= low + ARRIVED_DEG
 
 
+UNREPORTED = GimbalState()
+"""A gimbal that the drone has not reported."""
+
+
 def _ranges(message: gimbal.MaxSpeed | gimbal.Offsets) -> dict[Axis, Range]:
     values = {
         Axis.YAW: (message.current_yaw, message.min_bound_yaw, message.max_bound_yaw),
@@ -161,7 +165,7 @@ Gimbals = Mapping[int, GimbalState]
 
 
 def _with(state: Gimbals, id: int, **changes: object) -> Gimbals:
-    return with_item(state, id, replace(state.get(id, GimbalState()), **changes), 0)
+    return with_item(state, id, replace(state.get(id, UNREPORTED), **changes), 0)
 
 
 class Gimbal(Commanding[Gimbals]):
@@ -193,7 +197,7 @@ class Gimbal(Commanding[Gimbals]):
 
     def __getitem__(self, id: int) -> GimbalState:
         """The state of this gimbal, an empty one when the drone has not reported it."""
-        return self.state.get(id, GimbalState())
+        return self.state.get(id, UNREPORTED)
 
     @property
     def main(self) -> GimbalState:

@@ -7,18 +7,23 @@ between two of them is interpolated; after the newest position the drone goes on
 from __future__ import annotations
 
 import math
-from collections import deque
+import struct
+from collections.abc import Iterator
 
 import msgspec
 
 from anafi_mav import geo
 from anafi_mav.units import quaternion_from_euler, wrap_pi
 
-SAMPLES = 256
-"""Samples of each kind: eight seconds of pictures at 30 Hz."""
+SAMPLES = 96
+"""Samples of each kind: three seconds of pictures at 30 Hz. A photo's pose is taken within half a second."""
 
 FURTHEST = 1.5
 """s from the nearest sample at which a value is still taken for the moment; a position arrives once a second."""
+
+SPACING = 0.05
+"""s between two samples of events that are kept. An ANAFI reports five times a second; between samples at this distance
+the way of a drone or gimbal is straight."""
 
 NEAR = 0.2
 """s from a picture within which the pictures of the video are the source: six of them."""
@@ -41,30 +46,53 @@ class CameraPose(msgspec.Struct, frozen=True):
 
 
 class SampleTrack:
-    """Values of one kind over time; between two angles (rad) the shorter way is interpolated."""
+    """Values of one kind over time; between two angles (rad) the shorter way is interpolated.
 
-    def __init__(self, *, angles: bool = False) -> None:
+    The samples are packed numbers in a ring: as objects, 256 of each kind, those of a drone took 0.2 MB.
+    """
+
+    def __init__(self, width: int, *, angles: bool = False, spacing: float = 0.0) -> None:
+        """Create it empty.
+
+        `width`: values of a sample, `spacing`: s between two samples that are kept.
+        """
         self._angles = angles
-        self._samples: deque[tuple[float, tuple[float, ...]]] = deque(maxlen=SAMPLES)
+        self._spacing = spacing
+        self._row = struct.Struct(f"{1 + width}d")
+        """Time and values of a sample."""
+        self._ring = bytearray()
+        """Empty before the first sample: most drones are flown without a video."""
+        self._count = 0
+        """Samples so far."""
+        self.newest = -math.inf
+        """Time of the newest sample."""
 
     def add(self, at: float, *values: float) -> None:
-        """Add a sample; one that is not newer than the last, or not finite, is left out."""
-        samples = self._samples
-        if math.isfinite(sum(values)) and not (samples and at <= samples[-1][0]):
-            samples.append((at, values))
+        """Add a sample.
+
+        One that is not newer than the last by the spacing, or not finite, is left out.
+        """
+        if at - self.newest <= self._spacing or not math.isfinite(sum(values)):
+            return
+        if not self._ring:
+            self._ring = bytearray(SAMPLES * self._row.size)
+        self._row.pack_into(self._ring, self._count % SAMPLES * self._row.size, at, *values)
+        self._count += 1
+        self.newest = at
 
     def clear(self) -> None:
         """Forget all samples."""
-        self._samples.clear()
+        self._count, self.newest = 0, -math.inf
 
-    @property
-    def newest(self) -> float:
-        """Time of the newest sample."""
-        return self._samples[-1][0] if self._samples else -math.inf
+    def _latest_first(self) -> Iterator[tuple[float, tuple[float, ...]]]:
+        """Yield time and values of each sample."""
+        for number in range(self._count - 1, max(self._count - SAMPLES, 0) - 1, -1):
+            at, *values = self._row.unpack_from(self._ring, number % SAMPLES * self._row.size)
+            yield at, tuple(values)
 
     def distance(self, at: float) -> float:
         """Return how far the nearest sample is from a moment, s."""
-        return min((abs(time - at) for time, _ in self._samples), default=math.inf)
+        return min((abs(time - at) for time, _ in self._latest_first()), default=math.inf)
 
     def value(self, at: float) -> tuple[float, ...] | None:
         """Return the values at a moment.
@@ -73,7 +101,7 @@ class SampleTrack:
         `FURTHEST`.
         """
         before = after = None
-        for sample in reversed(self._samples):
+        for sample in self._latest_first():
             if sample[0] <= at:
                 before = sample
                 break
@@ -91,16 +119,17 @@ class SampleTrack:
 class PoseSource:
     """Samples of one source: the drone's events, or the pictures of its video."""
 
-    def __init__(self) -> None:
-        self.places = SampleTrack()
+    def __init__(self, spacing: float = 0.0) -> None:
+        """`spacing`: s between two samples of a kind that are kept."""
+        self.places = SampleTrack(2, spacing=spacing)
         """Latitude, longitude, deg."""
-        self.velocities = SampleTrack()
+        self.velocities = SampleTrack(2, spacing=spacing)
         """North, east, m/s."""
-        self.heights = SampleTrack()
+        self.heights = SampleTrack(1, spacing=spacing)
         """m above take-off."""
-        self.gimbals = SampleTrack(angles=True)
+        self.gimbals = SampleTrack(3, angles=True, spacing=spacing)
         """Roll and pitch of the camera to the horizon, its yaw to `headings`, rad."""
-        self.headings = SampleTrack(angles=True)
+        self.headings = SampleTrack(1, angles=True, spacing=spacing)
         """Yaw of the drone, rad; 0 in a source whose camera's yaw is that to true north."""
 
     def clear(self) -> None:
@@ -132,7 +161,7 @@ class PoseTrack:
     """The pose of the last seconds, from events and from pictures."""
 
     def __init__(self) -> None:
-        self.events = PoseSource()
+        self.events = PoseSource(SPACING)
         self.pictures = PoseSource()
 
     def clear(self) -> None:

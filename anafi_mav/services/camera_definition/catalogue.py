@@ -11,6 +11,7 @@ recording (camera.xml exposure_settings): a definition that follows them would c
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from msgspec.structs import replace
@@ -67,6 +68,10 @@ MAX_OPTIONS = 64
 is a confused drone."""
 
 
+SHARED = 64
+"""Cameras with different offers that are remembered: a model has up to three."""
+
+
 class Restriction(NamedTuple):
     """While a setting has a value, and the others theirs, the target has these options only."""
 
@@ -104,6 +109,12 @@ class CameraOffers(NamedTuple):
     """Options and limits of each of `SETTINGS`."""
 
 
+@lru_cache(maxsize=SHARED)
+def _shared(offers: CameraOffers) -> CameraOffers:
+    """Return one object for equal cameras of different drones: each has hundreds of options."""
+    return offers
+
+
 class Catalogue:
     """The settings of one connected drone."""
 
@@ -121,7 +132,7 @@ class Catalogue:
         for id, camera in cameras.cameras.items():
             self._cameras[id] = grown(self._cameras.get(id), camera)
         self._shared, self._thermal = cameras, thermal
-        offers = {id: self._offers_of(camera) for id, camera in self._cameras.items()}
+        offers = {id: _shared(self._offers_of(camera)) for id, camera in self._cameras.items()}
         if offers == self._offers:
             return False
         self._offers = offers

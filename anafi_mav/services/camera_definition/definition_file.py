@@ -33,14 +33,16 @@ def definition_file(catalogue: Catalogue, model: str) -> DefinitionFile:
     `model` is the camera's name in CAMERA_INFORMATION. The version is a hash of the content: QGroundControl and MAVSDK
     keep a file for each name and version for good.
     """
-    version = crc32(_content(catalogue, model, 0))
+    content = _content(catalogue, model)
+    version = crc32(content)
     folded = (version ^ version >> 16) & 0xFFFF or 1  # 0 means that there is no definition
-    return DefinitionFile(_content(catalogue, model, folded), folded)
+    return DefinitionFile(content.replace(b'version="0"', b'version="%d"' % folded, 1), folded)
 
 
-def _content(catalogue: Catalogue, model: str, version: int) -> bytes:
+def _content(catalogue: Catalogue, model: str) -> bytes:
+    """Return the file with version 0."""
     root = ET.Element("mavlinkcamera")
-    head = ET.SubElement(root, "definition", version=str(version))
+    head = ET.SubElement(root, "definition", version="0")
     ET.SubElement(head, "model").text = model
     ET.SubElement(head, "vendor").text = VENDOR
     parameters = ET.SubElement(root, "parameters")

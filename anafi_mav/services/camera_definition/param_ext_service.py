@@ -12,6 +12,7 @@ import math
 from collections import deque
 from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 from anafi_mav import texts
 from anafi_mav.drone import Camera, Thermal
@@ -22,7 +23,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.camera_definition.camera_setting import Guard, View
 from anafi_mav.services.camera_definition.catalogue import Catalogue, CatalogueEntry
-from anafi_mav.services.camera_definition.definition_file import definition_file
+from anafi_mav.services.camera_definition.definition_file import DefinitionFile, definition_file
 from anafi_mav.services.camera_definition.param_ext_codec import FIELD_LENGTH, VALUE_LENGTH
 from anafi_mav.services.component_metadata import COMPRESSED, compress
 from anafi_mav.services.definition_link import DefinitionContent
@@ -57,6 +58,9 @@ REPEAT_AFTER = 1.0
 
 REFUSAL_EVERY = 5.0
 """s between texts to one channel about refused writes: QGroundControl repeats a failed one three times."""
+
+SHARED = 16
+"""Definitions that drones share. A model has one, or a few that differ by the settings of its firmware."""
 
 EVENTS = tuple(kind for kind in (*Camera.REDUCERS, *Thermal.REDUCERS) if kind not in Camera.FREQUENT)
 
@@ -153,9 +157,7 @@ class ParamExtService(Service):
         if not self._catalogue.learn(drone.camera.state, drone.thermal.state) or not self._catalogue.entries:
             return
         made = definition_file(self._catalogue, drone.identity.model.title)
-        if made.content != self.host.definition.content.plain:
-            content = DefinitionContent(URI, made.version, made.content, compress(made.content))
-            self.host.definition.update(content)
+        self.host.definition.update(_content(made))
 
     def _plain_file(self, flavour: Flavour, query: Query) -> bytes | None:
         return self.host.definition.content.plain or None
@@ -346,6 +348,12 @@ class ParamExtService(Service):
             name.encode(errors="replace")[:FIELD_LENGTH], value, kind, result
         )
         self.host.send(message, inbound.channel)
+
+
+@lru_cache(maxsize=SHARED)
+def _content(made: DefinitionFile) -> DefinitionContent:
+    """Return a definition with its compressed file; equal drones share it."""
+    return DefinitionContent(URI, made.version, made.content, compress(made.content))
 
 
 def _accepts(entry: CatalogueEntry, value: float) -> bool:

@@ -19,7 +19,7 @@ from anafi_mav.services.checksum import crc32
 from anafi_mav.services.commands import Command
 from anafi_mav.services.component_metadata import COMPRESSED, GENERAL
 from anafi_mav.services.files import FileError, FileRefused, FileTree, Folder, Query, ServedFile, absolute
-from anafi_mav.services.flavours import FLAVOURS, Flavour, flavour_of
+from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.ftp.ftp import FtpServer, Wait, protected
 from anafi_mav.services.paced_sender import PacedSender
 from anafi_mav.services.service import Host, MessageHandler, Request, Service, channel_of, client_of
@@ -49,15 +49,21 @@ class FtpService(Service):
         self._sender = PacedSender(host)
         self._next_look = 0.0
         self._files: Mapping[str, ServedFile] = {}
+        self._folders: Mapping[str, Folder] = {}
         self._trees: dict[str, FileTree] = {}
-        """By name of the flavour."""
+        """By name of the flavour; made for its first client."""
         self._made: dict[tuple[str, str], bytes] = {}
         """Metadata by flavour and path: the same for as long as the drone is connected."""
 
     def take_tables(self, files: Mapping[str, ServedFile], folders: Mapping[str, Folder]) -> None:
         """Take the files and folders of all services, by path."""
-        self._files = files
-        for flavour in FLAVOURS.values():
+        self._files, self._folders = files, folders
+
+    def _tree(self, flavour: Flavour) -> FileTree:
+        """Return the files as clients of a flavour see them."""
+        tree = self._trees.get(flavour.name)
+        if tree is None:
+            files = self._files
             makers = {
                 path: partial(self._content, path, flavour)
                 for path, file in files.items()
@@ -66,7 +72,8 @@ class FtpService(Service):
             lasting = [path for path, file in files.items() if file.metadata is not None]
             makers |= {path + COMPRESSED: partial(self._content, path + COMPRESSED, flavour) for path in lasting}
             makers |= {path: partial(self._general, path, flavour) for path in (GENERAL, GENERAL + COMPRESSED)}
-            self._trees[flavour.name] = FileTree(makers, folders)
+            tree = self._trees[flavour.name] = FileTree(makers, self._folders)
+        return tree
 
     def capabilities(self) -> int:
         return dialect.MAV_PROTOCOL_CAPABILITY_FTP
@@ -109,7 +116,7 @@ class FtpService(Service):
 
     def _receive(self, inbound: Inbound) -> None:
         who = client_of(inbound)
-        files = _ClientFiles(self._trees[flavour_of(inbound.channel).name], self._files, inbound, self.host)
+        files = _ClientFiles(self._tree(flavour_of(inbound.channel)), self._files, inbound, self.host)
         answer = self._server.receive(who, bytes(inbound.message.payload), files, inbound.now)
         if isinstance(answer, Wait):
             answer.abandon = self.host.spawn(self._wait(answer, inbound)).cancel

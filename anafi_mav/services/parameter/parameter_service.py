@@ -10,9 +10,9 @@ from __future__ import annotations
 import asyncio
 import math
 import struct
-from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from anafi_mav import texts
 from anafi_mav.drone.events import Message
@@ -81,18 +81,51 @@ def parameters_of(flavour: Flavour) -> tuple[Parameter, ...]:
     return tuple(sorted((*NATIVE_NAMES, *NAME_TABLES[flavour.parameter_names]), key=lambda parameter: parameter.name))
 
 
+_RAW = struct.Struct("<d")
+
+
+class ParameterTable(NamedTuple):
+    """Parameters in the sequence of their list, and what follows from them."""
+
+    parameters: Sequence[Parameter]
+    places: Mapping[str, int]
+    """Place of each by its name."""
+    polled: Sequence[int]
+    """Places of the gateway's own settings."""
+    updated_by: Mapping[type[Message], Sequence[int]]
+    """Places of those that an event may change."""
+
+
+_known_tables: dict[tuple[int, ...], ParameterTable] = {}
+"""By the identities of the parameters: drones with the same ones share it."""
+
+
+def _table_of(parameters: Sequence[Parameter]) -> ParameterTable:
+    """Return the table of these parameters."""
+    key = tuple(map(id, parameters))
+    if key not in _known_tables:
+        updated_by: dict[type[Message], list[int]] = {}
+        for place, parameter in enumerate(parameters):
+            for event in parameter.updates:
+                updated_by.setdefault(event, []).append(place)
+        places = {parameter.name: place for place, parameter in enumerate(parameters)}
+        polled = [place for place, parameter in enumerate(parameters) if parameter.polled]
+        _known_tables[key] = ParameterTable(parameters, places, polled, updated_by)
+    return _known_tables[key]
+
+
 class ParameterList:
     """The parameters of one vehicle as one flavour lists them."""
 
     def __init__(self, host: Host, flavour: Flavour) -> None:
         self._host = host
         self._flavour = flavour
-        self.parameters = [one for one in parameters_of(flavour) if one.present(host.drone)]
-        self.index = {parameter.name: index for index, parameter in enumerate(self.parameters)}
-        self._told: list[bytes] = [self._raw(parameter) for parameter in self.parameters]
-        """The value of each that was last reported to all clients."""
-        self.changes = [0] * len(self.parameters)
-        """How often each was reported to all clients."""
+        self.table = _table_of([one for one in parameters_of(flavour) if one.present(host.drone)])
+        self.parameters, self.index = self.table.parameters, self.table.places
+        self._told = bytearray(b"".join(map(self._raw, self.parameters)))
+        """The values that were last reported to all clients."""
+        self.changes: Counter[int] = Counter()
+        """How often each was reported to all clients, by its place."""
         self.version = 0
         """How often any of them has changed."""
 
@@ -129,9 +162,9 @@ class ParameterList:
         """
         found = []
         for index in candidates:
-            raw = self._raw(self.parameters[index])
-            if raw != self._told[index]:
-                self._told[index] = raw
+            raw, place = self._raw(self.parameters[index]), slice(index * _RAW.size, (index + 1) * _RAW.size)
+            if raw != self._told[place]:
+                self._told[place] = raw
                 self.changes[index] += 1
                 self.version += 1
                 found.append(index)
@@ -139,7 +172,7 @@ class ParameterList:
 
     def _raw(self, parameter: Parameter) -> bytes:
         """Bytes, so that NaN is equal to NaN."""
-        return struct.pack("<d", parameter.value(self._host))
+        return _RAW.pack(parameter.value(self._host))
 
 
 class ParameterService(Service):
@@ -149,11 +182,9 @@ class ParameterService(Service):
         super().__init__(host)
         self._lists: dict[str, ParameterList] = {}
         """By name of the flavour; empty until the drone has connected for the first time."""
-        self._by_news: dict[type[Message], dict[str, list[int]]] = {}
-        self._polled: dict[str, list[int]] = {}
-        """By name of the flavour: places of the gateway's own settings."""
-        self._own: list[Parameter] = []
-        """The gateway's own settings, each once."""
+        self._own: list[Callable[[Host], float]] = []
+        """Functions that read the gateway's own settings, each once."""
+        self._own_packer = struct.Struct("")
         self._seen = b""
         """Their values at the last look."""
         self._sender = PacedSender(host)
@@ -191,13 +222,9 @@ class ParameterService(Service):
         self._restore()
         if not self._lists:
             self._lists = {flavour.name: ParameterList(self.host, flavour) for flavour in FLAVOURS.values()}
-            for name, listed in self._lists.items():
-                self._polled[name] = [index for index, one in enumerate(listed.parameters) if one.polled]
-                own = (one for one in listed.parameters if one.polled and not one.derived)
-                self._own += [one for one in own if one not in self._own]
-                for index, parameter in enumerate(listed.parameters):
-                    for event in parameter.updates:
-                        self._by_news.setdefault(event, {}).setdefault(name, []).append(index)
+            polled = (listed.parameters[place] for listed in self._lists.values() for place in listed.table.polled)
+            self._own = list({one.name: one.read for one in polled if not one.derived}.values())
+            self._own_packer = struct.Struct(f"<{len(self._own)}d")
         for name, listed in self._lists.items():
             self._tell(name, listed.changed(range(len(listed))))
 
@@ -210,11 +237,12 @@ class ParameterService(Service):
         self._refused_at.pop(channel, None)
 
     def subscriptions(self) -> Subscriptions:
-        return dict.fromkeys(self._by_news, self._on_value)
+        events = {event for listed in self._lists.values() for event in listed.table.updated_by}
+        return dict.fromkeys(events, self._on_value)
 
     def _on_value(self, message: Message, now: float) -> None:
-        for name, indices in self._by_news.get(type(message), {}).items():
-            self._tell(name, self._lists[name].changed(indices))
+        for name, listed in self._lists.items():
+            self._tell(name, listed.changed(listed.table.updated_by.get(type(message), ())))
 
     def tick(self, now: float) -> None:
         if not self._storing.locked() and self._own_values() != self._seen:
@@ -394,7 +422,7 @@ class ParameterService(Service):
     def _own_values(self) -> bytes:
         """Bytes, so that NaN is equal to NaN."""
         host = self.host
-        return struct.pack(f"<{len(self._own)}d", *[one.read(host) for one in self._own])
+        return self._own_packer.pack(*[read(host) for read in self._own])
 
     async def _settle(self) -> None:
         """Store the gateway's own settings that have changed, then notify every client of them.
@@ -405,8 +433,8 @@ class ParameterService(Service):
             while (now := self._own_values()) != self._seen:
                 self._seen = now
                 await self._keep()  # meanwhile at most as many change as there are writers: each waits for us
-            for name, indices in self._polled.items():
-                self._tell(name, self._lists[name].changed(indices))
+            for name, listed in self._lists.items():
+                self._tell(name, listed.changed(listed.table.polled))
 
     def _tell(self, name: str, indices: list[int]) -> None:
         """PARAM_VALUE of these to every channel of a flavour."""

@@ -9,8 +9,9 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 from anafi_mav.drone.events import Message
 from anafi_mav.mavlink import dialect
@@ -49,6 +50,9 @@ A component has those of its own messages. MAVSDK falls back on them, MAVProxy k
 LOG_EVERY = 5.0
 """s before it is logged again that a message cannot be made."""
 
+SHARED = 16
+"""Tables of streams that are remembered: all drones share those of the autopilot and of the camera."""
+
 REPEATED = 0.1
 """s between two repetitions of a message without updates; an update leaves at once, as often as `fastest` allows."""
 
@@ -73,14 +77,16 @@ class MessageService(Service):
         self._intervals: Streams[Channel] = Streams({})
         self._table: Mapping[int, MessageStream] = {}
         self._requests: Mapping[int, Request] = {}
-        self._tracker = UpdateTracker()
-        self._events: set[type[Message]] = set()
+        self._tracker = UpdateTracker({})
+        self._events: Sequence[type[Message]] = ()
         """Those that are news for some message."""
         self._repeated: tuple[int, ...] = ()
         self._on_change: list[int] = []
         self._linked_at = 0.0
         self._stamped: dict[int, float] = {}
         """The time (s, monotonic) in the last message of each kind: it never goes back."""
+        self._moment: tuple[float, Times] = (math.nan, Times(0, 0, 0))
+        """The moment (s, monotonic) of the last message, and its times: the next one is often of the same moment."""
         self._failed: dict[int, float] = {}
         """When it was last logged that a message cannot be made."""
         self._sources: PoseSources[Channel] = PoseSources()
@@ -105,13 +111,9 @@ class MessageService(Service):
         self._table, self._requests = streams, requests
         defaults = {id: stream.every for id, stream in streams.items() if stream.every is not None}
         self._intervals = Streams(defaults, without=self._unstreamed, pace=lambda channel: channel.pace)
-        for id, stream in streams.items():
-            self._tracker.register(id, (id,))
-            for event in stream.updates:
-                self._tracker.register(event, (id,))
-                self._events.add(event)
-            if stream.on_change:
-                self._on_change.append(id)
+        self._events, affected = _affected(tuple((id, stream.updates) for id, stream in streams.items()))
+        self._tracker = UpdateTracker(affected)
+        self._on_change = [id for id, stream in streams.items() if stream.on_change]
         self._repeated = tuple(id for id, stream in streams.items() if stream.is_repeated)
         self._poses = tuple(id for id, stream in streams.items() if stream.from_pictures)
         self._of_video = tuple(id for id, stream in streams.items() if stream.needs_video and not stream.from_pictures)
@@ -174,7 +176,7 @@ class MessageService(Service):
     def needs_video(self) -> bool:
         """True while a client has a stream whose fields are in the video only."""
         channels = self.host.channels
-        return any(self._intervals.interval(channel, id) is not None for id in self._of_video for channel in channels)
+        return any(self._intervals.is_streamed(channels, id) for id in self._of_video)
 
     def show_picture(self, pose: VehiclePose, shot: float, now: float) -> None:
         """Send the pose that a picture reports to the channels that want it.
@@ -262,7 +264,11 @@ class MessageService(Service):
     def _stamp(self, id: int, at: float, pose: VehiclePose = UNKNOWN_POSE) -> Times:
         """The time for a message of this kind; an event that was handled late does not put it back."""
         at = self._stamped[id] = max(at, self._stamped.get(id, at))
-        return self.host.times(at, pose)
+        moment, times = self._moment
+        if at != moment or pose is not times.pose:
+            times = self.host.times(at, pose)
+            self._moment = at, times
+        return times
 
     def _leave(self, id: int, to: Sequence[Channel], times: Times) -> bool:
         """Send a message; return False when a value that it needs is unknown."""
@@ -396,6 +402,23 @@ class MessageService(Service):
         if self._table[id].is_repeated:
             return REPEATED if interval is None else 1.0 / (1.0 / REPEATED + 1.0 / interval)
         return interval or 0.0
+
+
+@lru_cache(maxsize=SHARED)
+def _affected(
+    updates: tuple[tuple[int, tuple[type[Message], ...]], ...],
+) -> tuple[Sequence[type[Message]], Mapping[Hashable, tuple[int, ...]]]:
+    """Return the events that update messages, and the messages that each source affects.
+
+    Sources are these events and the messages themselves. `updates`: each message with the events that update it.
+    """
+    affected: dict[Hashable, tuple[int, ...]] = {}
+    for id, kinds in updates:
+        for kind in dict.fromkeys(kinds):
+            affected[kind] = (*affected.get(kind, ()), id)
+    events = tuple(kind for kind in affected if isinstance(kind, type))
+    affected.update((id, (id,)) for id, _ in updates)
+    return events, affected
 
 
 def _has(channel: Channel, stream: MessageStream) -> bool:

@@ -8,7 +8,7 @@ that a message made of all three is sent once, with all three.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Mapping
 
 WINDOW = 10.0
 """s. How often something is news is counted over the present window and the one before."""
@@ -39,8 +39,9 @@ class UpdateTracker:
     A source is anything hashable: a kind of event, the number of a message.
     """
 
-    def __init__(self) -> None:
-        self._ids: dict[Hashable, tuple[int, ...]] = {}
+    def __init__(self, ids: Mapping[Hashable, tuple[int, ...]]) -> None:
+        """`ids`: the messages that an update from each source affects."""
+        self._ids = ids
         self._updated: dict[Hashable, None] = {}
         """The sources that had news in this turn, in their order."""
         self._at = 0.0
@@ -49,14 +50,6 @@ class UpdateTracker:
         """The bundles that each message is in."""
         self._since = self._window = 0.0
         """When the window before this one began, and this one."""
-
-    def register(self, source: Hashable, ids: Iterable[int]) -> None:
-        """Register the messages that an update from this source affects."""
-        self._ids[source] = tuple(dict.fromkeys((*self._ids.get(source, ()), *ids)))
-
-    @property
-    def sources(self) -> Iterable[Hashable]:
-        return self._ids.keys()
 
     def reset(self, now: float) -> None:
         """Forget all updates and intervals."""

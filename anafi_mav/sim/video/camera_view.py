@@ -1,4 +1,4 @@
-"""View of the camera in one picture, and the rate of pictures..
+"""View of the camera in one picture, and the rate of pictures.
 
 `h264` and `camera_picture` draw it with numpy, which is imported for the first viewer only.
 """

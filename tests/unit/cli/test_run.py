@@ -7,6 +7,7 @@ import os
 import select
 import signal
 import socket
+import subprocess
 import sys
 import time
 from collections.abc import AsyncIterator
@@ -23,7 +24,7 @@ from support.world import HOLD, HOME, loopback
 from anafi_mav import geo, mav_enums
 from anafi_mav.cli import main
 from anafi_mav.cli.addresses import Reservations
-from anafi_mav.cli.run import configuration, place
+from anafi_mav.cli.run import ASKED_FOR, StopSignals, configuration, place
 from anafi_mav.cli.sim import Fleet
 from anafi_mav.config import Config, load
 from anafi_mav.mavlink.key_ring import write_key
@@ -235,6 +236,20 @@ async def test_ctrl_c_in_the_air_asks_first(tmp_path: Path) -> None:
         await gone(child, 0.0)
         assert free(address, 5760)
         assert p.complaints == []
+
+
+async def test_ctrl_c_in_the_air_asks_again_after_a_while(capsys: pytest.CaptureFixture[str]) -> None:
+    signals = StopSignals()
+    signals.flying = lambda: ["alpha is in the air"]
+    signals.receive(signal.SIGINT)
+    await asyncio.sleep(ASKED_FOR)
+    signals.receive(signal.SIGINT)
+    assert not signals.stop.is_set()
+    assert capsys.readouterr().out.count("alpha is in the air") == 2
+    await asyncio.sleep(ASKED_FOR - 1.0)
+    assert signals.unsaid() == []
+    signals.receive(signal.SIGINT)
+    assert signals.stop.is_set()
 
 
 async def test_service_manager_hears_ready_and_log_file_is_json(tmp_path: Path) -> None:
@@ -489,3 +504,13 @@ def test_help(words: list[str], capsys: Any) -> None:
         main(words)
     assert caught.value.code == 0
     assert "anafi-mav" in capsys.readouterr().out
+
+
+def test_gateway_without_simulated_drones_does_not_load_the_simulator() -> None:
+    program = (
+        "import sys; from anafi_mav.cli.run import place; from anafi_mav.config import Config, DroneConfig; "
+        "assert place(Config(drones=[DroneConfig(name='a', sysid=1, address='192.168.42.1')]), None)[1] is None; "
+        "print([name for name in sys.modules if name.startswith('anafi_mav.sim')])"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.strip() == "[]"

@@ -109,6 +109,25 @@ def test_dialect_has_version_2_and_messages_of_both_autopilots() -> None:
     assert len(dialect.mavlink_map) > 300
 
 
+def test_messages_have_the_attributes_of_mavgens_constructor() -> None:
+    """They are the classes' own: a constructor sets the fields alone."""
+    message = dialect.MAVLink_heartbeat_message(2, 12, 1, 0, 4, 3)
+    assert message.get_msgId() == 0
+    assert message.get_type() == "HEARTBEAT"
+    assert message.get_fieldnames() == dialect.MAVLink_heartbeat_message.fieldnames
+    assert (message.get_seq(), message.get_srcSystem(), message.get_signed(), message.get_crc()) == (0, 0, False, None)
+    assert sorted(vars(message)) == sorted(dialect.MAVLink_heartbeat_message.fieldnames)
+
+
+def test_packing_a_message_leaves_others_of_its_class_alone() -> None:
+    packed, other = (dialect.MAVLink_heartbeat_message(2, 12, 1, 0, 4, 3) for _ in range(2))
+    sender = dialect.MAVLink(None, 7, 8)
+    sender.seq = 9
+    packed.pack(sender)
+    assert (packed.get_srcSystem(), packed.get_seq()) == (7, 9)
+    assert (other.get_srcSystem(), other.get_seq(), other.get_msgbuf()) == (0, 0, b"")
+
+
 @pytest.fixture(scope="module")
 def generator() -> ModuleType:
     path = Path(__file__).parents[3] / "dialect" / "generate.py"

@@ -143,7 +143,7 @@ def test_groups_are_bounded() -> None:
     channels = [one]
     for number in range(1000):
         streams.due_on(channels, (ATTITUDE, number), float(number))
-    assert all(len(audience.quiet) <= 256 for audience in streams._audiences)
+    assert all(len(audience.groups) <= 256 for audience in streams._audiences)
 
 
 def test_lists_of_channels_asked_about_in_turn_share_intervals() -> None:

@@ -6,11 +6,11 @@ import math
 
 import pytest
 
-from anafi_mav.services.camera.pose_track import FURTHEST, PoseTrack, SampleTrack
+from anafi_mav.services.camera.pose_track import FURTHEST, SAMPLES, PoseTrack, SampleTrack
 
 
 def test_value_is_interpolated_between_samples() -> None:
-    track = SampleTrack()
+    track = SampleTrack(1)
     track.add(1.0, 10.0)
     track.add(1.2, 20.0)
     assert track.value(1.05) == pytest.approx((12.5,))
@@ -20,7 +20,7 @@ def test_value_is_interpolated_between_samples() -> None:
 
 
 def test_sample_that_is_not_newer_is_left_out() -> None:
-    track = SampleTrack()
+    track = SampleTrack(1)
     track.add(1.0, 10.0)
     track.add(1.0, 99.0)
     track.add(0.5, 99.0)
@@ -29,8 +29,28 @@ def test_sample_that_is_not_newer_is_left_out() -> None:
     assert track.newest == 1.0
 
 
+def test_oldest_samples_give_way_to_newer_ones() -> None:
+    track = SampleTrack(2)
+    for number in range(SAMPLES + 10):
+        track.add(float(number), 10.0 * number, -float(number))
+    assert track.value(10.0) == (100.0, -10.0)
+    assert track.value(SAMPLES + 8.5) == pytest.approx((10.0 * (SAMPLES + 8.5), -(SAMPLES + 8.5)))
+    assert track.distance(0.0) == 10.0
+    assert track.value(9.0) == (100.0, -10.0)
+
+
+def test_cleared_track_has_no_samples_of_before() -> None:
+    track = SampleTrack(1)
+    track.add(5.0, 1.0)
+    track.clear()
+    assert track.value(5.0) is None
+    assert track.distance(5.0) == math.inf
+    track.add(4.0, 2.0)
+    assert track.value(5.0) == (2.0,)
+
+
 def test_angle_is_interpolated_across_south() -> None:
-    track = SampleTrack(angles=True)
+    track = SampleTrack(1, angles=True)
     track.add(1.0, math.radians(175.0))
     track.add(2.0, math.radians(-175.0))
     assert track.value(1.5) == pytest.approx((math.pi,))

@@ -47,11 +47,7 @@ def bundled(tracker: UpdateTracker, sources: str, at: float) -> tuple[int, ...]:
 
 def registered() -> UpdateTracker:
     """a makes 1 and 2 new, b makes 2 and 3 new, c makes 3 new."""
-    tracker = UpdateTracker()
-    tracker.register("a", (1, 2))
-    tracker.register("b", (2,))
-    tracker.register("b", (3, 2))
-    tracker.register("c", (3,))
+    tracker = UpdateTracker({"a": (1, 2), "b": (2, 3), "c": (3,)})
     tracker.reset(0.0)
     return tracker
 
@@ -88,9 +84,7 @@ def test_how_often_a_message_is_new() -> None:
 
 
 def test_bundles_are_bounded() -> None:
-    tracker = UpdateTracker()
-    for source in range(600):
-        tracker.register(source, (source,))
+    tracker = UpdateTracker({source: (source,) for source in range(600)})
     tracker.reset(0.0)
     for source in range(600):
         tracker.mark(source, 1.0)
