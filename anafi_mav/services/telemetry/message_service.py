@@ -6,7 +6,6 @@ C3.
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import math
 from collections.abc import Collection, Hashable, Mapping, Sequence
@@ -69,7 +68,7 @@ LONGEST = 2**31 - 1
 class MessageService(Service):
     """Sends messages by their intervals and on request.
 
-    Updates are gathered until the end of the event-loop iteration (see `update_tracker`).
+    Updates that are read together are gathered (see `update_tracker`).
     """
 
     def __init__(self, host: Host) -> None:
@@ -160,12 +159,12 @@ class MessageService(Service):
 
     def _on_update(self, message: Message, now: float) -> None:
         if self._tracker.mark(type(message), now):
-            asyncio.get_running_loop().call_soon(self._send_updated)
+            self.host.drone.after_read(self._send_updated)
 
     def mark_updated(self, id: int, at: float) -> None:
-        """Send this message at the end of the event-loop iteration."""
+        """Send this message soon, with what else is updated at the same time."""
         if self._tracker.mark(id, at):
-            asyncio.get_running_loop().call_soon(self._send_updated)
+            self.host.drone.after_read(self._send_updated)
 
     @property
     def needs_pictures(self) -> bool:
