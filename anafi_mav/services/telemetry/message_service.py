@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
@@ -109,7 +109,7 @@ class MessageService(Service):
         """
         self._table, self._requests = streams, requests
         defaults = {id: stream.every for id, stream in streams.items() if stream.every is not None}
-        self._intervals = Streams(defaults, without=self._unstreamed, pace=lambda channel: channel.pace)
+        self._intervals = Streams(defaults, has=self._is_streamed, pace=lambda channel: channel.pace)
         self._events, affected = _affected(tuple((id, stream.updates) for id, stream in streams.items()))
         self._tracker = UpdateTracker(affected)
         self._on_change = [id for id, stream in streams.items() if stream.on_change]
@@ -288,12 +288,12 @@ class MessageService(Service):
                 logger.error("%s: message %d cannot be made: %r", self.host.drone.name, id, error)
         return True
 
-    def _unstreamed(self, channel: Channel) -> Collection[int]:
-        """Return the messages that a channel does not get by default."""
-        filtered = {id for id, stream in self._table.items() if not (channel.can_stream(id) and _has(channel, stream))}
-        if channel.bytes_per_second is not None and channel.bytes_per_second < SMALL_LINE:
-            filtered |= {id for id, stream in self._table.items() if stream.spared}
-        return flavour_of(channel).unstreamed | filtered
+    def _is_streamed(self, channel: Channel, id: int) -> bool:
+        """Return True for a message that a channel gets by default."""
+        stream = self._table[id]
+        if id in flavour_of(channel).unstreamed or not (channel.can_stream(id) and _has(channel, stream)):
+            return False
+        return not stream.spared or channel.bytes_per_second is None or channel.bytes_per_second >= SMALL_LINE
 
     def _data_stream(self, inbound: Inbound) -> None:
         """REQUEST_DATA_STREAM, from clients of flavours with `data_streams`."""
