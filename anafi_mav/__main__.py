@@ -2,8 +2,13 @@
 
 Importing a command takes up to a second. Ctrl-C ends the program at once then: nothing has been opened or begun, and a
 traceback out of an import helps no user. So this module imports nothing before it has made its arrangements.
+
+The garbage collector is off until the command is imported, and leaves alone for good what exists then. A hundred
+thousand objects of modules live as long as the process. To scan them takes a fifth of the start, and later stops
+everything for a twentieth of a second, again and again.
 """
 
+import gc
 import sys
 
 INTERRUPTED = 130
@@ -19,11 +24,18 @@ except KeyboardInterrupt:
 def main() -> int:
     """Run the command line; returns the exit status."""
     _end_at_once_on_interrupt(INTERRUPTED)
+    gc.disable()
     from anafi_mav.cli import main as run
 
-    status = run()
+    status = run(imported=_collect_garbage)
     _end_at_once_on_interrupt(status)
     return status
+
+
+def _collect_garbage() -> None:
+    """Collect garbage from now on, among objects that do not exist yet."""
+    gc.freeze()
+    gc.enable()
 
 
 def _end_at_once_on_interrupt(status: int) -> None:

@@ -51,7 +51,7 @@ class WrongAircraft(AnafiMavError):
     """
 
     def __init__(self, serial: str, wanted: str) -> None:
-        super().__init__(f"not connected: the aircraft has serial number {serial or 'unknown'}, expected {wanted}")
+        super().__init__(f"the aircraft has serial number {serial or 'unknown'}, expected {wanted}")
         self.serial = serial
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 from collections import Counter
 from collections.abc import Awaitable, Callable
 from functools import partial
@@ -80,6 +81,9 @@ RETRY_WRONG = 10.0
 """s until an address where another aircraft answered is tried again: behind a Skycontroller each attempt ends the
 connection of another program."""
 
+REPORT_EVERY = 60.0
+"""s between two texts about another aircraft at the address: for clients that have connected meanwhile."""
+
 MAX_SERIAL = 18
 """Characters of a serial number that fit the text; Parrot's have as many."""
 
@@ -138,6 +142,8 @@ class _Supervised:
         self.task: asyncio.Task[None] | None = None
         self._is_closing = False
         """True while the drone's connection is closed, which must not be interrupted."""
+        self._reported_at = -math.inf
+        """Time of the last text about another aircraft at the address."""
         self._contention = Contention()
         self._judged = drone.handshake_at
         """The handshake whose loss was judged last."""
@@ -178,6 +184,7 @@ class _Supervised:
                 if self.problem:  # it was reported at this level
                     logger.warning("%s: connected", self.config.name)
                 self.problem, pause = "", RETRY_FIRST
+                self._report_aircraft(None)
                 try:
                     memory_problem = await self.system.load_memory()
                     if self.drone.connected:
@@ -202,14 +209,24 @@ class _Supervised:
                     logger.warning("%s: %s", self.config.name, problem)
                     if isinstance(error, HandshakeRefused):
                         self.system.announce(Severity.WARNING, texts.CONNECTION_REFUSED.fill(status=error.status))
-                    elif isinstance(error, WrongAircraft):
-                        serial = error.serial[-MAX_SERIAL:] or "unknown"
-                        self.system.announce(Severity.CRITICAL, texts.WRONG_AIRCRAFT.fill(serial=serial))
+                self._report_aircraft(error if isinstance(error, WrongAircraft) else None)
                 self.problem = problem
                 self.first_attempt.set()
                 await self.drone.pause(RETRY_WRONG if isinstance(error, WrongAircraft) else pause)
                 pause = min(2.0 * pause, RETRY_LAST)
             await self._contend()
+
+    def _report_aircraft(self, wrong: WrongAircraft | None) -> None:
+        """Report the aircraft that an attempt has found, unless it is the right one (None)."""
+        if wrong is None:
+            self.system.absence, self._reported_at = None, -math.inf
+            return
+        text = texts.WRONG_AIRCRAFT.fill(serial=wrong.serial[-MAX_SERIAL:] or "unknown")
+        now = asyncio.get_running_loop().time()
+        if text != self.system.absence or now - self._reported_at >= REPORT_EVERY:
+            self._reported_at = now
+            self.system.announce(Severity.CRITICAL, text)
+        self.system.absence = text
 
     async def _contend(self) -> None:
         """Stay away for a while if another controller has taken the drone of a lost connection."""
@@ -677,8 +694,8 @@ class _FabricSystems:
     def is_started(self) -> bool:
         return bool(self._gateway.systems)
 
-    def refused_id(self, sysid: int) -> bool:
+    def report_id(self, sysid: int, *, is_taken: bool) -> bool:
         supervised = self._gateway.supervised(sysid)
         if supervised is not None:
-            supervised.system.announce(Severity.CRITICAL, texts.SYSTEM_ID_TAKEN.fill(sysid=sysid))
+            supervised.system.set_notice(texts.SYSTEM_ID_TAKEN.fill(sysid=sysid), is_true=is_taken)
         return supervised is not None

@@ -186,7 +186,7 @@ class StatusReport:
         known, connected = drone.identity, system.active
         source = None if relay is None else relay.source(str(reported.sysid))
         vehicle = system.vehicle
-        warnings: list[str] = []
+        warnings: list[str] = [str(text) for text in system.notices]
         if connected:
             warnings += [str(warning.text) for warning in warnings_of(drone, system.failsafe_limits)]
             warnings += [f"take-off refused: {blocker}" for blocker in drone.takeoff_blockers()]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol, cast
 
 from anafi_mav import __version__
@@ -48,8 +48,11 @@ class Subcommand(Protocol):
         """
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line `argv` (without the program's name); returns the exit status."""
+def main(argv: Sequence[str] | None = None, *, imported: Callable[[], None] = lambda: None) -> int:
+    """Run the command line `argv` (without the program's name); returns the exit status.
+
+    `imported` is called when the command is imported, before it runs.
+    """
     words = _with_command(list(sys.argv[1:] if argv is None else argv))
     parser = argparse.ArgumentParser(prog="anafi-mav", description="Parrot ANAFI drones as MAVLink systems.")
     parser.add_argument("--version", action="version", version=f"anafi-mav {__version__}")
@@ -62,6 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             command.add_arguments(subparser)
     arguments = parser.parse_args(words)
     assert command is not None, "argparse has ended the program"
+    imported()
     try:
         return command.run(arguments)
     except ConfigError as error:

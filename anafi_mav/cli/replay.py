@@ -10,13 +10,15 @@ from __future__ import annotations
 import argparse
 import asyncio
 import heapq
+import itertools
 import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from anafi_mav.cli import interrupts, log, options
 from anafi_mav.cli.terminal import say
-from anafi_mav.errors import ConfigError
+from anafi_mav.disk_writer import DiskWriter
+from anafi_mav.errors import AnafiMavError, ConfigError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.frames import Parser, ReceivedFrame
 from anafi_mav.mavlink.node import Node
@@ -27,11 +29,17 @@ from anafi_mav.services.flavours import FLAVOURS
 CHUNK = 64 * 1024
 """Bytes of a file that are read at once."""
 
+BATCH = 500
+"""Entries that are read ahead."""
+
 LONGEST_LINE = 1_000_000
 """Bytes of a line of a trace."""
 
 LONGEST_PAUSE = 5.0
 """s: a longer gap, as between two flights, is shortened to this."""
+
+_Timed = tuple[float, int, TlogEntry | TraceEntry]
+"""An entry with its time, and 1 for one of the trace."""
 
 DEFAULT_ENDPOINT = "udpout://127.0.0.1:14550"
 
@@ -48,13 +56,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Play to the end or to Ctrl-C. Raises `ConfigError` for a path without a recording."""
+    """Play to the end or to Ctrl-C.
+
+    Raises `ConfigError` for a path without a recording, and `AnafiMavError` for a file that cannot be read.
+    """
     log.set_up()
     tlogs, traces = files_of(arguments.path)
     speed = options.speed(arguments.speed)
     start = options.number("--start", arguments.start, "a number of seconds")
     endpoints = arguments.endpoint or [DEFAULT_ENDPOINT]
-    count = interrupts.run(_play(tlogs, traces if arguments.trace else [], endpoints, speed, start))
+    count = interrupts.run(play(tlogs, traces if arguments.trace else [], endpoints, speed, start))
     say(f"{count} frames played")
     return 0
 
@@ -62,13 +73,18 @@ def run(arguments: argparse.Namespace) -> int:
 def files_of(path: Path) -> tuple[list[Path], list[Path]]:
     """Return the parts of a session's tlog and of its trace. Raises `ConfigError`."""
     if path.is_dir():
-        tlogs = sorted(path.glob("gateway.*.tlog"))
-        traces = sorted(path.glob("arsdk.*.jsonl"))
+        tlogs = sorted(path.glob("gateway.*.tlog"), key=_in_order)
+        traces = sorted(path.glob("arsdk.*.jsonl"), key=_in_order)
     else:
         tlogs, traces = ([path] if path.is_file() else []), []
     if not tlogs:
         raise ConfigError("SESSION", f"expected the folder of a recorded session or a .tlog file, got {path}")
     return tlogs, traces
+
+
+def _in_order(part: Path) -> tuple[int, str]:
+    """Return the key by which part 10000 follows part 9999."""
+    return len(part.name), part.name
 
 
 def read_tlogs(paths: Sequence[Path]) -> Iterator[TlogEntry]:
@@ -108,7 +124,7 @@ class VehicleFrames:
         return frame if frame.sysid in self._vehicles else None
 
 
-async def _play(
+async def play(
     tlogs: Sequence[Path], traces: Sequence[Path], endpoints: Sequence[str], speed: float, start: float
 ) -> int:
     """Send everything at its time; return the number of frames."""
@@ -123,28 +139,43 @@ async def _play(
 async def _send(node: Node, tlogs: Sequence[Path], traces: Sequence[Path], speed: float, start: float) -> int:
     loop = asyncio.get_running_loop()
     vehicles, count = VehicleFrames(), 0
-    merged = heapq.merge(
-        ((entry.time, 0, entry) for entry in read_tlogs(tlogs)),
-        ((entry.t, 1, entry) for entry in read_traces(traces)),
-        key=lambda one: one[:2],
-    )
+    frames: Iterator[_Timed] = ((entry.time, 0, entry) for entry in read_tlogs(tlogs))
+    messages: Iterator[_Timed] = ((entry.t, 1, entry) for entry in read_traces(traces))
+    merged: Iterator[_Timed] = iter(heapq.merge(frames, messages, key=lambda one: one[:2]))
     first: float | None = None
     before, due = 0.0, loop.time()
-    for at, _, entry in merged:
-        first = at if first is None else first
-        frame = vehicles.choose(entry.frame) if isinstance(entry, TlogEntry) else None
-        if at - first < start:
-            before = at
-            continue
-        due += min(max(0.0, at - max(before, first + start)), LONGEST_PAUSE) / speed
-        before = max(before, at)
-        if due > loop.time():
-            await asyncio.sleep(due - loop.time())
-        if isinstance(entry, TraceEntry):
-            say(f"{at - first:.3f} {entry.drone} {entry.kind} {entry.name} {json.dumps(entry.args)}")
-        elif frame is not None:
-            raw = frame.version_2()
-            for channel in node.channels:
-                channel.forward(raw)
-            count += 1
+    # A file that is long, or none of ours, is searched for minutes: in a thread, so that Ctrl-C ends that.
+    reader = DiskWriter("anafi-mav-replay")
+    try:
+        while batch := await loop.run_in_executor(reader, _read_ahead, merged):
+            for at, _, entry in batch:
+                first = at if first is None else first
+                frame = vehicles.choose(entry.frame) if isinstance(entry, TlogEntry) else None
+                if at - first < start:
+                    before = at
+                    continue
+                due += min(max(0.0, at - max(before, first + start)), LONGEST_PAUSE) / speed
+                before = max(before, at)
+                if due > loop.time():
+                    await asyncio.sleep(due - loop.time())
+                if isinstance(entry, TraceEntry):
+                    say(f"{at - first:.3f} {entry.drone} {entry.kind} {entry.name} {json.dumps(entry.args)}")
+                elif frame is not None:
+                    raw = frame.version_2()
+                    for channel in node.channels:
+                        channel.forward(raw)
+                    count += 1
+    finally:
+        reader.shutdown()
     return count
+
+
+def _read_ahead(entries: Iterator[_Timed]) -> list[_Timed]:
+    """Return the next entries; none at the end.
+
+    Raises `AnafiMavError` for a file that cannot be read.
+    """
+    try:
+        return list(itertools.islice(entries, BATCH))
+    except OSError as error:
+        raise AnafiMavError(f"{error.filename}: cannot be read: {error.strerror}") from error

@@ -6,6 +6,7 @@ import argparse
 import asyncio
 import contextlib
 import logging
+import math
 import os
 import signal
 from collections.abc import Callable, Coroutine, Sequence
@@ -14,7 +15,7 @@ from typing import Any
 
 import msgspec
 
-from anafi_mav.cli import event_loop, heap, interrupts, log, run_check, start_warnings
+from anafi_mav.cli import event_loop, interrupts, log, run_check, start_warnings
 from anafi_mav.cli.addresses import Reservations, spot
 from anafi_mav.cli.child import SimulatorProcess
 from anafi_mav.cli.service_manager import ServiceManager
@@ -27,6 +28,10 @@ from anafi_mav.state_lock import read_holder, state_folder
 READY_LIMIT = 15.0
 """s after which "ready" is said though a drone has not answered: its connection takes 3 s at most, its settings and
 its states 5 s each."""
+
+ASKED_FOR = 60.0
+"""s after a SIGINT in which a second one ends the gateway though drones fly. One of an hour later may be a mistake,
+too."""
 
 CLOSE_LIMIT = 9.0
 """s for the last hover (5 s until the drone has confirmed it, 2 s of centred sticks) and the closing of the sockets; a
@@ -106,7 +111,6 @@ def _serve(arguments: argparse.Namespace) -> int:
     config = configuration(arguments.config, arguments.drone, arguments.endpoint, arguments.allow_kill)
     for warning in start_warnings.warnings_of(config):
         complain(f"warning: {warning.text}", warning.style)
-    heap.settle()
     problems = event_loop.run(_run(config, arguments.sim_log.absolute() if arguments.sim_log else None))
     for problem in problems:
         complain(f"not kept: {problem}")
@@ -129,7 +133,7 @@ def configuration(
     return msgspec.structs.replace(config, allow_kill=True) if allow_kill else config
 
 
-class _Interrupts:
+class StopSignals:
     """Signal handling: SIGINT, SIGTERM and SIGHUP set `stop`.
 
     While drones fly a second SIGINT is required.
@@ -138,7 +142,8 @@ class _Interrupts:
     def __init__(self) -> None:
         self.stop = asyncio.Event()
         self.flying: Callable[[], list[str]] = list
-        self._told = False
+        self._asked = -math.inf
+        """Time of the SIGINT that was answered with the drones in the air, s."""
 
     def install(self) -> None:
         interrupts.listen(self.receive, "SIGINT", "SIGTERM")
@@ -151,22 +156,26 @@ class _Interrupts:
 
         A first SIGINT shows it.
         """
-        return [] if self._told else self.flying()
+        return [] if self._has_asked else self.flying()
 
     def receive(self, number: signal.Signals) -> None:
-        sentences = self.flying() if number == signal.SIGINT and not self._told else []
+        sentences = self.flying() if number == signal.SIGINT and not self._has_asked else []
         if not sentences:
             self.stop.set()
             return
-        self._told = True
+        self._asked = asyncio.get_running_loop().time()
         for sentence in sentences:
             say(sentence, "yellow")
-        say("Ctrl-C once more ends the gateway all the same", "yellow")
+        say(f"Ctrl-C once more within {ASKED_FOR:.0f} s ends the gateway all the same", "yellow")
+
+    @property
+    def _has_asked(self) -> bool:
+        return asyncio.get_running_loop().time() - self._asked < ASKED_FOR
 
 
 async def _run(config: Config, sim_log: Path | None) -> list[str]:
     """Run the gateway; return what was wrong with its state folder at the end."""
-    signals = _Interrupts()
+    signals = StopSignals()
     signals.install()
     folder = state_folder(config.state)
     holder = read_holder(folder)

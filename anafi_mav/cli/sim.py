@@ -15,7 +15,7 @@ from pathlib import Path
 
 import msgspec
 
-from anafi_mav.cli import heap, interrupts, log, options, sim_validate
+from anafi_mav.cli import interrupts, log, options
 from anafi_mav.cli.options import integer, number
 from anafi_mav.cli.scenarios import load as load_scenario
 from anafi_mav.cli.terminal import say
@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of `anafi-mav sim`. Their values are checked by `run`, for one clear line each."""
     actions = parser.add_subparsers(dest="action", metavar="ACTION", title="instead of simulating")
     purpose = "fly the tests of the anafi_ros paper and print measured beside published"
-    sim_validate.add_arguments(actions.add_parser("validate", help=purpose, description=purpose))
+    _add_validate_arguments(actions.add_parser("validate", help=purpose, description=purpose))
     default = DroneSpec()
     parser.add_argument("--model", default=default.model, help=f"which ANAFI: {', '.join(MODELS)} (%(default)s)")
     parser.add_argument("--address", default=default.address, help="of the first drone (%(default)s)")
@@ -78,10 +78,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fleet", metavar="FILE", help=argparse.SUPPRESS)
 
 
+def _add_validate_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of `anafi-mav sim validate`."""
+    parser.add_argument("--model", default="all", help=f"{', '.join(MODELS)} or all (%(default)s)")
+    parser.add_argument(
+        "--speed",
+        default="1.0",
+        metavar="FACTOR",
+        help="simulated seconds per second; below 1 a busy machine disturbs less (%(default)s)",
+    )
+    parser.add_argument(
+        "--plots", type=Path, metavar="DIR", help="draw the figures of the paper into DIR (needs matplotlib)"
+    )
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Simulate until SIGINT or SIGTERM. Raises `ConfigError` before anything is started."""
     log.set_up()
     if arguments.action == "validate":
+        from anafi_mav.cli import sim_validate  # which loads the drone's side too
+
         return sim_validate.run(arguments)
     if arguments.fleet is not None:
         asyncio.run(_run(_from_fleet(arguments.fleet), arguments.log, arguments.stdin_watch))
@@ -195,7 +211,6 @@ def _scenarios(fleet: Fleet) -> dict[str, Scenario]:
 
 async def _run(fleet: Fleet, log: Path | None, stdin_watch: bool) -> None:
     scenarios = _scenarios(fleet)
-    heap.settle()
     stop = asyncio.Event()
     interrupts.listen(lambda number: stop.set(), "SIGINT", "SIGTERM")
     if stdin_watch:

@@ -82,20 +82,6 @@ GIMBAL_TIME = 2.2
 ADDRESS = "127.0.0.1"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of `anafi-mav sim validate`."""
-    parser.add_argument("--model", default="all", help=f"{', '.join(MODELS)} or all (%(default)s)")
-    parser.add_argument(
-        "--speed",
-        default="1.0",
-        metavar="FACTOR",
-        help="simulated seconds per second; below 1 a busy machine disturbs less (%(default)s)",
-    )
-    parser.add_argument(
-        "--plots", type=Path, metavar="DIR", help="draw the figures of the paper into DIR (needs matplotlib)"
-    )
-
-
 def run(arguments: argparse.Namespace) -> int:
     """Fly and compare; 1 when something does not agree or the flights are invalid.
 

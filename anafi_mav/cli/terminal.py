@@ -13,17 +13,15 @@ import json
 import math
 import sys
 from collections.abc import Callable, Container, Iterator, Sequence
-from typing import NamedTuple, TextIO
-
-from rich.cells import cell_len
-from rich.console import Console, Group, JustifyMethod
-from rich.live import Live
-from rich.measure import Measurement
-from rich.progress import Progress
-from rich.table import Table
-from rich.text import Text
+from typing import TYPE_CHECKING, NamedTuple, TextIO
 
 from anafi_mav.printable import printable
+
+if TYPE_CHECKING:  # rich is imported for a terminal or a table only
+    from rich.console import JustifyMethod
+    from rich.progress import Progress
+    from rich.table import Table
+    from rich.text import Text
 
 _LAST_COLUMN = 24
 """Characters that the last column of a table has at least, on a terminal that is too narrow for all."""
@@ -76,6 +74,10 @@ def is_live() -> bool:
 @contextlib.contextmanager
 def live_tables() -> Iterator[Callable[[Sequence[str], Sequence[TableRows]], None]]:
     """Lines and tables below them on the terminal, replaced by each call of what it gives."""
+    from rich.console import Console, Group
+    from rich.live import Live
+    from rich.text import Text
+
     with Live(console=Console(file=sys.stdout), screen=True, auto_refresh=False) as screen:
 
         def show(lines: Sequence[str], tables: Sequence[TableRows]) -> None:
@@ -92,6 +94,9 @@ def say_table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Contain
 
     A terminal gets a head in bold and a last column that is folded inside itself. Elsewhere a row is one line.
     """
+    from rich.console import Console
+    from rich.measure import Measurement
+
     table = _table(head, rows, right)
     if sys.stdout.isatty():
         console = Console(file=sys.stdout)
@@ -107,6 +112,10 @@ def say_table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Contain
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Container[int] = ()) -> Table:
+    from rich.cells import cell_len
+    from rich.table import Table
+    from rich.text import Text
+
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="bold")
     for place, title in enumerate(head):
         widest = max(cell_len(printable(row[place])) for row in [head, *rows])
@@ -132,6 +141,9 @@ def progress(what: str, total: int | None) -> Iterator[Callable[[int, int], None
     if not sys.stdout.isatty():
         yield lambda done, of: None
         return
+    from rich.console import Console
+    from rich.progress import Progress
+
     with Progress(console=Console(file=sys.stdout), transient=True) as bar:
         _bars.append(bar)
         task = bar.add_task(what, total=total)
@@ -145,6 +157,9 @@ def _write(stream: TextIO, line: str, style: str) -> None:
     line = printable(line)
     with contextlib.suppress(OSError):  # the reader may be gone (`anafi-mav | head`): no reason to end a flight
         if stream.isatty():
+            from rich.console import Console
+            from rich.text import Text
+
             console = _bars[-1].console if _bars and stream is sys.stdout else Console(file=stream)
             console.print(Text(line, style), soft_wrap=True)
         else:

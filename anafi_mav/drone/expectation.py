@@ -16,6 +16,8 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from anafi_mav.arsdk.codec.secret_fields import without_secrets
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
+from anafi_mav.arsdk.link.transport import Rank
+from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.drone.sent_commands import AUTOMATIC, Event, Phase, SentCommand, SentCommands, Slot
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost
 
@@ -46,7 +48,7 @@ class Wire(Protocol):
 
     on_delivered: Callable[[int, bool], None]
 
-    def send(self, message: Message | UnknownMessage) -> int: ...
+    def send(self, message: Message | UnknownMessage, rank: Rank = Rank.NORMAL) -> int: ...
 
     def cancel(self, token: int) -> None: ...
 
@@ -136,8 +138,9 @@ class Expectation(Generic[T]):
         if self._timer is not None:
             self._timer.cancel()
         self._commander.forget(self)
-        if self.future.done() and not self.future.cancelled():
-            self.future.exception()  # nobody may be waiting any more; asyncio would complain
+        if self.future.cancel() or self.future.cancelled():
+            return  # an error that it is given later needs no reader
+        self.future.exception()  # nothing may wait for it any longer; asyncio would complain
 
 
 class Commander:
@@ -213,8 +216,8 @@ class Commander:
         if task is not None and (task in self._silenced or (task in self._retired and not stops)):
             raise CommandRejected("replaced by a newer command")
 
-    def send(self, message: Message, *, stops: bool = False) -> int:
-        """Hand a command to the transport.
+    def send(self, message: Message, *, stops: bool = False, is_setting: bool = False) -> int:
+        """Hand a command to the transport; stops and landings go before settings there.
 
         Raises `LinkLost` when there is no link, or what the gate raises.
 
@@ -227,7 +230,8 @@ class Commander:
             return BLOCKED
         if message_log.isEnabledFor(logging.DEBUG):
             message_log.debug("%s: sent %r", self.name, without_secrets(message))
-        token = self._wire.send(message)
+        is_urgent = stops or isinstance(message, ardrone3.Landing)
+        token = self._wire.send(message, Rank.URGENT if is_urgent else Rank.SETTING if is_setting else Rank.NORMAL)
         if self.on_command is not None:
             try:
                 self.on_command(message)
@@ -339,10 +343,14 @@ class Commander:
         timeout: float = ANSWER_TIMEOUT,
         *,
         stops: bool = False,
+        is_setting: bool = False,
     ) -> T:
-        """Send a command and return what the judge makes of the answer. `stops`: see `send`."""
+        """Send a command and return what the judge makes of the answer.
+
+        `stops` and `is_setting`: see `send`.
+        """
         expectation = self.expect(answers, judge)
-        self.dispatch(expectation, command, timeout, stops=stops)
+        self.dispatch(expectation, command, timeout, stops=stops, is_setting=is_setting)
         return await expectation.wait()
 
     async def begin(
@@ -390,10 +398,18 @@ class Commander:
         if (undo := self.sent.withdraw(sent, loop_time())) is not None:
             self.send_stop_if_connected(undo)
 
-    def dispatch(self, expectation: Expectation[Any], command: Message, timeout: float, *, stops: bool = False) -> None:
-        """Send the command whose answer is expected. `stops`: see `send`."""
+    def dispatch(
+        self,
+        expectation: Expectation[Any],
+        command: Message,
+        timeout: float,
+        *,
+        stops: bool = False,
+        is_setting: bool = False,
+    ) -> None:
+        """Send the command whose answer is expected. `stops` and `is_setting`: see `send`."""
         try:
-            expectation.token = self.send(command, stops=stops)
+            expectation.token = self.send(command, stops=stops, is_setting=is_setting)
         except BaseException:
             expectation.close()
             raise

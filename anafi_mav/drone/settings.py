@@ -73,7 +73,7 @@ class Commanding(Element[StateT]):
         `stops`: it ends something that goes on.
         """
         async with self._setting_lock(answer):
-            return await self._commander.confirm(command, (answer,), judge, timeout, stops=stops)
+            return await self._commander.confirm(command, (answer,), judge, timeout, stops=stops, is_setting=not stops)
 
     def _setting_lock(self, answer: type[Message]) -> asyncio.Lock:
         """Return the lock that allows one change at a time.

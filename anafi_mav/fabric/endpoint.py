@@ -69,8 +69,11 @@ class FabricSystems(Protocol):
     def is_started(self) -> bool:
         """Return True once drones are connected to; before, an id is looked up and not claimed."""
 
-    def refused_id(self, sysid: int) -> bool:
-        """Report to clients that another gateway has this system id; False before the start."""
+    def report_id(self, sysid: int, *, is_taken: bool) -> bool:
+        """Report to clients that another gateway has this system id, or has it no longer.
+
+        Returns False before the start.
+        """
 
 
 @dataclass
@@ -396,8 +399,10 @@ class FabricEndpoint(Endpoint):
         now = self._clock.monotonic()
         self._claim()
         self._make_room(now)
-        self._reported &= self.claims.taken
-        self._reported |= {sysid for sysid in self.claims.taken - self._reported if self._systems.refused_id(sysid)}
+        taken = self.claims.taken
+        for sysid in taken ^ self._reported:
+            if self._systems.report_id(sysid, is_taken=sysid in taken):
+                self._reported ^= {sysid}
         for station in tuple(self._stations):
             self._ping_if_due(station, now)
         if now - self._stated >= STATE_EVERY and self._connection.is_up:

@@ -10,8 +10,10 @@ from typing import Any
 
 from anafi_mav.mavlink.base import EndpointUrl
 
-CONNECT_LIMIT_MS = 1000
-"""ms of one attempt to connect; the next one follows, and between them the session can be closed."""
+CONNECT_LIMIT_MS = 3000
+"""ms of one attempt to connect, at first and after a loss; the next one follows, and between them the session can be
+closed. A handshake is three times there and back, with TLS five times. With zenoh's default of 10 s after a loss two
+attempts that are not answered are 22 s without drones."""
 
 RETRY = {"period_init_ms": 250, "period_max_ms": 2000, "period_increase_factor": 2}
 """ms between attempts to connect again after a loss."""
@@ -38,6 +40,7 @@ def session_settings(url: EndpointUrl) -> dict[str, Any]:
         "connect/timeout_ms": CONNECT_LIMIT_MS,
         "connect/exit_on_failure": True,
         "connect/retry": RETRY,
+        "transport/unicast/open_timeout": CONNECT_LIMIT_MS,
         "listen/endpoints": place if options.listen else [],
         "listen/exit_on_failure": True,
         "scouting/multicast/enabled": False,

@@ -146,7 +146,8 @@ def _options(url: str, query: str | None) -> EndpointOptions:
     if query is None:
         return DEFAULTS
     try:
-        pairs = parse_qsl(query, strict_parsing=True, keep_blank_values=True)
+        # "+" is a sign of file names here, and no space as in the forms of web pages.
+        pairs = parse_qsl(query.replace("+", "%2B"), strict_parsing=True, keep_blank_values=True)
     except ValueError:
         pairs = []
     if not pairs or len(dict(pairs)) != len(pairs):

@@ -70,6 +70,14 @@ def _is_stations_heartbeat(message: Any) -> bool:
     return isinstance(message, dialect.MAVLink_heartbeat_message) and message.type == dialect.MAV_TYPE_GCS
 
 
+def _is_harmless(message: Any) -> bool:
+    """Return True if a permitted message of an observer neither deceives nor disturbs others.
+
+    It is a station's heartbeat, or reads from one system.
+    """
+    return _is_stations_heartbeat(message) or (targets(message)[0] != 0 and not concerns_link(message))
+
+
 def _log_change(change: str, channel: Channel) -> None:
     """Log that a channel opened or closed. One per made-up address would fill the log."""
     logger.log(logging.INFO if channel.proof is None else logging.DEBUG, "%s: %s", channel.name, change)
@@ -284,8 +292,9 @@ class Node:
             if self.tap is not None:
                 self._guarded(self.tap.received, received)
             permitted = channel.access is Access.ALL or self._permits(channel, received)
-            may_forward = permitted and self._may_forward(channel, received)
-            route = self._router.route(channel, received, now, reached, may_forward=may_forward)
+            is_false = channel.access is Access.OBSERVE and self._has_name_of_other(channel, received)
+            may_forward = permitted and self._may_forward(channel, received, is_false=is_false)
+            route = self._router.route(channel, received, now, reached, may_forward=may_forward, may_learn=not is_false)
             if route.forward:
                 self._forward(channel, received, route)
             if not route.hosts or not self._delivers:
@@ -322,12 +331,24 @@ class Node:
         channel.counters[f"refused_access.{name}"] += 1
         return False
 
-    def _may_forward(self, channel: Channel, received: ReceivedFrame) -> bool:
-        """Return True if a permitted frame may reach other channels; otherwise it is counted."""
+    def _has_name_of_other(self, channel: Channel, received: ReceivedFrame) -> bool:
+        """Return True for a frame in the name of a system of ours.
+
+        Or in that of one behind a channel with more access.
+        """
+        return self._router.is_ours(received.sysid) or any(
+            other.access > channel.access for other in self._router.heard_on(received.sysid)
+        )
+
+    def _may_forward(self, channel: Channel, received: ReceivedFrame, *, is_false: bool) -> bool:
+        """Return True if a permitted frame may reach other channels; otherwise it is counted.
+
+        `is_false`: it is an observer's, in the name of another sender.
+        """
         if not self._stays_within(channel, received):
             channel.counters["filtered_frames"] += 1
             return False
-        if channel.access is Access.OBSERVE and not self._is_harmless(channel, received):
+        if channel.access is Access.OBSERVE and (is_false or not _is_harmless(received.message)):
             channel.counters["refused_observer"] += 1
             return False
         return True
@@ -342,20 +363,6 @@ class Node:
         if channel.system_ids is None or targets(message)[0] != 0 or _is_stations_heartbeat(message):
             return True
         return received.sysid in channel.system_ids and not has_target(message)
-
-    def _is_harmless(self, channel: Channel, received: ReceivedFrame) -> bool:
-        """Return True if a permitted frame of an observer neither deceives nor disturbs others.
-
-        It is a station's heartbeat, or reads from one system. It is not in the name of a system of ours, or of one
-        behind a channel with more access.
-        """
-        named = self._router.is_ours(received.sysid) or any(
-            other.access > channel.access for other in self._router.heard_on(received.sysid)
-        )
-        message = received.message
-        return not named and (
-            _is_stations_heartbeat(message) or (targets(message)[0] != 0 and not concerns_link(message))
-        )
 
     def _stalled(self, seconds: float) -> None:
         logger.warning(

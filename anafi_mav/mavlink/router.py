@@ -99,8 +99,8 @@ class Router(Generic[KeyT, HostT]):
         return tuple([host for host in found if host is not None])
 
     def is_ours(self, sysid: int) -> bool:
-        """Return True for a system that has a host of ours."""
-        return sysid in self._hosts
+        """Return True for a system that has a host of ours, also one that is not there at present."""
+        return sysid in self._hosts or sysid in self._absent_hosts
 
     def heard_on(self, sysid: int, compid: int | None = None) -> list[KeyT]:
         """The channels on which this system, or this component of it, has been heard."""
@@ -121,18 +121,21 @@ class Router(Generic[KeyT, HostT]):
         reached: Container[int] | None = None,
         *,
         may_forward: bool = True,
+        may_learn: bool = True,
     ) -> Route[KeyT, HostT]:
         """Return the destinations of a frame from this channel, and learn its source.
 
         `reached`: the systems that the channel reaches; None: all. `may_forward` is False for a frame that goes to our
-        hosts alone: it then takes no place from the same frame on a channel that may send it.
+        hosts alone: it then takes no place from the same frame on a channel that may send it. `may_learn` is False for
+        a frame in the name of another sender: messages for that one must not go to this channel.
         """
         source = (received.sysid, received.compid)
         if source in self.own_sources:
             self.counters["own_sources"] += 1
             return Route((), ())
         # 0 is the address of all, nobody's name.
-        if received.message is not None and received.sysid != 0 and received.verdict is not Verdict.ALLOWED:
+        is_named = received.message is not None and received.sysid != 0 and received.verdict is not Verdict.ALLOWED
+        if is_named and may_learn:
             self._learn(channel, source)
         target, component = targets(received.message)
         hosts = () if received.message is None else self.hosts(target, component, reached)

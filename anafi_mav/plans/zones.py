@@ -14,10 +14,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
-
-import numpy as np
-import numpy.typing as npt
+from typing import NamedTuple
 
 from anafi_mav import geo
 
@@ -62,6 +59,16 @@ class CircleZone:
         return [t for t in ((-b - math.sqrt(root)) / a, (-b + math.sqrt(root)) / a) if 0.0 < t < 1.0]
 
 
+class Side(NamedTuple):
+    """A side of a polygon, from one corner to the next. m from the polygon's first corner."""
+
+    north: float
+    east: float
+    end_north: float
+    way_north: float
+    way_east: float
+
+
 class PolygonZone:
     """A zone with straight sides."""
 
@@ -69,46 +76,46 @@ class PolygonZone:
         self.name, self.inclusion, self.group = name, inclusion, group
         self.corners = tuple(corners)
         self._origin = self.corners[0]
-        starts = geo.offsets(*self._origin, self.corners)
-        self._starts: npt.NDArray[Any] = starts
-        self._ends: npt.NDArray[Any] = np.roll(starts, -1, axis=0)
-        self._sides = self._ends - starts
-        self._squares = np.maximum(np.einsum("ij,ij->i", self._sides, self._sides), 1e-12)
+        places = [geo.offset(*self._origin, *corner) for corner in self.corners]
+        ends = [*places[1:], places[0]]
+        self._sides = [
+            Side(north, east, end_north, end_north - north, end_east - east)
+            for (north, east), (end_north, end_east) in zip(places, ends, strict=True)
+        ]
 
     @property
     def area(self) -> float:
         """m²."""
-        n, e = self._starts[:, 0], self._starts[:, 1]
-        return abs(float(n @ self._ends[:, 1] - e @ self._ends[:, 0])) / 2.0
+        return abs(sum(side.north * side.way_east - side.east * side.way_north for side in self._sides)) / 2.0
 
     def depth(self, point: LatLon, home: LatLon | None) -> float:
         """How far inside the boundary a point is (m), negative outside."""
-        here = np.array(geo.offset(*self._origin, *point))
-        back = here - self._starts
-        along = np.clip(np.einsum("ij,ij->i", back, self._sides) / self._squares, 0.0, 1.0)
-        misses = back - along[:, None] * self._sides
-        distance = math.sqrt(float(np.min(np.einsum("ij,ij->i", misses, misses))))
-        # Sides that the ray from the point towards the east crosses.
-        below, above = self._starts[:, 0] <= here[0], self._ends[:, 0] <= here[0]
-        crossing = below != above
-        at = (
-            self._starts[crossing, 1]
-            + (here[0] - self._starts[crossing, 0]) / self._sides[crossing, 0] * (self._sides[crossing, 1])
-        )
-        inside = int(np.count_nonzero(at > here[1])) % 2 == 1
-        return distance if inside else -distance
+        north, east = geo.offset(*self._origin, *point)
+        nearest, inside = math.inf, False
+        for n, e, end_n, way_n, way_e in self._sides:
+            dn, de = north - n, east - e
+            along = min(max((dn * way_n + de * way_e) / max(way_n * way_n + way_e * way_e, 1e-12), 0.0), 1.0)
+            missed_n, missed_e = dn - along * way_n, de - along * way_e
+            nearest = min(nearest, missed_n * missed_n + missed_e * missed_e)
+            # The ray from the point towards the east crosses the side.
+            if (n <= north) != (end_n <= north) and e + dn / way_n * way_e > east:
+                inside = not inside
+        return math.sqrt(nearest) if inside else -math.sqrt(nearest)
 
     def crossings(self, start: LatLon, end: LatLon, home: LatLon | None) -> list[float]:
         """Return where the straight way between two points crosses the boundary: shares of the way."""
-        first, last = (np.array(geo.offset(*self._origin, *point)) for point in (start, end))
-        way = last - first
-        back = self._starts - first
-        cross = way[0] * self._sides[:, 1] - way[1] * self._sides[:, 0]
-        with np.errstate(divide="ignore", invalid="ignore"):  # parallel sides are met at their ends by their neighbours
-            along = (back[:, 0] * self._sides[:, 1] - back[:, 1] * self._sides[:, 0]) / cross
-            across = (back[:, 0] * way[1] - back[:, 1] * way[0]) / cross
-            meets = (along > 0.0) & (along < 1.0) & (across >= 0.0) & (across <= 1.0)
-        return [float(t) for t in along[meets]]
+        (north, east), (to_north, to_east) = (geo.offset(*self._origin, *point) for point in (start, end))
+        far_n, far_e = to_north - north, to_east - east
+        found = []
+        for n, e, _, way_n, way_e in self._sides:
+            cross = far_n * way_e - far_e * way_n
+            if cross == 0.0:
+                continue  # parallel sides are met at their ends by their neighbours
+            along = ((n - north) * way_e - (e - east) * way_n) / cross
+            across = ((n - north) * far_e - (e - east) * far_n) / cross
+            if 0.0 < along < 1.0 and 0.0 <= across <= 1.0:
+                found.append(along)
+        return found
 
 
 Zone = CircleZone | PolygonZone

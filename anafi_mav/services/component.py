@@ -79,6 +79,7 @@ class ComponentSystem(Protocol):
     """True when the configuration allows pose from the live video."""
     failsafe_limits: FailsafeLimits
     payload_history: PayloadHistory
+    notices: dict[OperatorText, None]
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -133,6 +134,7 @@ class Component:
         self.has_picture_pose = system.has_picture_pose
         self.failsafe_limits = system.failsafe_limits
         self.payload_history = system.payload_history
+        self.notices = system.notices
         self.definition = DefinitionLink()
         self._system = system
         # The system's part of `Host`, without a method here for each.

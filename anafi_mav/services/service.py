@@ -67,6 +67,8 @@ class Host(Protocol):
     """Values beyond which a setting of the drone is reported as dangerous."""
     payload_history: PayloadHistory
     """Newest actions of camera and gimbal, of all components."""
+    notices: dict[OperatorText, None]
+    """Critical texts that are true whatever the drone does."""
     definition: DefinitionLink
     """Camera definition of the component."""
     camera_flags: int

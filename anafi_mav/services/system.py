@@ -198,12 +198,16 @@ class System:
         self.failsafe_limits = failsafe_limits
         self.position_of = position_of
         self.payload_history = PayloadHistory()
+        self.notices: dict[OperatorText, None] = {}
+        """Texts that are true whatever the drone does: a client that connects later gets them with its banner."""
         self.drone = drone
         self.clock = clock
         self.memory = Memory(state)
         self.download_folder = download_folder
         self.uris = uris
         self.active = False
+        self.absence: OperatorText | None = None
+        """Text to senders of commands about why the drone is not connected, where there is more to say."""
         self._node = node
         self._started = started
         self._texts = TextNumbers()
@@ -406,6 +410,14 @@ class System:
         for message in self._texts.messages(severity, text):
             self._node.send(message, sysid=self.sysid, compid=AUTOPILOT, to=self.channels)
 
+    def set_notice(self, text: OperatorText, *, is_true: bool) -> None:
+        """Send a critical text to every client, and to those that connect later while it is true."""
+        if is_true:
+            self.notices[text] = None
+            self.announce(Severity.CRITICAL, text)
+        else:
+            self.notices.pop(text, None)
+
     def warn_throttled(self, text: OperatorText) -> None:
         """Send a warning on a frequent event, at most every `STATUS_EVERY` seconds.
 
@@ -580,8 +592,9 @@ class System:
             return
         if inbound.is_permitted and self._on_command is not None:
             self._on_command(inbound)
-        for text in self._texts.messages(Severity.WARNING, texts.COMMAND_WITHOUT_DRONE):
-            self._node.send(text, sysid=self.sysid, compid=AUTOPILOT, to=inbound.channel)
+        for text in (texts.COMMAND_WITHOUT_DRONE, self.absence):
+            for part in self._texts.messages(Severity.WARNING, text) if text is not None else ():
+                self._node.send(part, sysid=self.sysid, compid=AUTOPILOT, to=inbound.channel)
         if message.get_msgId() in COMMANDS:
             compid = message.target_component or self.owner(message).compid
             answer = _answer(inbound, dialect.MAV_RESULT_FAILED)

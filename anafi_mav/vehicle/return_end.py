@@ -31,7 +31,7 @@ from anafi_mav.drone.events import (
     RthHomeType,
     RthState,
 )
-from anafi_mav.errors import AnafiMavError, LinkLost
+from anafi_mav.errors import AnafiMavError, CommandTimeout, LinkLost
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.flight_task import PlainTask, TaskRules
@@ -56,6 +56,10 @@ LOCATION_WAIT = 1.5
 
 An ANAFI reports its location once a second: the last one may be from before it stopped, some metres away.
 """
+
+LAND_AGAIN = 5.0
+"""s after a landing that the drone did not confirm until it is announced once more: no station may be left that could
+command it."""
 
 UNREPORTED = 10.0
 """s of hovering at home after which a drone that reports no end of its return is asked for its states."""
@@ -288,19 +292,18 @@ class ReturnEnd(PlainTask):
         if self.wait > SHORTEST_WAIT:
             vehicle.text(Severity.NOTICE, texts.RETURN_LANDING_IN.fill(seconds=self.wait))
             await asyncio.sleep(self.wait - SHORTEST_WAIT)
-        if (reason := self._late_objection()) is None:
-            self._announce_landing()
-            before = vehicle.drone.gps.state.location
-            await asyncio.sleep(SHORTEST_WAIT)
-            reason = self._late_objection()
-            if reason is None and vehicle.drone.gps.state.location is before:
-                reason = texts.HOVER_OLD_POSITION
-        if reason is not None:
-            self._hover(reason)
-            return
-        attempt.phase = _Phase.LANDING
         try:
-            await self._command_landing()
+            while (reason := await self._countdown()) is None:
+                attempt.phase = _Phase.LANDING
+                try:
+                    await self._command_landing()
+                    return
+                except CommandTimeout as error:
+                    logger.warning("landing at home: %s", error)
+                    vehicle.text(Severity.ERROR, texts.HOME_LANDING_FAILED)
+                attempt.phase = _Phase.WAITING
+                await asyncio.sleep(LAND_AGAIN)
+            self._hover(reason)
         except AnafiMavError as error:
             logger.warning("landing at home: %s", error)
             vehicle.text(Severity.ERROR, texts.HOME_LANDING_FAILED)
@@ -308,6 +311,17 @@ class ReturnEnd(PlainTask):
                 self._close()
         finally:
             attempt.task = None
+
+    async def _countdown(self) -> OperatorText | None:
+        """Announce the landing and wait; return why the drone does not land, or None."""
+        if (reason := self._late_objection()) is not None:
+            return reason
+        self._announce_landing()
+        before = self._vehicle.drone.gps.state.location
+        await asyncio.sleep(SHORTEST_WAIT)
+        if (reason := self._late_objection()) is not None:
+            return reason
+        return texts.HOVER_OLD_POSITION if self._vehicle.drone.gps.state.location is before else None
 
     async def _see_landing(self, attempt: ReturnAttempt) -> None:
         """Report a hover when the landing by the drone's own setting does not begin in time.

@@ -22,6 +22,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import gc
 import json
 import os
 import random
@@ -299,14 +300,13 @@ def receive(address: str, ports: list[str]) -> None:
 async def generate(first: str, count: int, rate: float) -> None:
     """Simulate drones, and report what they sent."""
     from anafi_mav.arsdk.messages.ardrone3 import AltitudeAboveGroundChanged
-    from anafi_mav.cli import heap
     from anafi_mav.sim import DroneSpec, Simulator
 
     specs = [
         DroneSpec(address=address, http_port=None, rtsp_port=None, telemetry_rate=rate)
         for address in consecutive(first, count)
     ]
-    heap.settle()
+    gc.freeze()  # as the program does
     chance = random.Random(1)
     height = FIRST_HEIGHT
     async with Simulator(specs, seed=1, remember=False) as simulator:

@@ -8,11 +8,17 @@ this process and its clock; the router is the Python package in a process of its
 not impaired. For each start it waits 15 s at most for the drone's heartbeat and the answer to a command. Then it sends
 commands for SECONDS, repeated after 1 s without an answer, uploads a mission of 12 items and downloads a file of
 about 100 kB.
+
+    .venv/bin/python tests/bench/fabric_loss.py declaration [SECONDS]
+
+Two liveliness tokens are declared over `udp`. The datagram with the first declaration is lost, and no other. It prints
+which tokens another session sees within SECONDS, and after the first one was declared again.
 """
 
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
 import sys
 import tempfile
@@ -22,6 +28,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+import zenoh
 from common import machine, quantile
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support import missions, repeating
@@ -146,8 +153,47 @@ async def _use(station: FabricStation, seconds: float, tally: Tally) -> None:
         await asyncio.sleep(0.1)
 
 
+def opened(locator: str) -> zenoh.Session:
+    config = zenoh.Config()
+    for key, value in {"mode": "client", "connect/endpoints": [locator]}.items():
+        config.insert_json5(key, json.dumps(value))
+    return zenoh.open(config)
+
+
+async def declaration(seconds: float) -> None:
+    """Lose one declaration, and print what becomes of it."""
+    lost, kept = "bench/lost", "bench/kept"
+    seen: set[str] = set()
+    async with router(also="udp") as node:
+        relay = LossyRelay(node.other_port, loss=0.0)
+        locator = f"udp/127.0.0.1:{await relay.start()}"
+        session = await asyncio.to_thread(opened, locator)
+        observer = await asyncio.to_thread(opened, f"tcp/127.0.0.1:{node.port}")
+        watch = observer.liveliness().declare_subscriber(
+            "bench/**", lambda sample: seen.add(str(sample.key_expr)), history=True
+        )
+        relay.lose_next = lost.encode()
+        first = await asyncio.to_thread(session.liveliness().declare_token, lost)
+        await asyncio.sleep(1.0)
+        second = await asyncio.to_thread(session.liveliness().declare_token, kept)
+        await asyncio.sleep(seconds)
+        print(f"{relay.lost} of {relay.lost + relay.passed} datagrams lost; seen after {seconds:.0f} s: {sorted(seen)}")
+        await asyncio.to_thread(first.undeclare)
+        third = await asyncio.to_thread(session.liveliness().declare_token, lost)
+        await asyncio.sleep(5.0)
+        print(f"seen 5 s after the first was declared again: {sorted(seen)}")
+        for held in (watch, second, third):
+            await asyncio.to_thread(held.undeclare)
+        await asyncio.to_thread(session.close)
+        await asyncio.to_thread(observer.close)
+        await relay.close()
+
+
 def main() -> None:
     words = sys.argv[1:]
+    if words[:1] == ["declaration"]:
+        asyncio.run(declaration(float(words[1]) if len(words) > 1 else 60.0))
+        return
     links = ("tcp", "udp", "quic") if not words or words[0] == "all" else (words[0],)
     starts = int(words[1]) if len(words) > 1 else 10
     seconds = float(words[2]) if len(words) > 2 else 10.0

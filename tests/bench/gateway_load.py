@@ -29,7 +29,6 @@ from common import consecutive, frames_option, loopback, machine
 from anafi_mav.arsdk.link import watchdog
 from anafi_mav.arsdk.link.frame import FrameType, decode_frames, encode_frame
 from anafi_mav.arsdk.link.session import Session
-from anafi_mav.cli import heap
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, Simulator
@@ -140,7 +139,7 @@ async def measure(loop: _Loop, drones: int, endpoints: int, rounds: int, query: 
         video=False,
         http=False,
     )
-    heap.settle()
+    gc.freeze()  # as the program does
     await simulator.start()
     gateway = Gateway(config, clock=_Clock(loop))
     await gateway.start()

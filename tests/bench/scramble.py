@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import gc
 import os
 import sys
 import tempfile
@@ -46,6 +47,7 @@ def main() -> int:
         flights = [(QUIRKS[name], seed) for name in given.quirks for seed in seeds]
     tally: Counter[str] = Counter()
     began, cpu = time.perf_counter(), time.process_time()
+    gc.freeze()  # to collect is cheap then
     with tempfile.TemporaryDirectory() as folder:
         for number, (quirk, seed) in enumerate(flights):
             os.environ["XDG_STATE_HOME"] = f"{folder}/{number}"

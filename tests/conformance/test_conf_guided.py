@@ -174,6 +174,19 @@ async def test_conf_143_condition_yaw_turns_in_the_requested_direction() -> None
         assert move["max_yaw_rotation_speed"] == 60.0
 
 
+@pytest.mark.parametrize("name", ["ANF_CRUISE_SPEED", "ANF_CLIMB_SPEED"])
+async def test_conf_082_speed_at_which_no_move_would_end_is_not_set(name: str) -> None:
+    """As in the command, whose least is 0.1 m/s; 0 is the drone's own speed."""
+    async with world() as w:
+        for value, kept in ((2.0, 2.0), (0.01, 2.0), (0.0, 0.0)):
+            mark = w.client.mark()
+            w.client.send(dialect.MAVLink_param_set_message(1, 1, name.encode(), value, 9))
+            await w.client.wait("PARAM_VALUE", lambda m: m.param_id == name, since=mark)
+            mark = w.client.mark()
+            w.client.send(dialect.MAVLink_param_request_read_message(1, 1, name.encode(), -1))
+            assert (await w.client.wait("PARAM_VALUE", lambda m: m.param_id == name, since=mark)).param_value == kept
+
+
 @pytest.mark.parametrize("reference", [3.0, 0.5, -1.0, math.inf])
 async def test_conf_143_condition_yaw_of_an_unknown_reference_is_denied(reference: float) -> None:
     """Taken for absolute it would turn the wrong way; ArduCopter refuses it too."""

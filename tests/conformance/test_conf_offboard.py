@@ -754,3 +754,32 @@ async def test_goto_is_reported_as_position_target() -> None:
         assert told.alt == pytest.approx(9.0)
         near = await w.client.wait("POSITION_TARGET_LOCAL_NED")
         assert (near.x, near.y, near.z) == pytest.approx((30.0, -10.0, -9.0), abs=0.1)
+
+
+@pytest.mark.parametrize("frame", [1, 8])
+async def test_position_is_held_against_a_velocity_that_leads_away(frame: int) -> None:
+    """A program that keeps a velocity of 9 m/s with the position where the drone is; in frame 8 to the right."""
+    async with world(speed=1.0) as w:
+        await w.take_off(8.0)
+        allow_speed(w)
+        at, v = ((0.0, 0.0, -8.0), (9.0, 0.0, 0.0)) if frame == 1 else ((0.0, 0.0, 0.0), (0.0, 9.0, 0.0))
+        async with streaming(w.client, local(NO_ACCELERATION | NO_YAW | NO_YAW_RATE, frame, at=at, v=v)):
+            await engage(w.client, "px4")
+            began = now()
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > began + 30.0, 40.0)
+            # Where 9 m/s and the approach are equal: the root of 3 times the distance is 9.
+            assert math.hypot(w.drone.pose.north, w.drone.pose.east) == pytest.approx(27.0, abs=3.0)
+            assert math.hypot(w.drone.pose.vn, w.drone.pose.ve) < 1.0
+
+
+async def test_height_is_held_against_a_climb_that_leads_away() -> None:
+    """A climb of 20 m/s, far beyond the drone's own limit, with a height of 8 m."""
+    async with world(speed=1.0) as w:
+        await w.take_off(8.0)
+        fastest = w.drone.firmware.settings.number("max_vertical_speed")
+        setpoint = local(NO_ACCELERATION | NO_YAW | NO_YAW_RATE, at=(0.0, 0.0, -8.0), v=(0.0, 0.0, -20.0))
+        async with streaming(w.client, setpoint):
+            await engage(w.client, "px4")
+            began = now()
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > began + 30.0, 40.0)
+            assert w.drone.pose.up == pytest.approx(8.0 + fastest, abs=0.5)  # the height loop has 1 /s

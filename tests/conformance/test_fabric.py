@@ -62,6 +62,12 @@ def counted(w: World, name: str) -> int:
     return w.gateway.counters()[name]
 
 
+async def notified(client: Client) -> None:
+    """Wait until a client knows that another gateway has the system id: from its banner, if it came too late."""
+    client.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    await client.wait("STATUSTEXT", lambda m: m.text.startswith("System id 1: another"), since=0)
+
+
 async def accepted(station: Client, command: int, *params: float) -> None:
     """Send a command until it is accepted.
 
@@ -204,7 +210,7 @@ async def test_system_id_of_another_gateway_is_left_to_it(tmp_path: Path, monkey
         monkeypatch.setattr(claims, "SPREAD", 0.0)
         monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))  # one gateway uses one state folder
         async with world(endpoints=(node.url,)) as other:
-            await other.client.wait("STATUSTEXT", lambda m: m.text.startswith("System id 1: another"), since=0)
+            await notified(other.client)
             assert (await station.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
             await w.gateway.close()
             mark = station.mark()
@@ -224,7 +230,8 @@ async def test_lost_link_of_a_gateway_gives_its_system_id_to_no_other(
                 station = w.take(await FabricStation().join(stations))
                 monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))  # one gateway uses one state folder
                 async with world(endpoints=(node.url,)) as other:
-                    await other.client.wait("STATUSTEXT", lambda m: m.text.startswith("System id 1: another"), since=0)
+                    await notified(other.client)
+                    await notified(await other.connect(250))
                     await relay.close()
                     await station.silence("HEARTBEAT", 2.0)
                     relay = StallingRelay(node.port)

@@ -110,6 +110,26 @@ async def test_setpoints_of_a_stall_move_nothing_and_land_gets_through() -> None
         assert w.gateway.counters()["late_inputs"] > 5
 
 
+async def test_link_of_600_ms_there_and_back_connects() -> None:
+    async with router() as node:
+        relay = StallingRelay(node.port, delay=0.3)
+        try:
+            async with joined(f"zenoh://127.0.0.1:{await relay.start()}", node.url, flying=False) as w:
+                assert w.gateway.counters()["reopened"] == 0
+        finally:
+            await relay.close()
+
+
+async def test_drones_are_back_soon_when_new_connections_get_no_answer() -> None:
+    async with stalling() as (w, relay):
+        relay.unanswered = 2
+        relay.reset()
+        await w.client.silence("HEARTBEAT", 1.5)
+        # Each of both attempts ends after 3 s; zenoh's own limit is 10 s.
+        await w.client.heartbeat(lambda beat: True, timeout=10.0)
+        assert (relay.unanswered, w.gateway.counters()["reopened"]) == (0, 1)
+
+
 async def test_loss_delays_commands_an_upload_and_a_download_and_loses_none() -> None:
     async with lossy() as (w, relay):
         photo = add_photo(w.drone)

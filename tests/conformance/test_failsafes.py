@@ -6,9 +6,10 @@ import asyncio
 import math
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import ACCEPTED, REJECTED, RTL, goto
+from support.fault_scenarios import ACCEPTED, REJECTED, RTL, deaf, goto, heard
 from support.mav import Client
 from support.missions import said
+from support.params import write
 from support.world import LAND, RETURN, World, world
 
 from anafi_mav.arsdk.messages import ardrone3, rth
@@ -104,3 +105,37 @@ async def test_gps_loss_in_flight_hovers_and_refuses_goto_and_return() -> None:
         assert await goto(w, 150.0, 10.0) == REJECTED
         assert (await w.client.command(RTL)).result != ACCEPTED
         assert w.drone.flying_state is FlyingState.HOVERING
+
+
+async def test_return_of_a_station_loss_that_fails_is_tried_again() -> None:
+    """The drone hears nothing of the first return, hovers once it hears again, and returns ten seconds later."""
+    async with world(speed=1.0) as w:
+        await write(w.client, "ANF_GCS_LOSS", 2, dialect.MAV_PARAM_TYPE_INT32)
+        await write(w.client, "ANF_GCS_LOSS_T", 2.0)
+        await w.take_off(10.0)
+        assert await goto(w, 200.0, 10.0) == ACCEPTED
+        w.client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+        mark = w.client.mark()
+        await asyncio.sleep(1.5)  # no heartbeat
+        deaf(w, 6.0)
+        await w.client.wait("STATUSTEXT", lambda m: "return failed" in m.text, since=mark, timeout=10.0)
+        assert heard(w, "return_to_home") == []
+        await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN, since=mark, timeout=30.0)
+        assert heard(w, "return_to_home") == ["return_to_home"]
+
+
+async def test_return_of_a_station_loss_that_failed_yields_to_a_later_command() -> None:
+    """A program flies on by a goto of its own after the return has failed."""
+    async with world(speed=1.0) as w:
+        await write(w.client, "ANF_GCS_LOSS", 2, dialect.MAV_PARAM_TYPE_INT32)
+        await write(w.client, "ANF_GCS_LOSS_T", 2.0)
+        await w.take_off(10.0)
+        w.client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+        mark = w.client.mark()
+        await asyncio.sleep(1.5)  # no heartbeat
+        deaf(w, 6.0)
+        await w.client.wait("STATUSTEXT", lambda m: "return failed" in m.text, since=mark, timeout=10.0)
+        await asyncio.sleep(3.0)  # until the drone hears again and hovers
+        assert await goto(w, 200.0, 10.0) == ACCEPTED
+        await asyncio.sleep(15.0)
+        assert heard(w, "return_to_home") == []

@@ -6,11 +6,13 @@ import asyncio
 import sys
 from pathlib import Path
 
+import pytest
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.lines import UdpClient
 from support.world import HOLD, LAND, world
 
+from anafi_mav.cli import main, replay
 from anafi_mav.cli.replay import files_of, read_tlogs, read_traces
 from anafi_mav.config import RecordingConfig
 
@@ -76,3 +78,29 @@ async def test_replay_shows_a_station_the_vehicle_alone(tmp_path: Path) -> None:
             process.kill()
             await process.wait()
         await station.close()
+
+
+async def test_replay_of_a_file_of_other_bytes_can_be_ended(tmp_path: Path) -> None:
+    """It is searched for frames in a thread; the event loop, which sees Ctrl-C, goes on."""
+    path = tmp_path / "film.tlog"
+    path.write_bytes(bytes(3_000_000))
+    playing = asyncio.ensure_future(replay.play([path], [], ["udpout://127.0.0.1:9"], 1.0, 0.0))
+    for _ in range(20):
+        await asyncio.sleep(0)
+    assert not playing.done()
+    playing.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await playing
+
+
+def test_replay_names_a_file_that_cannot_be_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "gateway.0001.tlog").mkdir()
+    assert main(["replay", str(tmp_path), "--endpoint", "udpout://127.0.0.1:9"]) == 1
+    assert capsys.readouterr().err == f"anafi-mav: {tmp_path}/gateway.0001.tlog: cannot be read: Is a directory\n"
+
+
+def test_parts_of_a_session_follow_each_other_by_number(tmp_path: Path) -> None:
+    names = [f"gateway.{number:04d}.tlog" for number in (9999, 10000, 998)]
+    for name in names:
+        (tmp_path / name).touch()
+    assert [path.name for path in files_of(tmp_path)[0]] == [names[2], names[0], names[1]]

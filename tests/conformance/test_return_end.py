@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import return_by_itself, somebody_else
+from support.fault_scenarios import deaf, return_by_itself, somebody_else
 from support.flavours import both
 from support.mav import NAN, Client
 from support.missions import RTL as RTL_ITEM
@@ -109,6 +109,32 @@ async def test_hold_above_home_cancels_the_landing() -> None:
         await asyncio.sleep(5.5)  # longer than what was left
         assert landings(w) == []
         assert w.drone.flying_state.name == "HOVERING"
+
+
+async def test_landing_that_the_drone_does_not_hear_is_tried_again() -> None:
+    async with world(speed=1.0) as w:
+        await away(w)
+        mark = await go_home(w)
+        await said(w.client, "Landing in 5 s", mark)
+        await asyncio.sleep(4.5)  # nearly all of it
+        deaf(w, 6.0)
+        await said(w.client, "Landing at home failed, hovering", mark)
+        assert landings(w) == []
+        await landed(w, mark)
+
+
+async def test_hold_between_two_landings_cancels_the_second() -> None:
+    async with world(speed=1.0) as w:
+        await away(w)
+        mark = await go_home(w)
+        await said(w.client, "Landing in 5 s", mark)
+        await asyncio.sleep(4.5)  # nearly all of it
+        deaf(w, 6.0)
+        await said(w.client, "Landing at home failed, hovering", mark)
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
+        await asyncio.sleep(12.0)  # longer than until the second
+        assert landings(w) == []
 
 
 async def test_return_commanded_again_above_home_does_not_restart() -> None:

@@ -618,3 +618,21 @@ async def test_interval_beyond_the_int32_range_is_answered() -> None:
 
 def test_the_names_above_are_px4s() -> None:
     assert PX4_OFFBOARD[1] << 16 == OFFBOARD
+
+
+@pytest.mark.parametrize("stop", ["hold", "land"])
+async def test_stop_does_not_wait_behind_settings_that_a_client_loads(stop: str) -> None:
+    """In version 1 of Parrot's protocol each setting takes a round trip, of 0.4 s here."""
+    async with world(speed=1.0, versions=(1, 1)) as w:
+        await w.take_off()
+        assert await goto(w, 200.0, 10.0) == ACCEPTED
+        w.drone.faults.up = w.drone.faults.down = Impairment(delay=0.2)
+        for name in ("ANF_MAX_TILT", "ANF_YAW_RATE", "ANF_VERT_SPEED", "ANF_TILT_RATE", "ANF_MAX_ALT", "ANF_RTH_ALT"):
+            for value in (30.0, 31.0):
+                w.client.send(dialect.MAVLink_param_set_message(1, 1, name.encode(), value, 9))
+        await w.drone.wait_log(lambda e: e.kind == "command" and e.name.endswith("MaxTilt"), 5.0)
+        began = asyncio.get_running_loop().time()
+        w.client.send_command(*((SET_MODE, *PX4_HOLD) if stop == "hold" else (LAND_CMD,)))
+        name = "CancelMoveTo" if stop == "hold" else "Landing"
+        heard_at = (await w.drone.wait_log(lambda e: e.kind == "command" and e.name.endswith(name), 10.0)).t
+        assert heard_at - began < 1.0

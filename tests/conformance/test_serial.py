@@ -52,7 +52,7 @@ def received(drone: SimulatedDrone) -> list[str]:
 
 
 async def is_refused(gateway: Gateway, client: Client) -> None:
-    """One text about the aircraft and no vehicle, through several attempts; commands fail."""
+    """One text about the aircraft in a minute and no vehicle, through several attempts; commands fail with it."""
     text = await client.wait("STATUSTEXT", lambda m: m.text.startswith("Not connected"), since=0)
     assert (text.text, text.severity) == (f"Not connected: drone has serial {OTHER}", dialect.MAV_SEVERITY_CRITICAL)
     assert f"the aircraft has serial number {OTHER}, expected {OURS}" in gateway.status().drones[0].problem
@@ -62,6 +62,10 @@ async def is_refused(gateway: Gateway, client: Client) -> None:
     assert client.since(mark, "STATUSTEXT") == []
     ack = await client.command(dialect.MAV_CMD_NAV_TAKEOFF, z=5.0, target=(7, 1))
     assert ack.result == dialect.MAV_RESULT_FAILED
+    said = [m.text for _, m in client.since(mark, "STATUSTEXT")]
+    assert said == ["Command failed: drone not connected", text.text]
+    # A client that connected later learns it too.
+    assert (await client.wait("STATUSTEXT", timeout=50.0)).text == text.text
     assert gateway.status().drones[0].connections == 0
 
 

@@ -15,6 +15,7 @@ from subprocess import PIPE, Popen
 from typing import Any, TypeAlias
 
 import pytest
+from support import olympe_server
 
 import anafi_mav.arsdk.messages
 from anafi_mav.arsdk.codec import wire
@@ -49,7 +50,11 @@ class Referee:
     """The process with Olympe in it."""
 
     def __init__(self) -> None:
-        self.process = Popen([sys.executable, str(SCRIPT)], stdin=PIPE, stdout=PIPE, text=True)
+        self.process = (
+            olympe_server.Script(SCRIPT)
+            if olympe_server.is_running()
+            else Popen([sys.executable, str(SCRIPT)], stdin=PIPE, stdout=PIPE, text=True)
+        )
         assert self.process.stdout is not None
         if not self.process.stdout.readline():
             if self.process.wait(10) == 77:

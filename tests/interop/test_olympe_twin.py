@@ -18,7 +18,6 @@ from support.process import simulator_process
 from support.product import START_LIMIT, Process, product, program
 from support.world import ARMED, loopback
 
-SCRIPT = Path(__file__).with_name("olympe_twin.py")
 SAMPLE = Path(__file__).parents[2] / "missions" / "delivery.plan"
 
 PORT = 8080
@@ -92,9 +91,8 @@ async def test_the_same_file_flies_the_same_path(on: olympe.Combination, tmp_pat
 
     async def by_olympe() -> None:
         async with simulator_process(olympes, logs["olympe"], *options):
-            flown = await run(str(SCRIPT), olympes, str(PORT), model, str(twin), timeout=180.0)
-            steps = json.loads(flown.lines[-1])
-            assert steps == dict.fromkeys(("connect", "flown", "landed", "disconnect"), True), str(flown)
+            steps, err = await olympe.run("olympe_twin.py", olympes, str(PORT), model, str(twin), timeout=180.0)
+            assert steps == dict.fromkeys(("connect", "flown", "landed", "disconnect"), True), err
 
     async def by_gateway() -> None:
         async with simulator_process(ours, logs["gateway"], *options), product(tmp_path, config):

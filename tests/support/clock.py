@@ -24,17 +24,16 @@ import gc
 import os
 import selectors
 import socket
-import threading
+import subprocess
 import time
+from asyncio import _get_running_loop
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from threading import get_ident
 from typing import Any
 
 STEP = 1e-6
 """s between two looks at the clock while callbacks run."""
-
-DELIVERY_LIMIT = 60.0
-"""s of real time for a datagram to ourselves: only a broken machine needs longer."""
 
 _real = time.monotonic
 _ahead = 0.0
@@ -42,12 +41,14 @@ _ahead = 0.0
 _newest = 0.0
 _computing: int | None = None
 """Identity of the thread whose loop runs callbacks, while no other process or thread can change anything."""
+_may_have_children = True
+"""False from when no child process was left until the next one is started."""
 
 
 def now() -> float:
     """What `time.monotonic` is in tests; never steps back."""
     global _newest
-    if _computing == threading.get_ident() and asyncio._get_running_loop() is not None:
+    if _computing is not None and _computing == get_ident() and _get_running_loop() is not None:
         _newest += STEP
     else:
         _newest = max(_newest, _real() + _ahead)
@@ -56,11 +57,21 @@ def now() -> float:
 
 def childless() -> bool:
     """Whether no process that this one has started is left."""
+    global _may_have_children
+    if not _may_have_children:
+        return True
     try:
         os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT)
     except ChildProcessError:
+        _may_have_children = False
         return True
     return False
+
+
+def _note_child() -> None:
+    """A process is started: from now on the kernel is asked whether it is left."""
+    global _may_have_children
+    _may_have_children = True
 
 
 class Turns:
@@ -88,8 +99,7 @@ class Barrier:
     def __init__(self) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
-        self._socket.connect(self._socket.getsockname())
-        self._socket.settimeout(DELIVERY_LIMIT)
+        self._socket.connect(self._socket.getsockname())  # blocking, without a limit of Python's: that polls each time
 
     def wait(self) -> None:
         self._socket.send(b"\0")
@@ -126,35 +136,44 @@ class Selector(selectors.DefaultSelector):
 
     def _select(self, timeout: float | None) -> Any:
         global _ahead, _newest, _computing
-        alone = timeout is not None and self._alone()
-        if _computing is not None:
-            _ahead = now() - _real()
-            _computing = None
-        if not alone:
-            began = now()
-            ready = super().select(timeout)
-            if self._only_threads() or self._only_reactive():
-                here = _real() + _ahead
-                if timeout is not None:
-                    here = min(here, began + max(timeout, 0.0))
-                _ahead, _newest = here - _real(), max(_newest, here)
-                _computing = threading.get_ident()
-            return ready
-        here = now()
+        if timeout is None or not self._alone():
+            return self._select_beside_others(timeout)
+        here = self._stop_computing()
         ready = super().select(0.0)
-        if not ready and timeout:
+        if not ready and timeout > 0.0:
             # What waits behind callbacks that are ready need not be seen before them.
             self._barrier.wait()
             ready = super().select(0.0)
-        if not ready and timeout is not None:
-            here += max(timeout, 0.0)
-        _ahead, _newest = here - _real(), max(_newest, here)
-        _computing = threading.get_ident()
+            if not ready:
+                here += timeout
+        _ahead, _newest = here - _real(), here
+        _computing = get_ident()
         return ready
+
+    def _select_beside_others(self, timeout: float | None) -> Any:
+        global _ahead, _newest, _computing
+        began = self._stop_computing()
+        ready = super().select(timeout)
+        if self._only_threads() or self._only_reactive():
+            here = _real() + _ahead
+            if timeout is not None:
+                here = min(here, began + max(timeout, 0.0))
+            _ahead, _newest = here - _real(), max(_newest, here)
+            _computing = get_ident()
+        return ready
+
+    def _stop_computing(self) -> float:
+        """From now on the clock runs again; returns the time."""
+        global _ahead, _computing
+        if _computing is not None:
+            _ahead = now() - _real()
+            _computing = None
+        return now()
 
     def _alone(self) -> bool:
         """Whether nobody but the loop itself can bring anything about."""
-        self.processes = [process for process in self.processes if process.get_returncode() is None]
+        if self.processes:
+            self.processes = [process for process in self.processes if process.get_returncode() is None]
         return not (self.in_threads or self.others or self.processes) and childless()
 
     def _only_threads(self) -> bool:
@@ -242,3 +261,13 @@ def turns() -> Iterator[Turns]:
 def install() -> None:
     """From here on `time.monotonic`, which event loops read, is this clock."""
     time.monotonic = now
+    os.register_at_fork(after_in_parent=_note_child)
+    start = subprocess.Popen.__init__
+
+    def noted_start(self: Any, *args: Any, **options: Any) -> None:
+        try:
+            start(self, *args, **options)
+        finally:
+            _note_child()
+
+    subprocess.Popen.__init__ = noted_start

@@ -9,12 +9,14 @@ import json
 import re
 import socket
 import sys
-from collections.abc import Iterator
+import tempfile
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import pytest
 
+from support import clock, olympe_server
 from support.pairwise import selection
 from support.process import simulator_process
 from support.world import loopback
@@ -118,20 +120,39 @@ def complaints(err: str, *harmless: dict[str, str]) -> list[str]:
 
 async def run(script: str, *arguments: str, timeout: float) -> tuple[Any, str]:
     """What a script of `interop` reports, and Olympe's own log. `timeout` in s only ends what hangs."""
-    process = await asyncio.create_subprocess_exec(
-        sys.executable,
-        *(str(SCRIPTS / script), *arguments),
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.PIPE,
-    )
+    words = (str(SCRIPTS / script), *arguments)
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        start = _forked if olympe_server.is_running() else _alone
+        await asyncio.wait_for(start(words, out, err), timeout)
+        out.seek(0)
+        err.seek(0)
+        report, log = out.read(), err.read().decode()
+    assert report, log
+    return json.loads(report), log
+
+
+async def _forked(words: Sequence[str], out: IO[bytes], err: IO[bytes]) -> None:
+    """Run a script to its end in a process that has imported Olympe already."""
+    loop = asyncio.get_running_loop()
+    with (
+        tempfile.TemporaryFile() as nothing,
+        olympe_server.start(words, (nothing.fileno(), out.fileno(), err.fileno())) as connection,
+        clock.everybodys(),
+    ):
+        connection.setblocking(False)
+        for _ in ("process id", "exit status"):
+            olympe_server.number(await loop.sock_recv(connection, olympe_server.ANSWER))
+
+
+async def _alone(words: Sequence[str], out: IO[bytes], err: IO[bytes]) -> None:
+    """Run a script to its end in a process of its own."""
+    process = await asyncio.create_subprocess_exec(sys.executable, *words, stdout=out, stderr=err)
     try:
-        out, err = await asyncio.wait_for(process.communicate(), timeout)
+        await process.wait()
     finally:
         if process.returncode is None:
             process.kill()
             await process.wait()
-    assert out, err.decode()
-    return json.loads(out), err.decode()
 
 
 async def visit(

@@ -16,6 +16,8 @@ class LossyRelay:
 
     def __init__(self, port: int, *, loss: float = 0.05, delay: float = 0.05, seed: int = 1) -> None:
         self.passed = self.lost = 0
+        self.lose_next = b""
+        """The next datagram with these bytes is lost; none: by chance only."""
         self._to = port
         self.loss, self._delay = loss, delay
         self._chance = random.Random(seed)
@@ -65,8 +67,10 @@ class LossyRelay:
             self._later(transport, data, None)
 
     def _later(self, transport: asyncio.DatagramTransport, data: bytes, to: tuple[str, int] | None) -> None:
-        if self._chance.random() < self.loss:
+        is_chosen = bool(self.lose_next) and self.lose_next in data
+        if is_chosen or self._chance.random() < self.loss:
             self.lost += 1
+            self.lose_next = b"" if is_chosen else self.lose_next
             return
         self.passed += 1
 
@@ -90,13 +94,16 @@ class _Receiver(asyncio.DatagramProtocol):
 class StallingRelay:
     """TCP to TCP: bytes of both directions arrive `delay` s later, and not at all while it is stalled.
 
-    It stalls on `stall`, and by itself for `stall_time` s every `stall_every` s.
+    It stalls on `stall`, and by itself for `stall_time` s every `stall_every` s. `reset` ends its connections.
     """
 
     def __init__(
         self, port: int, *, delay: float = 0.0, stall_time: float = 0.0, stall_every: float | None = None
     ) -> None:
         self.stalls = 0
+        self.unanswered = 0
+        """So many of the next connections are accepted and get no answer."""
+        self._ends: set[asyncio.StreamWriter] = set()
         self._to = port
         self._delay = delay
         self._stall_time, self._stall_every = stall_time, stall_every
@@ -118,6 +125,12 @@ class StallingRelay:
         self.stalls += 1
         self._moving.clear()
 
+    def reset(self) -> None:
+        """End all connections, each with a reset."""
+        for end in self._ends:
+            end.transport.abort()
+        self._ends.clear()
+
     def resume(self) -> None:
         """Let everything pass that waits, and go on."""
         self._moving.set()
@@ -127,6 +140,7 @@ class StallingRelay:
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
+        self.reset()
         if self._server is not None:
             self._server.close()
 
@@ -141,7 +155,12 @@ class StallingRelay:
             self.resume()
 
     async def _connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._ends.add(writer)
+        if self.unanswered:
+            self.unanswered -= 1
+            return
         onward_reader, onward_writer = await asyncio.open_connection("127.0.0.1", self._to)
+        self._ends.add(onward_writer)
         for source, sink in ((reader, onward_writer), (onward_reader, writer)):
             waiting: asyncio.Queue[tuple[float, bytes]] = asyncio.Queue(MAX_WAITING)
             self._run(self._read(source, waiting))

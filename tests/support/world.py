@@ -155,6 +155,7 @@ async def world(
     pose: Literal["video", "events"] = "video",
     rtsp_port: int = VIDEO_PORT,
     quirks: tuple[str, ...] = (),
+    versions: tuple[int, int] = (1, 3),
     before: Callable[[SimulatedDrone], None] = lambda drone: None,
     options: Sequence[str] = (),
     endpoints: Sequence[str] = (),
@@ -179,6 +180,7 @@ async def world(
         skycontroller=skycontroller,
         video_latency=video_latency,
         firmware_quirks=quirks,
+        versions=versions,
     )
     config = Config(
         endpoints=(

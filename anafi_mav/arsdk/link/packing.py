@@ -50,13 +50,15 @@ class Waiting:
     `packed` counts the bytes that already are.
     """
 
-    __slots__ = ("command", "forever", "packed", "token")
+    __slots__ = ("command", "forever", "packed", "token", "yields")
 
-    def __init__(self, token: int, command: bytes, forever: bool) -> None:
+    def __init__(self, token: int, command: bytes, forever: bool, *, yields: bool = False) -> None:
         self.token = token
         self.command = command
         self.forever = forever
         """True when it is repeated until the link is down."""
+        self.yields = yields
+        """True when an urgent command that is sent later goes before it."""
         self.packed = 0
 
 

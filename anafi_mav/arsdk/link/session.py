@@ -23,6 +23,7 @@ from anafi_mav.arsdk.link.transport import (
     Event,
     Garbage,
     LinkDown,
+    Rank,
     ReceivedMessage,
     Silent,
     Speaks,
@@ -138,12 +139,12 @@ class Session(asyncio.DatagramProtocol):
         """See `Transport.counters`."""
         return self._transport.counters
 
-    def send(self, message: Message | UnknownMessage) -> int:
+    def send(self, message: Message | UnknownMessage, rank: Rank = Rank.NORMAL) -> int:
         """Send a message at the end of this event-loop iteration; the token is for `cancel`.
 
         Raises `LocalProtocolError` when it cannot be encoded. On a link that is lost it does nothing.
         """
-        token = self._transport.send(message, self._loop.time())
+        token = self._transport.send(message, self._loop.time(), rank)
         self._flush_soon()
         return token
 

@@ -72,6 +72,14 @@ class Role(enum.Enum):
     DEVICE = "device"
 
 
+class Rank(enum.Enum):
+    """Place of a command among those that wait in its queue."""
+
+    SETTING = "it moves nothing: an urgent command that is sent later goes before it"
+    NORMAL = "commands go in the order in which they were sent"
+    URGENT = "it goes before the settings that wait directly before it, but before nothing else"
+
+
 class ReceivedMessage(msgspec.Struct, frozen=True):
     """The peer sent a message; each acknowledged one arrives once and in order."""
 
@@ -304,11 +312,13 @@ class Transport:
 
     # -- sending
 
-    def send(self, message: Message | UnknownMessage, now: float) -> int:
+    def send(self, message: Message | UnknownMessage, now: float, rank: Rank = Rank.NORMAL) -> int:
         """Queue a message; the token names it in `cancel`, `Delivered` and `Undelivered`.
 
         An unknown message travels in the acknowledged queue. A HIGH_PRIO message takes the place of everything that was
         not delivered, in the same queue: its own (12) is read by no Parrot program that we know.
+        `rank` is of an acknowledged message. In version 1 each takes a round trip of its own, and a stop must not wait
+        behind a list of settings that a client loads.
         Raises `LocalProtocolError` when it cannot be encoded or is too long for its queue. On a link that is down
         the message is counted and forgotten.
         """
@@ -326,10 +336,10 @@ class Transport:
                 self.counters["dropped.noack"] += 1
             self._noack.append((token, data))
         else:
-            self._enqueue(buffer, token, data)
+            self._enqueue(buffer, token, data, rank)
         return token
 
-    def _enqueue(self, buffer: Buffer, token: int, data: bytes) -> None:
+    def _enqueue(self, buffer: Buffer, token: int, data: bytes, rank: Rank) -> None:
         if buffer is Buffer.HIGH_PRIO:
             # Nothing of before may follow it, nor may it wait for the acknowledgement of what is in flight.
             self.abandon("overtaken")
@@ -339,9 +349,17 @@ class Transport:
             self._pending.append(Undelivered(token, "queue full"))
             return
         forever = not self._gives_up or MessageId(*wire.HEADER.unpack_from(data)) in RETRIED_FOR_EVER
-        entry = Waiting(token, data, forever)
+        entry = Waiting(token, data, forever, yields=rank is Rank.SETTING)
         if buffer is not Buffer.HIGH_PRIO:
-            queue.waiting.append(entry)
+            place = len(queue.waiting)
+            while (
+                rank is Rank.URGENT
+                and place
+                and queue.waiting[place - 1].yields
+                and not queue.waiting[place - 1].packed
+            ):
+                place -= 1
+            queue.waiting.insert(place, entry)
         else:
             # In front of all, but not between the parts of a split command.
             queue.waiting.insert(1 if queue.waiting and queue.waiting[0].packed else 0, entry)

@@ -114,6 +114,8 @@ class BannerService(Service):
         if self.host.drone.controller.present:
             for text in PILOT_IN_CONTROL:
                 self.host.text(Severity.WARNING, text, channel)
+        for text in self.host.notices:
+            self.host.text(Severity.CRITICAL, text, channel)
         for text in (*self.host.vehicle.standing_warnings, *self._failsafe_warnings()):
             self.host.text(Severity.WARNING, text, channel)
         for text in banner(self.host.drone, flavour_of(channel)):

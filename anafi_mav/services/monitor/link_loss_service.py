@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from anafi_mav import texts
 from anafi_mav.errors import AnafiMavError
@@ -18,6 +19,18 @@ from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.link_loss import GcsWatch, LossAction
 from anafi_mav.vehicle.vehicle import Landed
 
+RETRY = 10.0
+"""s until an action that has failed is tried again: a bad link, or a lost GPS fix, may be better by then."""
+
+
+class FailedAction(NamedTuple):
+    """An action for a loss that was not carried out."""
+
+    at: float
+    """When it is tried again."""
+    epoch: int
+    """Of the vehicle's control: what was commanded since has priority."""
+
 
 class LinkLossService(Service):
     """Watches the heartbeats of ground stations on all channels."""
@@ -27,10 +40,12 @@ class LinkLossService(Service):
         self._watch = GcsWatch()
         self._ticked = math.inf
         """Time of the last check; infinite before the first one of a connection."""
+        self._failed: FailedAction | None = None
 
     def link_up(self) -> None:
         self._watch.restart(self.host.clock.monotonic())
         self._ticked = math.inf
+        self._failed = None
 
     def tick(self, now: float) -> None:
         if (gap := now - self._ticked) >= STALL:
@@ -39,6 +54,11 @@ class LinkLossService(Service):
         policy = self.host.vehicle.gcs_loss
         if policy.action is not LossAction.NOTHING and self._watch.expire(now, policy.after):
             self._lost(policy.after)
+        elif self._failed is not None and now >= self._failed.at:
+            failed, self._failed = self._failed, None
+            is_newest = failed.epoch == self.host.vehicle.control.epoch
+            if is_newest and self._watch.lost and policy.action is not LossAction.NOTHING:
+                self._lost(policy.after)
 
     def heartbeat(self, inbound: Inbound) -> None:
         if inbound.message.type == dialect.MAV_TYPE_GCS and self._watch.heard(inbound.now, inbound.channel):
@@ -66,17 +86,27 @@ class LinkLossService(Service):
             self.host.run_action(LinkLossService, self._act(policy.action), is_order=False)
 
     async def _act(self, action: LossAction) -> None:
-        vehicle = self.host.vehicle
+        """Carry an action out; one that fails is tried again, unless something newer is commanded."""
         try:
-            if action is LossAction.HOLD:
-                await vehicle.hold(FlightMode.HOLD, Source.LOST_LINK)
-            elif action is LossAction.LAND:
-                await vehicle.land(Source.LOST_LINK)
-            else:
-                await vehicle.return_home(Source.LOST_LINK)
+            await self._perform(action)
         except AnafiMavError as error:
-            self.host.text(
-                Severity.CRITICAL, texts.STATION_LOST_FAILED.fill(action=action.name.lower(), error=reason_of(error))
-            )
+            self._report(action, error)
             if action is LossAction.RETURN:  # without a way home, what is left is not to fly on
-                await self._act(LossAction.HOLD)
+                try:
+                    await self._perform(LossAction.HOLD)
+                except AnafiMavError as further:
+                    self._report(LossAction.HOLD, further)
+            self._failed = FailedAction(self.host.clock.monotonic() + RETRY, self.host.vehicle.control.epoch)
+
+    async def _perform(self, action: LossAction) -> None:
+        vehicle = self.host.vehicle
+        if action is LossAction.HOLD:
+            await vehicle.hold(FlightMode.HOLD, Source.LOST_LINK)
+        elif action is LossAction.LAND:
+            await vehicle.land(Source.LOST_LINK)
+        else:
+            await vehicle.return_home(Source.LOST_LINK)
+
+    def _report(self, action: LossAction, error: AnafiMavError) -> None:
+        text = texts.STATION_LOST_FAILED.fill(action=action.name.lower(), error=reason_of(error))
+        self.host.text(Severity.CRITICAL, text)

@@ -12,6 +12,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from typing import Any
 
+from anafi_mav import texts
 from anafi_mav.drone import MODELS, Drone, Range, events
 from anafi_mav.drone.events import Axis, PilotingStyleStyle, PreciseHomeMode, RthEndingBehavior, RthHomeType
 from anafi_mav.drone.events import ObstacleAvoidanceMode as AvoidanceMode
@@ -19,8 +20,9 @@ from anafi_mav.services.parameter.parameter import Limits, Parameter, bounds, cu
 from anafi_mav.services.parameter.parameter_codec import ParamType
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.base.aircraft import FlightSettings
-from anafi_mav.vehicle.base.bounds import LOWEST
+from anafi_mav.vehicle.base.bounds import LOWEST, SLOWEST
 from anafi_mav.vehicle.base.move_heading import MoveHeading
+from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import Source
 from anafi_mav.vehicle.flight_policy import BY_NUMBER, NUMBERS
 from anafi_mav.vehicle.joystick_override import Override
@@ -464,13 +466,23 @@ MAX_CRUISE_SPEED = 15.0
 """m/s: the maximum of anafi_ros (its max_horizontal_speed); no model reports its own limit."""
 
 
+def _move_speed(value: float) -> float | None:
+    """Return the speed (m/s) of moves, None for the drone's own.
+
+    Raises `Refused` for one at which no move would end.
+    """
+    if 0.0 < value < SLOWEST:
+        raise Refused(texts.SPEED, texts.SPEED_RANGE.fill(slowest=SLOWEST, fastest=MAX_CRUISE_SPEED))
+    return value or None
+
+
 async def _set_cruise_speed(host: Host, value: float) -> None:
-    _set(host, cruise_speed=value or None)
+    _set(host, cruise_speed=_move_speed(value))
     await _go_on(host)
 
 
 async def _set_climb_speed(host: Host, value: float) -> None:
-    _set(host, climb_speed=value or None)
+    _set(host, climb_speed=_move_speed(value))
     await _go_on(host)
 
 
@@ -501,7 +513,7 @@ CRUISE_SPEED = Parameter(
     step=0.1,
     decimals=1,
     group=GATEWAY,
-    long="0: the drone's default. MAV_CMD_DO_CHANGE_SPEED sets the same value.",
+    long="0: the drone's default; else 0.1 at least. MAV_CMD_DO_CHANGE_SPEED sets the same value.",
     default=0.0,
     source="gateway",
 )
@@ -517,7 +529,7 @@ CLIMB_SPEED = Parameter(
     step=0.1,
     decimals=1,
     group=GATEWAY,
-    long="0: the drone's default. MAV_CMD_DO_CHANGE_SPEED sets the same value.",
+    long="0: the drone's default; else 0.1 at least. MAV_CMD_DO_CHANGE_SPEED sets the same value.",
     default=0.0,
     source="gateway; up to the maximum of ANF_VERT_SPEED",
 )

@@ -8,13 +8,15 @@ speed of 0.3 m/s is 0.3 again.
 from __future__ import annotations
 
 import math
-
-import numpy as np
+import struct
 
 from anafi_mav.plans.plan import Item
 from anafi_mav.vehicle.fence.plan_items import DEGREES, UNSET, PlanItem, has_place
 
-LARGEST = float(np.finfo(np.float32).max)
+_FLOAT = struct.Struct("<f")
+
+LARGEST: float = _FLOAT.unpack(b"\xff\xff\x7f\x7f")[0]
+"""Largest number in single precision."""
 
 EXACT = 2.0**24
 """Whole numbers below it are the same in single precision."""
@@ -57,7 +59,14 @@ def _single(value: float | None) -> float:
         return math.nan
     if abs(value) > LARGEST:
         raise ValueError(f"{value:g} is too large a number for MAVLink")
-    return float(np.float32(value))
+    return _in_single_precision(value)
+
+
+def _in_single_precision(value: float) -> float:
+    try:
+        return float(_FLOAT.unpack(_FLOAT.pack(value))[0])
+    except OverflowError:
+        return math.copysign(math.inf, value)
 
 
 def _integer(value: float | None, placed: bool) -> int:
@@ -72,4 +81,8 @@ def _integer(value: float | None, placed: bool) -> int:
 def _shortest(value: float) -> float | None:
     if value.is_integer() and abs(value) < EXACT:
         return value
-    return None if math.isnan(value) else float(str(np.float32(value)))
+    if not math.isfinite(value):
+        return None if math.isnan(value) else value
+    single = _in_single_precision(value)
+    # Nine digits distinguish all numbers of single precision.
+    return next(near for digits in range(1, 10) if _in_single_precision(near := float(f"{value:.{digits}g}")) == single)

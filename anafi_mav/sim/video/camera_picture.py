@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from anafi_mav.arsdk.video.video_metadata import Quaternion
+from anafi_mav.sim.video.camera_view import CameraView
 from anafi_mav.sim.video.h264 import CELL, COLD, DARK, GROUND, HORIZON, LIGHT, SKY, WARM, Blocks, Cells, encoder
 from anafi_mav.units import DEG_PER_RAD, euler_from_quaternion, wrap_360
 
@@ -51,20 +51,6 @@ _GLYPHS = {
     "#": "0A0A1F0A1F0A0A", "?": "0E110102040004",
 }  # fmt: skip
 """Rows of a letter from the top, a byte each, its leftmost cell the highest of five bits."""
-
-
-class CameraView(NamedTuple):
-    """Contents of one picture: name, number and time, attitude and field of view of the camera."""
-
-    name: str
-    number: int
-    """Of the picture."""
-    milliseconds: int
-    """Time of the picture."""
-    quat: Quaternion
-    """Attitude of the camera, from north, east, down to forward, right, down."""
-    hfov: float
-    """rad, from the left to the right edge."""
 
 
 class CameraPicture:

@@ -18,12 +18,9 @@ import numpy as np
 import numpy.typing as npt
 
 from anafi_mav.errors import LocalProtocolError
+from anafi_mav.sim.video.camera_view import FRAME_RATE
 from anafi_mav.sim.video.cavlc import chroma_dc, luma_dc, se, ue
 
-KEY_INTERVAL = 30
-"""Pictures from one key picture to the next: a second."""
-FRAME_RATE = 30
-"""Pictures a second, as the stream says of itself."""
 CELL = 4
 """Pixels of a cell's side."""
 

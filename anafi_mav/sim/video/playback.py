@@ -5,15 +5,17 @@ from __future__ import annotations
 import asyncio
 import random
 from collections.abc import Callable
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from anafi_mav.arsdk.video import rtcp
 from anafi_mav.arsdk.video.rtcp import ReceiverReport, SenderReport
 from anafi_mav.arsdk.video.rtp_h264 import CLOCK_RATE, PictureSender
 from anafi_mav.arsdk.video.video_metadata import FrameMetadata
-from anafi_mav.sim.video.camera_picture import CameraPicture
-from anafi_mav.sim.video.h264 import KEY_INTERVAL, Blocks, encoder
+from anafi_mav.sim.video.camera_view import KEY_INTERVAL
 from anafi_mav.sim.video.video import CameraStream
+
+if TYPE_CHECKING:
+    from anafi_mav.sim.video.h264 import Blocks
 
 REPORT_PERIOD = 1.0
 """s between two sender reports."""
@@ -59,6 +61,9 @@ class Track:
         on_report: Callable[[], None],
     ) -> None:
         """`on_report` hears that the client reports, and so lives."""
+        from anafi_mav.sim.video.camera_picture import CameraPicture
+        from anafi_mav.sim.video.h264 import encoder
+
         self.stream = stream
         self._sender = PictureSender(chance.getrandbits(32), chance.getrandbits(16))
         self.camera = CameraPicture(stream.width, stream.height, stream.spectrum)

@@ -17,7 +17,7 @@ import math
 import random
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from anafi_mav.arsdk.video import rtsp
 from anafi_mav.arsdk.video.rtsp import (
@@ -34,10 +34,12 @@ from anafi_mav.arsdk.video.video_metadata import FrameMetadata, Quaternion
 from anafi_mav.sim.autopilot.firmware import Firmware
 from anafi_mav.sim.payload.media import MediaKind
 from anafi_mav.sim.video import video
-from anafi_mav.sim.video.camera_picture import CameraView
-from anafi_mav.sim.video.h264 import FRAME_RATE, Blocks
+from anafi_mav.sim.video.camera_view import FRAME_RATE, CameraView
 from anafi_mav.sim.video.playback import Send, Track
 from anafi_mav.sim.video.video import CameraStream, streams_of
+
+if TYPE_CHECKING:
+    from anafi_mav.sim.video.h264 import Blocks
 
 SERVER = "Parrot Streaming Server"
 SESSION_TIMEOUT = 60

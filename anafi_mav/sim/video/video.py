@@ -27,7 +27,6 @@ from anafi_mav.sim.autopilot.firmware import Firmware
 from anafi_mav.sim.features.services import QUALITY
 from anafi_mav.sim.features.wireless import RSSI
 from anafi_mav.sim.payload.optics import Optics, zoomed
-from anafi_mav.sim.video.h264 import encoder
 from anafi_mav.sim.world.model import AircraftModel
 from anafi_mav.units import DEG_PER_RAD, RAD_PER_DEG, quaternion_from_euler
 
@@ -210,6 +209,8 @@ def describe(
 
 
 def _describe(firmware: Firmware, stream: CameraStream) -> MediaDescription:
+    from anafi_mav.sim.video.h264 import encoder
+
     shown = encoder(stream.width, stream.height)
     seen = optics(firmware, stream)
     hfov, vfov = seen.hfov * DEG_PER_RAD, seen.vfov(stream.width, stream.height) * DEG_PER_RAD

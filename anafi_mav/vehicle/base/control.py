@@ -73,18 +73,6 @@ class Conditions(Protocol):
     text: Callable[[Severity, OperatorText], None]
     changed: Callable[[], None]
 
-    @property
-    def in_air(self) -> bool:
-        """True when flying, and neither taking off nor landing by itself."""
-
-    @property
-    def returning(self) -> bool:
-        """True while the drone flies home."""
-
-    @property
-    def activity(self) -> OperatorText:
-        """Activity of the drone, as the reason of a refusal."""
-
     def lacking(self, needs: Needs) -> OperatorText | None:
         """Return the first condition that is not met, as the reason of a refusal; None: all are."""
 
@@ -291,9 +279,7 @@ class Control:
             # One asked for through another controller, or before the link was lost. Raises when it is the drone's own.
             await piloting.cancel_return_home()
             self._require_pending(attempt, rules.what)
-        if Needs.IN_AIR in rules.needs and (not aircraft.in_air or aircraft.returning):
-            raise Refused(rules.what, aircraft.activity)
-        if (reason := aircraft.lacking(rules.needs & ~Needs.NO_DESCENT)) is not None:
+        if (reason := aircraft.lacking(rules.needs)) is not None:
             raise Refused(rules.what, reason)
         self.require_allowed(request.task, request.by, rules)
         if rules.start is Preparation.HOVER:

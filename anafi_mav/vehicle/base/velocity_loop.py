@@ -55,7 +55,8 @@ PLACE_GAIN = 0.7
 """1/s: velocity per position error."""
 
 PLACE_SPEED = 5.0
-"""m/s at most towards a position, as fast as an ANAFI's own moveTo; a velocity that the setpoint names comes on top."""
+"""m/s at most towards a position, as fast as an ANAFI's own moveTo; a velocity that the setpoint names comes on top,
+and what it has away from the position, so that this is held."""
 
 PLACE_BRAKING = 1.5
 """m/s2 that an approach to a position is planned with; an ANAFI brakes with 2 to 4 (anafi_ros paper IV)."""
@@ -328,7 +329,7 @@ class VelocityController:
         heading = motion.heading(now)
         frame = heading if demand.body else 0.0
         velocity = _turned(*motion.velocity(now + TILT_LAG), -frame)
-        towards = _turned(*self._approach(demand), -frame)
+        towards = _turned(*self._approach(demand, frame), -frame)
         wish, push = [0.0, 0.0], [0.0, 0.0]
         closed = [False, False]
         for i, axis in enumerate((demand.x, demand.y)):
@@ -354,8 +355,12 @@ class VelocityController:
         pitch = -_kept(math.atan(front / G), wish_front, full)
         return _kept(math.atan(right / G), wish_right, full), pitch
 
-    def _approach(self, demand: Demand) -> tuple[float, float]:
-        """Velocity (north, east) towards the demanded position."""
+    def _approach(self, demand: Demand, frame: float) -> tuple[float, float]:
+        """Return the velocity (north, east) towards the demanded position.
+
+        `frame`: rad from north to the first axis of velocities. One that leads away from the position is a mistake in
+        one of the two, and the position holds.
+        """
         along, across = _turned(self.motion.north, self.motion.east, -demand.turn)
         x = 0.0 if demand.x.position is None else demand.x.position - along
         y = 0.0 if demand.y.position is None else demand.y.position - across
@@ -363,8 +368,11 @@ class VelocityController:
         distance = math.hypot(north, east)
         if distance == 0.0:
             return 0.0, 0.0
-        speed = min(PLACE_GAIN * distance, math.sqrt(2.0 * PLACE_BRAKING * distance), PLACE_SPEED)
-        return north / distance * speed, east / distance * speed
+        north, east = north / distance, east / distance
+        ahead = _turned(demand.x.velocity or 0.0, demand.y.velocity or 0.0, frame)
+        most = PLACE_SPEED + max(0.0, -(ahead[0] * north + ahead[1] * east))
+        speed = min(PLACE_GAIN * distance, math.sqrt(2.0 * PLACE_BRAKING * distance), most)
+        return north * speed, east * speed
 
     def _note_saturation(self, saturated: bool, short: float, now: float) -> None:
         if not saturated:
@@ -383,7 +391,8 @@ class VelocityController:
             self._climb = units.clip(self._climb, -limits.climb_mps, limits.climb_mps)
             return self._climb
         self._climb = None
-        climb = -(demand.down_velocity or 0.0)
+        # A faster one cannot be flown, and would only shift the height that is held.
+        climb = -units.clip(demand.down_velocity or 0.0, -limits.climb_mps, limits.climb_mps)
         if demand.height is not None and self.motion.height is not None:
             climb += HEIGHT_GAIN * (demand.height - self.motion.height)
         return units.clip(climb, -limits.climb_mps, limits.climb_mps)

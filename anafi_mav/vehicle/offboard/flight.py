@@ -367,12 +367,8 @@ class OffboardFlight(PlainTask):
     def _require_freedom(self, what: OperatorText) -> None:
         vehicle = self._vehicle
         lifting = self._takeoff.under_way or self._stream.state is State.LIFTING
-        if not (vehicle.in_air or self._stands or lifting):
-            raise Refused(what, texts.TAKE_OFF_FIRST)
         if vehicle.drone.piloting.about_to_fly and not lifting:
             raise Refused(what, texts.WILL_TAKE_OFF)
-        if vehicle.returning:
-            raise Refused(what, texts.RETURNS)
         if (reason := vehicle.lacking(_GROUND)) is not None:
             raise Refused(what, reason)
 
@@ -396,7 +392,6 @@ class OffboardFlight(PlainTask):
         """The newest setpoint in mode Guided acquires the drone from whatever it does in that mode."""
         vehicle, control = self._vehicle, self._vehicle.control
         try:
-            self._require_freedom(texts.SETPOINT)
             if vehicle.mode is not FlightMode.GUIDED:  # ended by what arrived together with the setpoint
                 raise Refused(texts.SETPOINT, texts.IN_MODE.fill(mode=vehicle.mode.value))
             async with control.acquire(

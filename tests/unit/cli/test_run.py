@@ -24,7 +24,7 @@ from support.world import HOLD, HOME, loopback
 from anafi_mav import geo, mav_enums
 from anafi_mav.cli import main
 from anafi_mav.cli.addresses import Reservations
-from anafi_mav.cli.run import configuration, place
+from anafi_mav.cli.run import ASKED_FOR, StopSignals, configuration, place
 from anafi_mav.cli.sim import Fleet
 from anafi_mav.config import Config, load
 from anafi_mav.mavlink.key_ring import write_key
@@ -236,6 +236,20 @@ async def test_ctrl_c_in_the_air_asks_first(tmp_path: Path) -> None:
         await gone(child, 0.0)
         assert free(address, 5760)
         assert p.complaints == []
+
+
+async def test_ctrl_c_in_the_air_asks_again_after_a_while(capsys: pytest.CaptureFixture[str]) -> None:
+    signals = StopSignals()
+    signals.flying = lambda: ["alpha is in the air"]
+    signals.receive(signal.SIGINT)
+    await asyncio.sleep(ASKED_FOR)
+    signals.receive(signal.SIGINT)
+    assert not signals.stop.is_set()
+    assert capsys.readouterr().out.count("alpha is in the air") == 2
+    await asyncio.sleep(ASKED_FOR - 1.0)
+    assert signals.unsaid() == []
+    signals.receive(signal.SIGINT)
+    assert signals.stop.is_set()
 
 
 async def test_service_manager_hears_ready_and_log_file_is_json(tmp_path: Path) -> None:

@@ -89,3 +89,8 @@ def test_program_without_a_fabric_refuses_the_scheme() -> None:
     url = parse_endpoint("zenoh://127.0.0.1:7447")
     with pytest.raises(ConfigError, match="for run and ground only"):
         make_endpoint(url, None, SystemClock())  # type: ignore[arg-type]  # not reached
+
+
+def test_plus_sign_in_a_file_name_of_a_url_stays() -> None:
+    url = parse_endpoint("zenoh://router.example:7447?link=tls&ca=/etc/c++/ca%20one.pem")
+    assert url.options.ca == "/etc/c++/ca one.pem"

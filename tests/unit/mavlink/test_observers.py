@@ -92,3 +92,25 @@ def test_observer_reads_messages_and_files_of_a_foreign_system() -> None:
     party.send("observer", command(dialect.MAV_CMD_REQUEST_MESSAGE), (200, 190))
     party.send("observer", file_request(dialect.MAV_FTP_OPCODE_LISTDIRECTORY), (200, 190), seq=1)
     assert party.got("drone") == [("COMMAND_LONG", 200, 190), ("FILE_TRANSFER_PROTOCOL", 200, 190)]
+
+
+def test_observer_gets_no_command_to_a_drone_that_is_not_connected() -> None:
+    """In the name of that drone it would: its pilot would get no answer, and no connection for a command."""
+    party, absent = Party(), []
+    party.node.add_absent_host(7, lambda inbound: absent.append(inbound.message.get_type()))
+    party.send("observer", STATION, (7, 1))
+    land = dialect.MAVLink_command_long_message(7, 1, dialect.MAV_CMD_NAV_LAND, 0, 0, 0, 0, 0, 0, 0, 0)
+    party.send("pilot", land, (255, 190))
+    assert absent == ["COMMAND_LONG"]
+    assert party.got("observer") == []
+
+
+def test_observer_gets_no_answer_to_another_client() -> None:
+    party = Party()
+    party.send("pilot", STATION, (255, 190))
+    party.send("observer", STATION, (255, 190), seq=3)
+    party.got("observer")
+    value = dialect.MAVLink_command_ack_message(dialect.MAV_CMD_NAV_LAND, 0, 0, 0, 255, 190)
+    party.send("drone", value, (FOREIGN, 1))
+    assert party.got("pilot") == [("COMMAND_ACK", FOREIGN, 1)]
+    assert party.got("observer") == []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections import defaultdict
 from pathlib import Path
 
@@ -31,6 +32,7 @@ BOTH_SIDES = {
 """The same real thing, once simulated in `sim` and once seen by its user in `drone`."""
 
 
+@functools.cache
 def public_classes() -> dict[str, list[str]]:
     """Return the modules (room/…/module.py) of each class that is public and stands at the top of a module."""
     places = defaultdict(list)

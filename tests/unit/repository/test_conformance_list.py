@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import ast
+import functools
 import re
 from pathlib import Path
 
-import pytest
 from support.conformance_items import ITEMS
+from support.each import failures
 
 TESTS = Path(__file__).parents[2]
 TABLE = TESTS.parent / "docs" / "conformance.md"
@@ -18,11 +19,13 @@ FOLDERS = ("conformance", "clients")
 ROW = re.compile(r"\| (\d+) \| .* \| ([^|]+) \| ([^|]+) \| ([^|]*) \|")
 
 
+@functools.cache
 def rows() -> dict[int, tuple[str, str, str]]:
     found = (ROW.fullmatch(line) for line in TABLE.read_text(encoding="utf-8").splitlines())
     return {int(m[1]): (m[2], m[3], m[4]) for m in found if m}
 
 
+@functools.cache
 def named_in(path: Path) -> set[int]:
     """Numbers of the tests in a file."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -34,17 +37,20 @@ def test_the_table_has_every_item() -> None:
     assert list(rows()) == sorted(ITEMS)
 
 
-@pytest.mark.parametrize("number", ITEMS)
-def test_an_item_is_shown(number: int) -> None:
+def test_every_item_is_shown() -> None:
+    assert failures(ITEMS, require_shown) == ""
+
+
+def require_shown(number: int) -> None:
     px4, copter, files = rows()[number]
     item = ITEMS[number]
     for flavour, cell in (("px4", px4), ("ardupilot", copter)):
         if flavour in item.flavours or not item.flavours:
             assert cell.isdecimal(), f"item {number}, {flavour}: {cell}"
         else:
-            assert cell == "–"
+            assert cell == "–", f"item {number}, {flavour}: {cell}"
     places = re.findall(r"`([^`]+)`", files)
     assert places
     for place in places:
         (path,) = (path for folder in FOLDERS for path in (TESTS / folder).rglob(place))
-        assert number in named_in(path)
+        assert number in named_in(path), path

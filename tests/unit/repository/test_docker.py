@@ -217,6 +217,14 @@ def test_image_is_not_of_root(stage: str) -> None:
     assert "RUN" not in words[words.index("USER") :]
 
 
+def test_image_has_the_extras_of_a_gateway() -> None:
+    """Without them it would refuse a zenoh:// endpoint, and show no live picture."""
+    (step,) = [arguments for word, arguments in STAGES["gateway"] if word == "RUN" and "pip install" in arguments]
+    extras = re.search(r"\[([\w,]+)\]", step)
+    assert extras is not None
+    assert set(extras[1].split(",")) == {"web", "fabric"}
+
+
 def test_router_of_the_image_is_the_tested_one() -> None:
     (step,) = [arguments for word, arguments in STAGES["router"] if word == "RUN"]
     needed = Requirement(shlex.split(step)[-1])
@@ -259,7 +267,8 @@ def test_compose_ports_and_addresses_are_those_of_the_configurations() -> None:
     fleet = yaml.safe_load((DOCKER / "fleet.yaml").read_text())
     (endpoint,) = fleet["endpoints"]
     assert endpoint == "tcpin://0.0.0.0:5760"
-    assert _published(services["gateway"]) == {"5760", str(fleet["http"]["port"]), str(fleet["video"]["rtsp_port"])}
+    own = {"5760", str(fleet["http"]["port"]), str(fleet["video"]["rtsp_port"])}
+    assert _published(services["gateway"]) == own | {"8888"}  # that of HLS is MediaMTX's own default
     (master,) = [word for word in services["router"]["command"] if word.startswith("--master=")]
     assert master == "--master=tcp:gateway:5760"
     outs = {word.rpartition(":")[2] for word in services["router"]["command"] if word.startswith("--out=")}
@@ -277,6 +286,11 @@ def test_compose_ports_and_addresses_are_those_of_the_configurations() -> None:
         (int(given.http_port), int(given.rtsp_port))
     }
 
-    (pattern, path), *_ = yaml.safe_load((DOCKER / "mediamtx.yml").read_text())["paths"].items()
-    assert path["source"] == f"rtsp://gateway:{fleet['video']['rtsp_port']}/$G1/visible"
+    mediamtx = yaml.safe_load((DOCKER / "mediamtx.yml").read_text())
+    # Its RTSP server would have the port of the simulated drones.
+    assert [name for name in ("rtsp", "rtmp", "hls", "webrtc", "srt") if mediamtx[name]] == ["hls"]
+    (pattern, path), *_ = mediamtx["paths"].items()
+    # From another container it would need the gateway's token.
+    assert services["mediamtx"]["network_mode"] == services["fleet"]["network_mode"] == "service:gateway"
+    assert path["source"] == f"rtsp://127.0.0.1:{fleet['video']['rtsp_port']}/$G1/visible"
     assert all(re.fullmatch(pattern.removeprefix("~"), drone["name"]) for drone in fleet["drones"])

@@ -48,12 +48,12 @@ def faults(text: str) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(PACKAGE).as_posix())
-def test_first_line_of_docstring_follows_the_writing_rules(path: Path) -> None:
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    assert [
-        f"{path.relative_to(ROOT)}:{line}: {fault}" for line, text in docstrings(tree) for fault in faults(text)
-    ] == []
+def test_first_line_of_docstring_follows_the_writing_rules() -> None:
+    found = [
+        (path, line, text) for path in MODULES for line, text in docstrings(ast.parse(path.read_text(encoding="utf-8")))
+    ]
+    assert len(found) > 2000
+    assert [f"{path.relative_to(ROOT)}:{line}: {fault}" for path, line, text in found for fault in faults(text)] == []
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ Windows has not, are found in the source; each use needs a condition on the syst
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -34,6 +35,20 @@ LOOP_METHODS = {"add_reader", "add_signal_handler", "add_writer", "connect_read_
 """Methods that the event loop of Windows refuses with NotImplementedError."""
 
 SUBPROCESS_ARGUMENTS = {"pass_fds", "preexec_fn", "process_group", "user"}
+
+_USE = re.compile(
+    "|".join(
+        (
+            rf"^\s*(?:import|from)\b.*\b(?:{'|'.join(POSIX_MODULES)})\b",
+            rf"\bfrom (?:{'|'.join(POSIX_NAMES)}) import\b",
+            *(rf"\b{module}\s*\.\s*(?:{'|'.join(names)})\b" for module, names in POSIX_NAMES.items()),
+            rf"\b(?:{'|'.join(LOOP_METHODS)})\b",
+            rf"\b(?:{'|'.join(SUBPROCESS_ARGUMENTS)})\s*=",
+        )
+    ),
+    re.MULTILINE,
+)
+"""Every use looks so; a source without any is not parsed."""
 
 POSIX_ONLY = ("arsdk/link/watchdog.py", "arsdk/link/watchdog_child.py")
 """Modules that run on POSIX only; the module that starts the watchdog has the condition."""
@@ -84,7 +99,8 @@ def bare_uses(source: str) -> list[str]:
         for child in ast.iter_child_nodes(node):
             visit(child, line)
 
-    visit(ast.parse(source), 0)
+    if _USE.search(source):
+        visit(ast.parse(source), 0)
     return found
 
 

@@ -8,6 +8,7 @@ import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -139,24 +140,37 @@ def room_of(path: Path) -> str:
     return first.removesuffix(".py")
 
 
-def imports(path: Path) -> tuple[tuple[int, str], ...]:
-    """(line, dotted name) of each import in a file of the package, relative ones resolved, wherever it stands."""
-    return imports_of(path.read_text(encoding="utf-8"), "anafi_mav", *path.relative_to(PACKAGE).parent.parts)
+class Source(NamedTuple):
+    """Everything that is read of a module."""
+
+    imports: tuple[tuple[int, str], ...]
+    """(line, dotted name) of each, relative ones resolved, wherever it stands."""
+    docstring: str
+
+
+def source_of(path: Path) -> Source:
+    """Return what is read of a file of the package."""
+    return _read(path.read_text(encoding="utf-8"), "anafi_mav", *path.relative_to(PACKAGE).parent.parts)
 
 
 @functools.cache
-def imports_of(source: str, *package: str) -> tuple[tuple[int, str], ...]:
-    """As `imports`, of the source of a module in this package."""
-    return tuple(_read_imports(source, package))
+def _read(text: str, *package: str) -> Source:
+    tree = ast.parse(text)
+    return Source(tuple(_read_imports(tree, package)), ast.get_docstring(tree) or "")
 
 
-def _read_imports(source: str, package: tuple[str, ...]) -> Iterator[tuple[int, str]]:
-    for node in ast.walk(ast.parse(source)):
+def imports(path: Path) -> tuple[tuple[int, str], ...]:
+    """Return the imports of a file of the package."""
+    return source_of(path).imports
+
+
+def _read_imports(tree: ast.Module, package: tuple[str, ...]) -> Iterator[tuple[int, str]]:
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield node.lineno, alias.name
         elif isinstance(node, ast.ImportFrom):
-            base = package[: len(package) - node.level + 1] if node.level else []
+            base = package[: len(package) - node.level + 1] if node.level else ()
             module = ".".join([*base, *([node.module] if node.module else [])])
             for alias in node.names:
                 yield node.lineno, f"{module}.{alias.name}"
@@ -203,11 +217,8 @@ def test_every_room_is_there() -> None:
     assert not missing
 
 
-@pytest.mark.parametrize(
-    "path", [p for p in modules() if room_of(p) != "__init__"], ids=lambda p: str(p.relative_to(PACKAGE))
-)
-def test_imports_run_along_the_table(path: Path) -> None:
-    assert edges_not_in_the_table(path) == []
+def test_imports_run_along_the_table() -> None:
+    assert [edge for path in modules() if room_of(path) != "__init__" for edge in edges_not_in_the_table(path)] == []
 
 
 def test_package_itself_imports_no_room() -> None:
@@ -244,24 +255,23 @@ def test_a_wrong_edge_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 def docstring(path: Path) -> str:
     """The docstring of a module, or of a folder."""
-    file = path / "__init__.py" if path.is_dir() else path
-    return ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
+    return source_of(path / "__init__.py" if path.is_dir() else path).docstring
 
 
-@pytest.mark.parametrize("core", CORES)
-def test_core_imports_neither_sockets_nor_clocks(core: str) -> None:
-    path = PACKAGE / core
-    files = sorted(path.rglob("*.py")) if path.is_dir() else [path]
-    assert files
+def test_core_imports_neither_sockets_nor_clocks() -> None:
+    files = {core: sorted((PACKAGE / core).rglob("*.py")) or [PACKAGE / core] for core in CORES}
     found = [
-        f"{file.name}:{line}: {name}" for file in files for line, name in imports(file) if name.partition(".")[0] in IO
+        f"{core}: {file.name}:{line}: {name}"
+        for core in CORES
+        for file in files[core]
+        for line, name in imports(file)
+        if name.partition(".")[0] in IO
     ]
     assert found == []
 
 
-@pytest.mark.parametrize("core", sorted({*CORES} - GENERATED))
-def test_core_docstring_states_no_io(core: str) -> None:
-    assert NO_IO in docstring(PACKAGE / core)
+def test_core_docstring_states_no_io() -> None:
+    assert [core for core in sorted({*CORES} - GENERATED) if NO_IO not in docstring(PACKAGE / core)] == []
 
 
 def test_module_stating_no_io_is_a_core() -> None:
@@ -278,15 +288,18 @@ LISTS = {"arsdk/messages", "cli"}
 """Folders with one module for each item of a list: Parrot's features, the subcommands."""
 
 
-@pytest.mark.parametrize("folder", FOLDERS)
-def test_folder_holds_at_most_twenty_modules(folder: str) -> None:
-    found = [path.name for path in (PACKAGE / folder).glob("*.py") if path.name != "__init__.py"]
-    assert len(found) <= LARGEST or folder in LISTS, found
+def test_folder_holds_at_most_twenty_modules() -> None:
+    assert len(FOLDERS) > 50
+    found = {
+        folder: [path.name for path in (PACKAGE / folder).glob("*.py") if path.name != "__init__.py"]
+        for folder in FOLDERS
+        if folder not in LISTS
+    }
+    assert {folder: names for folder, names in found.items() if len(names) > LARGEST} == {}
 
 
-@pytest.mark.parametrize("folder", FOLDERS)
-def test_folder_docstring_states_its_contents(folder: str) -> None:
-    assert docstring(PACKAGE / folder).strip()
+def test_folder_docstring_states_its_contents() -> None:
+    assert [folder for folder in FOLDERS if not docstring(PACKAGE / folder).strip()] == []
 
 
 def test_unit_tests_mirror_the_package() -> None:
@@ -382,23 +395,26 @@ def test_every_place_of_the_table_exists() -> None:
         assert path.is_dir() or path.with_suffix(".py").is_file(), name
 
 
-@pytest.mark.parametrize("place", sorted(LAW))
-def test_places_import_each_other_one_way_only(place: str) -> None:
+def reached_from(place: str) -> set[str]:
+    """Return the places that a place imports, directly or by others."""
     seen: set[str] = set()
     todo = [*LAW[place]]
     while todo:
         one = todo.pop()
-        assert one in LAW, f"{one} is no place"
+        assert one in LAW, f"{place}: {one} is no place"
         if one not in seen:
             seen.add(one)
             todo += LAW[one]
-    assert place not in seen
+    return seen
 
 
-@pytest.mark.parametrize("folder", FOLDERS)
-def test_imports_inside_a_room_run_along_the_table(folder: str) -> None:
-    found = [edge for path in sorted((PACKAGE / folder).glob("*.py")) for edge in folder_edges(path)]
-    assert found == []
+def test_places_import_each_other_one_way_only() -> None:
+    assert [place for place in sorted(LAW) if place in reached_from(place)] == []
+
+
+def test_imports_inside_a_room_run_along_the_table() -> None:
+    files = [path for folder in FOLDERS for path in sorted((PACKAGE / folder).glob("*.py"))]
+    assert [edge for path in files for edge in folder_edges(path)] == []
 
 
 def test_wrong_edge_inside_a_room_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

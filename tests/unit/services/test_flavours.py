@@ -18,7 +18,10 @@ NAMES = {"PX4", "ARDUPILOT", "STANDARD"}
 
 def comparisons(path: Path) -> Iterator[int]:
     """The lines that compare something with one flavour, by `is`, `==` or `in`."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), str(path))):
+    source = path.read_text(encoding="utf-8")
+    if not any(name in source for name in NAMES):
+        return
+    for node in ast.walk(ast.parse(source, str(path))):
         if isinstance(node, ast.Compare):
             operands = [node.left, *node.comparators]
             operands += [one for operand in operands if isinstance(operand, ast.Tuple) for one in operand.elts]

@@ -18,6 +18,7 @@ from anafi_mav.arsdk.link.transport import (
     Event,
     Garbage,
     LinkDown,
+    Rank,
     ReceivedMessage,
     Role,
     Silent,
@@ -683,3 +684,21 @@ def test_silence_while_the_host_stalls_is_not_the_peers() -> None:
     for now in (5.5, 6.0):
         assert transport.expire(now) == []
     assert [type(event) for event in transport.expire(6.5)] == [LinkDown]
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_urgent_command_goes_before_settings_that_wait_and_before_nothing_else(version: int) -> None:
+    transport = Transport(Role.CONTROLLER, version, 0.0)
+    first = transport.send(tilt(1), 0.0, Rank.SETTING)
+    transport.outgoing(0.0)  # in flight
+    before = transport.send(common.AllStates(), 0.0)
+    settings = [transport.send(tilt(value), 0.0, Rank.SETTING) for value in (2, 3)]
+    urgent = transport.send(ardrone3.CancelMoveTo(), 0.0, Rank.URGENT)
+    later = transport.send(ardrone3.Landing(), 0.0)
+    last = transport.send(ardrone3.CancelMoveTo(), 0.0, Rank.URGENT)
+    delivered, seq = [], 0
+    while len(delivered) < 7:
+        delivered += [e.token for e in transport.receive(ack(version, 11, seq), 0.0) if isinstance(e, Delivered)]
+        transport.outgoing(0.0)
+        seq += 1
+    assert delivered == [first, before, urgent, *settings, later, last]

@@ -4,6 +4,7 @@ against a device that answers as each test says, and goes deaf when it says so."
 from __future__ import annotations
 
 import asyncio
+import gc
 from collections.abc import Awaitable, Callable
 from typing import Any
 
@@ -258,6 +259,21 @@ async def test_hover_repeats_the_stop_when_follow_me_continues(drone: Drone, dev
     await device.until(follow_me.Stop, 2)
     await in_order(drone, device)
     assert len(device.got(follow_me.Stop)) == 2
+
+
+async def test_return_cancelled_during_a_takeoff_leaves_no_unread_error(
+    drone: Drone, device: ScriptedDevice, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The wait for its answer has ended before the link is lost."""
+    await flies(drone, device, FlyingState.TAKINGOFF)
+    returning = asyncio.ensure_future(drone.piloting.return_home())
+    await device.until(rth.ReturnToHome)
+    returning.cancel()
+    await asyncio.wait([returning])
+    await drone.close()
+    del returning
+    gc.collect()
+    assert "never retrieved" not in caplog.text
 
 
 # -- flight plans

@@ -11,8 +11,9 @@ import pytest
 from support.pictures import decode, horizon, strip
 
 from anafi_mav.arsdk.video.video_metadata import Quaternion
-from anafi_mav.sim.video.camera_picture import CameraPicture, CameraView
-from anafi_mav.sim.video.h264 import KEY_INTERVAL, encoder
+from anafi_mav.sim.video.camera_picture import CameraPicture
+from anafi_mav.sim.video.camera_view import KEY_INTERVAL, CameraView
+from anafi_mav.sim.video.h264 import encoder
 from anafi_mav.units import quaternion_from_euler
 
 HFOV = math.radians(69.0)

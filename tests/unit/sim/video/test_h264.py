@@ -11,8 +11,9 @@ from support.pictures import decode
 
 from anafi_mav.errors import LocalProtocolError
 from anafi_mav.sim.video import cavlc
+from anafi_mav.sim.video.camera_view import KEY_INTERVAL
 from anafi_mav.sim.video.cavlc import chroma_dc, luma_dc, se, ue
-from anafi_mav.sim.video.h264 import CELL, KEY_INTERVAL, PALETTE, SKY, Cells, PictureEncoder
+from anafi_mav.sim.video.h264 import CELL, PALETTE, SKY, Cells, PictureEncoder
 
 LUMA = np.array([128 + 40 * colour.luma for colour in PALETTE])
 

@@ -21,7 +21,7 @@ from anafi_mav.arsdk.video.video_metadata import FlyingState
 from anafi_mav.sim import DroneSpec, Simulator
 from anafi_mav.sim.payload.jpeg_scene import Scene
 from anafi_mav.sim.payload.media import MediaKind
-from anafi_mav.sim.video.h264 import KEY_INTERVAL
+from anafi_mav.sim.video.camera_view import KEY_INTERVAL
 from anafi_mav.sim.video.rtsp import MAX_CONNECTIONS, MAX_SESSIONS, VideoServer
 from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.sim.world.motion import STEP
