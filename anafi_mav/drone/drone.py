@@ -716,7 +716,10 @@ class Drone:
         return undo
 
     def after_read(self, call: Callable[[], None]) -> None:
-        """Call a function when the messages that are read together are handled; see `Session.after_read`."""
+        """Call a function when the messages that are read together are handled.
+
+        See `Session.after_read`.
+        """
         if self._session is None:
             asyncio.get_running_loop().call_soon(call)
         else:

@@ -154,9 +154,10 @@ class Session(asyncio.DatagramProtocol):
         self._flush_soon()
 
     def after_read(self, call: Callable[[], None]) -> None:
-        """Call a function when the messages that are read together are handled; soon, if none are being read.
+        """Call a function when the messages that are read together are handled.
 
-        At once: what they were about is still in the processor's caches, and with 250 drones no longer a little later.
+        Soon, if none are being read. What the messages were about is in the processor's caches then, and no longer
+        after the datagrams of many other drones.
         """
         if self._is_reading:
             self._after_read.append(call)
