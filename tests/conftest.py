@@ -5,6 +5,7 @@ pytest tests/conformance tests/clients -m "not soak" --conformance=docs/conforma
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 import signal
@@ -35,6 +36,9 @@ watchdog.LIMIT = None
 
 # A shell starts what runs in its background with SIGINT ignored, and the programs that tests start would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+_STATES = itertools.count()
+"""Names of state folders."""
 
 _NUMBER = re.compile(r"test_conf_(\d{3})")
 
@@ -73,20 +77,9 @@ def pytest_asyncio_loop_factories() -> dict[str, Any]:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    _keep_bytecode(config.rootpath / ".pytest_cache" / "bytecode")
     path = config.getoption("--conformance")
     if path is not None and not hasattr(config, "workerinput"):
         config.pluginmanager.register(_Table(Path(path)), "conformance-table")
-
-
-def _keep_bytecode(folder: Path) -> None:
-    """Let workers and child programs keep bytecode in `folder` where the environment forbids it in the sources.
-
-    A run starts some 200 programs, and without bytecode each compiles all that it imports: 0.6 s for ours, more for
-    clients' libraries, a fifth of the whole run.
-    """
-    if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
-        os.environ.setdefault("PYTHONPYCACHEPREFIX", str(folder))
 
 
 @pytest.fixture(autouse=True)
@@ -97,10 +90,19 @@ def _flavours_spoken_to(request: pytest.FixtureRequest) -> Iterator[None]:
 
 
 @pytest.fixture(autouse=True)
-def _own_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A gateway remembers plans by the serial number of its drone, and simulated drones share those: no test finds what
-    another one left, and none writes where its user keeps his own."""
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+def _own_state(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Set a state folder that no other test has, and no user; it does not exist.
+
+    A gateway remembers plans by the serial number of its drone, and simulated drones share those. A folder that is made
+    for each test costs more than most tests: only those that use `tmp_path` have their state in it.
+    """
+    if "tmp_path" in request.fixturenames:
+        folder = request.getfixturevalue("tmp_path") / "state"
+    else:
+        folder = tmp_path_factory.getbasetemp() / "states" / str(next(_STATES))
+    monkeypatch.setenv("XDG_STATE_HOME", str(folder))
 
 
 class _Table:

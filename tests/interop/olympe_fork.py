@@ -1,8 +1,9 @@
 """Imports Olympe once and forks for each script: ``olympe_fork.py SOCKET``.
 
 To import Olympe takes seconds of processor time: it makes a class of each of Parrot's messages. This program does that
-with the first request. Olympe's one thread after its import writes its log: it ends before the first fork, and each
-script gets its own. All other threads begin with Olympe's objects, so a script finds what its own import would give it.
+with the first request. Olympe's one thread after its import writes its log, and looks for a line a thousand times a
+second, most of a script's processor time: the log is written without it here. All other threads begin with Olympe's
+objects, so a script finds what its own import would give it.
 
 A client connects to the Unix socket SOCKET and sends one datagram: JSON with `argv` (the script's path first),
 `folder` (the current one) and `environment`, with three files, which become stdin, stdout and stderr. The answers are
@@ -15,7 +16,6 @@ from __future__ import annotations
 import gc
 import importlib
 import json
-import logging
 import os
 import random
 import runpy
@@ -58,7 +58,7 @@ def import_olympe() -> None:
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # numpy's threads
     for module in MODULES:
         importlib.import_module(module)
-    logging.shutdown()
+    sys.modules["olympe"].log.update_config({"handlers": {"console": {"class": "logging.StreamHandler"}}})
     (only,) = Path("/proc/self/task").iterdir()
     assert int(only.name) == os.getpid(), "a fork would lose threads"
     gc.freeze()
@@ -103,7 +103,6 @@ def run(request: dict[str, Any], files: list[int]) -> None:
         sys.argv = request["argv"]
         sys.path[0] = str(Path(sys.argv[0]).parent)
         random.seed()
-        sys.modules["olympe"].log.update_config({})  # new handlers, with a thread
         runpy.run_path(sys.argv[0], run_name="__main__")
         status = 0
     except SystemExit as end:

@@ -109,6 +109,10 @@ class CameraOffers(NamedTuple):
     """Options and limits of each of `SETTINGS`."""
 
 
+Offers = tuple[tuple[int, CameraOffers], ...]
+"""Of each camera by its id, in the order in which they were reported."""
+
+
 @lru_cache(maxsize=SHARED)
 def _shared(offers: CameraOffers) -> CameraOffers:
     """Return one object for equal cameras of different drones: each has hundreds of options."""
@@ -140,6 +144,11 @@ class Catalogue:
         self.entries = tuple(entry for entry in found if entry is not None)
         self.index = {entry.setting.name: place for place, entry in enumerate(self.entries)}
         return True
+
+    @property
+    def offers(self) -> Offers:
+        """Everything that the definition depends on, beside the model."""
+        return tuple(self._offers.items())
 
     def __getitem__(self, name: str) -> CatalogueEntry:
         return self.entries[self.index[name]]

@@ -13,7 +13,7 @@ import xml.etree.ElementTree as ET
 from typing import NamedTuple
 
 from anafi_mav.services.camera_definition.camera_setting import Option
-from anafi_mav.services.camera_definition.catalogue import Catalogue, CatalogueEntry, Restriction
+from anafi_mav.services.camera_definition.catalogue import Catalogue, CatalogueEntry, Offers, Restriction
 from anafi_mav.services.camera_definition.param_ext_codec import ExtType
 from anafi_mav.services.checksum import crc32
 
@@ -27,16 +27,35 @@ class DefinitionFile(NamedTuple):
     version: int
 
 
+MAX_KEPT = 16
+"""Definitions that are kept."""
+
+_kept: dict[tuple[str, Offers], DefinitionFile] = {}
+"""Definitions of all drones, by model and offers: a fleet of one model needs one, also after each reconnection."""
+
+_NO_VERSION = b'<definition version="0">'
+
+
 def definition_file(catalogue: Catalogue, model: str) -> DefinitionFile:
     """Return the definition of a drone's camera.
 
     `model` is the camera's name in CAMERA_INFORMATION. The version is a hash of the content: QGroundControl and MAVSDK
     keep a file for each name and version for good.
     """
+    key = model, catalogue.offers
+    found = _kept.get(key)
+    if found is None:
+        if len(_kept) >= MAX_KEPT:
+            _kept.clear()
+        found = _kept[key] = _made(catalogue, model)
+    return found
+
+
+def _made(catalogue: Catalogue, model: str) -> DefinitionFile:
     content = _content(catalogue, model)
     version = crc32(content)
     folded = (version ^ version >> 16) & 0xFFFF or 1  # 0 means that there is no definition
-    return DefinitionFile(content.replace(b'version="0"', b'version="%d"' % folded, 1), folded)
+    return DefinitionFile(content.replace(_NO_VERSION, b'<definition version="%d">' % folded, 1), folded)
 
 
 def _content(catalogue: Catalogue, model: str) -> bytes:
