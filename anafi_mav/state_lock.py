@@ -105,6 +105,8 @@ class StateLock:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._file: int | None = None
+        self._own: int | None = None
+        """The folder itself, where it can be locked: a person may delete a lock file that looks old."""
 
     def acquire(self) -> Holder | None:
         """Lock the folder and return None, or return the gateway that holds it.
@@ -116,6 +118,8 @@ class StateLock:
         try:
             for attempt in range(TRIES):
                 if try_lock(file):
+                    if not self._lock_folder():
+                        break
                     self._file, file = file, -1
                     self.write(())
                     return None
@@ -125,6 +129,22 @@ class StateLock:
         finally:
             if file >= 0:
                 os.close(file)
+
+    def _lock_folder(self) -> bool:
+        """Lock the folder itself; False when another gateway has it, whose lock file was deleted."""
+        if os.name != "posix":
+            return True
+        folder = os.open(self._folder, os.O_RDONLY)
+        try:
+            if not try_lock(folder):
+                return False
+            self._own, folder = folder, -1
+        except OSError:  # a file system on which folders cannot be locked
+            return True
+        finally:
+            if folder >= 0:
+                os.close(folder)
+        return True
 
     def write(self, drones: Iterable[HeldDrone], web: str = "") -> None:
         """Replace what the file says. A full disk is no reason to end a flight."""
@@ -143,6 +163,9 @@ class StateLock:
                 os.ftruncate(self._file, 0)
             os.close(self._file)
             self._file = None
+        if self._own is not None:
+            os.close(self._own)
+            self._own = None
 
 
 def read_holder(folder: Path | None) -> Holder | None:

@@ -715,6 +715,16 @@ class Drone:
 
         return undo
 
+    def after_read(self, call: Callable[[], None]) -> None:
+        """Call a function when the messages that are read together are handled.
+
+        See `Session.after_read`.
+        """
+        if self._session is None:
+            asyncio.get_running_loop().call_soon(call)
+        else:
+            self._session.after_read(call)
+
     async def expect(
         self,
         answer: type[MessageT],

@@ -136,7 +136,11 @@ class FabricGround:
     # What endpoints report.
 
     def opened(self, channel: Channel) -> None:
-        """Become a station on the fabric."""
+        """Make a peer a station on the fabric, once it has proved to be at its address."""
+        if channel.proof is None:
+            self._join(channel)
+
+    def _join(self, channel: Channel) -> None:
         self._count += 1
         station = _FabricStation(station_id(self._connection.session, self._count), channel)
         self._stations[channel] = self._by_name[station.name] = station
@@ -155,7 +159,8 @@ class FabricGround:
             self._connection.zenoh.end(f"{keys.down(ALL, station.name)}/**")
 
     def proved(self, channel: Channel) -> None:
-        """Note that a peer is at its address."""
+        """Make a peer a station, which a made-up address is not: the places of gateways are few."""
+        self._join(channel)
 
     def introduce(self, channel: Channel) -> None:
         """Do nothing: the endpoints here have no keys."""

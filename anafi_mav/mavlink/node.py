@@ -357,12 +357,14 @@ class Node:
         """Return True if a frame reaches none but the systems of its channel's option `systems`.
 
         The router decides about frames for one system. To all go a station's heartbeat, and what these systems send
-        to no target: a command to system 0 would be one to the systems behind other endpoints.
+        to no target: a command to system 0 would be one to the systems behind other endpoints. COMMAND_ACK of older
+        autopilots has no target though it has the field.
         """
         message = received.message
         if channel.system_ids is None or targets(message)[0] != 0 or _is_stations_heartbeat(message):
             return True
-        return received.sysid in channel.system_ids and not has_target(message)
+        is_ack = isinstance(message, dialect.MAVLink_command_ack_message)
+        return received.sysid in channel.system_ids and (is_ack or not has_target(message))
 
     def _stalled(self, seconds: float) -> None:
         logger.warning(

@@ -6,7 +6,7 @@ values are updated, and not more often than this.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Generic, TypeVar
 from weakref import WeakKeyDictionary
 
@@ -96,16 +96,16 @@ class Streams(Generic[ChannelT]):
     def __init__(
         self,
         defaults: Mapping[int, float],
-        without: Callable[[ChannelT], Collection[int]] = lambda channel: (),
+        has: Callable[[ChannelT, int], bool] = lambda channel, id: True,
         pace: Callable[[ChannelT], StreamPace | None] = lambda channel: None,
     ) -> None:
         """Create streams with `defaults`, the intervals in s by message id.
 
-        `without` returns the message ids that a channel does not have by default, `pace` how far it is slowed down.
+        `has` returns False for a message that a channel does not have by default, `pace` how far it is slowed down.
         """
         self._pace = pace
         self._defaults = dict(defaults)
-        self._without = without
+        self._has = has
         self._channels: WeakKeyDictionary[ChannelT, dict[int, _Stream]] = WeakKeyDictionary()
         self._audiences: list[_Audience[ChannelT]] = []
 
@@ -219,4 +219,5 @@ class Streams(Generic[ChannelT]):
         return stream
 
     def _default(self, channel: ChannelT, id: int) -> float | None:
-        return None if id in self._without(channel) else self._defaults.get(id)
+        interval = self._defaults.get(id)
+        return interval if interval is not None and self._has(channel, id) else None

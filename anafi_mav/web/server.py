@@ -359,7 +359,9 @@ class HttpServer:
             answer.headers["Cache-Control"] = "no-store"
             raise answer
         self.refused["token"] += 1
-        raise web.HTTPUnauthorized(text=NO_TOKEN, headers={"WWW-Authenticate": 'Bearer realm="anafi-mav"'})
+        refusal = web.HTTPUnauthorized(text=NO_TOKEN, headers={"WWW-Authenticate": 'Bearer realm="anafi-mav"'})
+        refusal.force_close()  # its place is for those who have the token
+        raise refusal
 
     def _is_link_to_page(self, request: web.Request) -> bool:
         """True for a page that is opened as such, and not as a part of another one."""

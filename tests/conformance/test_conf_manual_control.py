@@ -195,6 +195,31 @@ async def test_sticks_have_one_holder() -> None:
             await w.drone.wait_log(lambda e: e.name.endswith(".PCMD") and e.args["roll"] == -100, 5.0, since=now())
 
 
+async def test_released_channels_of_another_client_leave_the_holders_sticks() -> None:
+    async with world(speed=1.0) as w:
+        other = await w.connect(sysid=250)
+        await w.take_off()
+        await by_sticks(w, "px4")
+        async with streaming(w.client, manual(x=500), 0.2):
+            await w.drone.wait_log(lambda e: e.name.endswith(".PCMD") and e.args["pitch"] == 50, 5.0)
+            began = now()
+            async with streaming(other, override(0, 0, 0, 0), 0.1):
+                await asyncio.sleep(0.5)
+            assert {stick(e)[:2] for e in heard(w, "PCMD", since=began)} == {(0, 50)}
+
+
+async def test_sticks_are_refused_with_a_text_while_the_pilot_moves_one() -> None:
+    async with world(speed=1.0, skycontroller=3) as w:
+        await w.take_off()
+        await by_sticks(w, "px4")
+        async with streaming(w.client, manual(x=500), 0.1):
+            await w.drone.wait_log(lambda e: e.name.endswith(".PCMD") and e.args["pitch"] == 50, 5.0)
+            mark = w.client.mark()
+            assert w.drone.skycontroller is not None
+            w.drone.skycontroller.stick(3, -60)
+            await said(w.client, "Sticks ignored: Skycontroller pilot", mark)
+
+
 async def test_sticks_for_another_system_are_not_ours() -> None:
     async with world(speed=1.0) as w:
         await w.take_off()

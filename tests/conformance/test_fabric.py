@@ -23,6 +23,7 @@ from support.fault_scenarios import watched
 from support.ftp import Ftp
 from support.mav import Client
 from support.media import DAY, add_photo
+from support.own_address import own_address
 from support.params import write
 from support.poor_link import StallingRelay
 from support.process import gateway_process
@@ -391,6 +392,31 @@ async def test_key_that_a_station_sends_is_not_published() -> None:
             while b"after the key" not in contents[-1]:
                 contents.append((await asyncio.to_thread(samples.recv)).payload.to_bytes())
         assert not [content for content in contents if key in content]
+
+
+async def test_made_up_address_is_no_station_on_the_fabric() -> None:
+    """One datagram, whose sender's address may be forged, would take a place of each gateway."""
+    address = own_address()
+    async with router() as node:
+        ground_process = FabricGround(parse_endpoint(node.url), [parse_endpoint(f"udpin://{address}:0")], SystemClock())
+        await ground_process.start()
+        client, tokens = Client(), "anafi/station/**"
+        try:
+            (port,) = (one.local_port for one in ground_process.endpoints)
+            assert port is not None
+            with await asyncio.to_thread(opened, node) as session:
+
+                async def stations() -> int:
+                    return len(await asyncio.to_thread(lambda: list(session.liveliness().get(tokens))))
+
+                client.connect_udp(address, port)
+                for sent in range(3):
+                    client.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+                    await asyncio.sleep(0.5)
+                    assert await stations() == (sent == 2)
+        finally:
+            await client.close()
+            await ground_process.close()
 
 
 async def test_flood_of_queries_leaves_room_for_the_next_one() -> None:

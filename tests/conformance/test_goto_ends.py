@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import asyncio
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.fault_scenarios import ACCEPTED, REJECTED, goto, heard
-from support.setpoints import said, texts
-from support.world import World, world
+from support.mav import NAN
+from support.setpoints import POSITION_ONLY, earth, engage, said, streaming, texts
+from support.world import HOME, World, world
 
+from anafi_mav import geo
 from anafi_mav.arsdk.messages.skyctrl import Source
 
 PITCH_STICK = 3
@@ -60,3 +63,19 @@ async def test_goto_replaced_by_a_command_of_a_client_has_no_text_about_its_end(
         await w.client.wait("HEARTBEAT")
         await asyncio.sleep(1.0)  # the drone's events about what was replaced
         assert [text for text in texts(w.client, mark) if text.startswith("Goto")] == []
+
+
+@pytest.mark.parametrize("seed", [2, 16])
+async def test_goto_to_the_place_of_a_cancelled_move_is_acknowledged_as_it_is_flown(seed: int) -> None:
+    """The drone reports the end of the cancelled move twice, the second time after the goto was sent."""
+    async with world(speed=1.0, quirks=(f"scramble:{seed}",)) as w:
+        await w.take_off(10.0)
+        place = geo.destination(*HOME[:2], 40.0, 0.0)
+        x, y = round(place[0] * 1e7) / 1e7, round(place[1] * 1e7) / 1e7
+        async with streaming(w.client, earth(POSITION_ONLY, 6, place=(x, y), height=10.0)):
+            await engage(w.client, "px4")
+            await asyncio.sleep(1.5)  # on the way
+        await asyncio.sleep(0.46)  # the silence that ends the move
+        ack = await w.client.command(dialect.MAV_CMD_DO_REPOSITION, -1, 1, 0, NAN, frame=6, x=x, y=y, z=10.0)
+        assert ack.result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["north"] - 40.0) < 1.0, 20.0)

@@ -205,3 +205,18 @@ async def test_joystick_takes_over_again_after_another_rest() -> None:
         await asyncio.sleep(1.0)
         stick.x = 800
         await w.drone.wait_log(lambda e: len(heard(w, "CancelMoveTo")) == 2)
+
+
+async def test_joystick_does_not_end_a_return_while_the_aircraft_is_the_pilots() -> None:
+    async with world(speed=1.0, skycontroller=3) as w:
+        await w.take_off(10.0)
+        assert await goto(w, 60.0, 10.0) == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 20.0, 20.0)
+        assert (await w.client.command(RTL)).result == ACCEPTED
+        await write(w.client, "ANF_SC_OFFBOARD", 0, dialect.MAV_PARAM_TYPE_INT32)
+        async with joystick(w) as held:
+            held.x = 1000
+            await asyncio.sleep(1.0)
+        assert heard(w, "abort") == []
+        assert w.drone.firmware.homing.active
+        assert not taken(w)

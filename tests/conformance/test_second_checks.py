@@ -220,6 +220,15 @@ async def test_task_whose_conditions_end_in_its_wait_is_refused(meanwhile: str, 
         assert beat.custom_mode in (w.modes.hold, w.modes.land, w.modes.returning)
 
 
+async def test_follow_chosen_during_a_goto_stops_the_drone_until_a_target_is_known() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off(UP)
+        await moving(w)
+        assert (await w.client.command(SET_MODE, *FOLLOW)).result == ACCEPTED
+        await watched(3.0)
+        assert w.drone.pose.vn == pytest.approx(0.0, abs=0.2)
+
+
 # Setpoints.
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 import stat
 from collections.abc import AsyncIterator
@@ -52,6 +53,16 @@ async def test_request_without_the_token_is_refused_and_counted(server: HttpServ
                     assert answer.headers["WWW-Authenticate"].startswith("Bearer")
                     assert TOKEN.text not in await answer.text()
     assert server.refused["token"] == 6
+
+
+async def test_connection_without_the_token_keeps_no_place(server: HttpServer) -> None:
+    reader, writer = await asyncio.open_connection("127.0.0.1", server.port)
+    writer.write(b"GET /status.json HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+    answer = await reader.read()  # to the end of the connection, for which a client could also be silent for long
+    assert answer.startswith(b"HTTP/1.1 401 ")
+    assert b"\r\nConnection: close\r\n" in answer
+    assert server.connections == 0
+    writer.close()
 
 
 async def test_bearer_token_passes(server: HttpServer) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from anafi_mav.gateway import state_in_use
 from anafi_mav.state_lock import FILE, HeldDrone, Holder, StateLock, read_holder
 
 ALPHA = HeldDrone("alpha", "192.168.42.1", "wlan1", "PI040416DA9H839157")
@@ -48,6 +49,19 @@ def test_state_lock_of_a_second_gateway_is_refused(tmp_path: Path) -> None:
     first.write([ALPHA])
     assert second.acquire() == Holder(1, os.getpid(), (ALPHA,))
     assert held(tmp_path).drones == (ALPHA,)  # looking changed nothing
+    first.release()
+    assert second.acquire() is None
+    second.release()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Windows deletes no open file")
+def test_state_lock_whose_file_was_deleted_is_still_held(tmp_path: Path) -> None:
+    first, second = StateLock(tmp_path), StateLock(tmp_path)
+    assert first.acquire() is None
+    (tmp_path / FILE).unlink()  # by a person who takes it for a leftover
+    holder = second.acquire()
+    assert holder == Holder(1, 0)
+    assert "a gateway whose lock file was deleted holds " in str(state_in_use(tmp_path, holder))
     first.release()
     assert second.acquire() is None
     second.release()

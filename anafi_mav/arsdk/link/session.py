@@ -100,6 +100,8 @@ class Session(asyncio.DatagramProtocol):
         self._timer_at = float("inf")
         self._flush_due = False
         self._until_look = LOOK_AFTER
+        self._is_reading = False
+        self._after_read: list[Callable[[], None]] = []
         self._congested = False
         self._guard: SendGuard | None = None
 
@@ -151,6 +153,17 @@ class Session(asyncio.DatagramProtocol):
         self._transport.cancel(token)
         self._flush_soon()
 
+    def after_read(self, call: Callable[[], None]) -> None:
+        """Call a function when the messages that are read together are handled.
+
+        Soon, if none are being read. What the messages were about is in the processor's caches then, and no longer
+        after the datagrams of many other drones.
+        """
+        if self._is_reading:
+            self._after_read.append(call)
+        else:
+            self._loop.call_soon(call)
+
     async def close(self) -> None:
         """Send what is queued, once, then end the session and free its port. Idempotent."""
         self._flush()
@@ -182,11 +195,21 @@ class Session(asyncio.DatagramProtocol):
         self.end("closed" if exc is None else f"UDP socket failed: {exc}")
 
     def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
-        self._receive(data, addr)
-        self._until_look -= 1
-        if self._until_look == 0:
-            self._until_look = LOOK_AFTER
-            read_waiting(self._endpoint, self._receive, self.error_received)
+        self._is_reading = True
+        try:
+            self._receive(data, addr)
+            self._until_look -= 1
+            if self._until_look == 0:
+                self._until_look = LOOK_AFTER
+                read_waiting(self._endpoint, self._receive, self.error_received)
+        finally:
+            self._is_reading = False
+        calls, self._after_read = self._after_read, []
+        for call in calls:
+            try:
+                call()
+            except Exception as error:
+                self._loop.call_exception_handler({"message": f"{call!r} failed", "exception": error, "protocol": self})
 
     def _receive(self, data: bytes, addr: tuple[str, int]) -> None:
         if self.mute or self.lost.done():

@@ -111,7 +111,7 @@ class GuidedMoves:
         if (heading_deg is not None) != (orientation in _WITH_HEADING):
             raise LocalProtocolError(f"a moveTo with orientation {orientation.name} and heading {heading_deg}")
         self.require_free()
-        target = self._moves.distinct(Position(latitude, longitude, altitude))
+        target = self._moves.distinct(Position(latitude, longitude, altitude), loop_time())
         command = self._move_to_command(target, orientation, heading_deg, horizontal_speed, vertical_speed)
         move = Move(self._commander.expect((), _decided_elsewhere), target)
         self._sticks.let_go()

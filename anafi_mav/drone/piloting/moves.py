@@ -38,7 +38,8 @@ The drone answers one within a few tenths of a second.
 """
 
 STRAY_FOR = 2.0
-"""s after a cancelled moveBy in which a moveByEnd may still be its own, or that of the zero move that cancelled it."""
+"""s after the end of a move in which an event may still be about it: a moveByEnd after a cancelled moveBy, or that of
+the zero move that cancelled it; the end of a moveTo once more."""
 
 _SAME_PLACE_DEG = 1e-7
 """About a centimetre. The drone echoes a target as it got it; this tolerates a detour through single precision."""
@@ -174,6 +175,8 @@ class Moves:
 
         It may still do so until it flies a newer one.
         """
+        self._ended: deque[tuple[Position, float]] = deque(maxlen=MAX_UNANSWERED)
+        """Targets of moveTos that the drone has ended, and when: it may report that twice."""
         self._stray_until = 0.0
         self.inherited = True
         """True when a moveBy of an earlier connection may be under way.
@@ -189,16 +192,21 @@ class Moves:
 
     # -- what we do
 
-    def distinct(self, target: Position) -> Position:
-        """Return a target for a new moveTo that cannot be confused with an aborted move.
+    def distinct(self, target: Position, now: float) -> Position:
+        """Return a target for a new moveTo that cannot be confused with an aborted or ended move.
 
-        It is this target, or one a little below it when the drone's events about an aborted move would be taken for
-        its own. Not above it, which the ceiling may forbid.
+        It is this target, or one a little below it when the drone's events about such a move would be taken for its
+        own. Not above it, which the ceiling may forbid.
         """
-        while any(_same(target, other) for other in self._unanswered):
+        cancelling = () if self._cancelling is None or self._cancelling.target is None else (self._cancelling.target,)
+        while any(_same(target, other) for other in (*self._before(now), *cancelling)):
             step = max(_APART, _APART_SHARE * abs(target.altitude))
             target = msgspec.structs.replace(target, altitude=target.altitude - step)
         return target
+
+    def _before(self, now: float) -> list[Position]:
+        """Return the targets of earlier moveTos that an event may still be about."""
+        return [*self._unanswered, *(target for target, at in self._ended if now - at < STRAY_FOR)]
 
     def begin_to(self, move: Move) -> Move | None:
         """Note that a moveTo is about to be sent; return the pending one that it replaces.
@@ -276,6 +284,7 @@ class Moves:
         self.to = self.returning = self._older = self._cancelling = None
         self.by.clear()
         self._unanswered.clear()
+        self._ended.clear()
         self._stray_until = 0.0
         self.aborting = False
         self.inherited = True
@@ -292,7 +301,7 @@ class Moves:
     def _on_move_to(self, message: ardrone3.MoveToChanged, now: float) -> None:
         move = self.to
         if message.status == MoveToStatus.RUNNING:
-            if move is None:
+            if move is None or (not move.is_to(message) and any(_same(message, one) for one in self._before(now))):
                 return
             if not move.is_to(message) and not move.running and self._is_alone and move.may_be_to(message):
                 move.echo = position(message.latitude, message.longitude, message.altitude)
@@ -305,20 +314,26 @@ class Moves:
         if move is None or not move.running:
             # Commands are carried out in their order, so this may still speak of what was before.
             if self._cancelling is not None and self._cancelling.is_to(message):
-                self._cancelling.end(how)
+                self._end(self._cancelling, how, now)
                 self._cancelling = None
                 return
             if self._older is not None and self._older.is_to(message):
-                self._older.end(how)
+                self._end(self._older, how, now)
                 self._older = None
                 return
-        if any(_same(message, target) for target in self._unanswered):
+        if any(_same(message, target) for target in self._before(now)):
             return
         if move is None or (not move.is_to(message) and (move.running or how is MoveEnd.DONE)):
             return
         self.to, self._older = self._older, None
-        move.end(how)
+        self._end(move, how, now)
         move.answer.fail(CommandRejected(f"the drone answered the moveTo with {how.value}"))
+
+    def _end(self, move: Move, how: MoveEnd, now: float) -> None:
+        """The drone has reported the end of a moveTo."""
+        if move.target is not None:
+            self._ended.append((move.target, now))
+        move.end(how)
 
     @property
     def _is_alone(self) -> bool:

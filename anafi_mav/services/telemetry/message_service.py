@@ -6,10 +6,9 @@ C3.
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import math
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
@@ -69,7 +68,7 @@ LONGEST = 2**31 - 1
 class MessageService(Service):
     """Sends messages by their intervals and on request.
 
-    Updates are gathered until the end of the event-loop iteration (see `update_tracker`).
+    Updates that are read together are gathered (see `update_tracker`).
     """
 
     def __init__(self, host: Host) -> None:
@@ -110,7 +109,7 @@ class MessageService(Service):
         """
         self._table, self._requests = streams, requests
         defaults = {id: stream.every for id, stream in streams.items() if stream.every is not None}
-        self._intervals = Streams(defaults, without=self._unstreamed, pace=lambda channel: channel.pace)
+        self._intervals = Streams(defaults, has=self._is_streamed, pace=lambda channel: channel.pace)
         self._events, affected = _affected(tuple((id, stream.updates) for id, stream in streams.items()))
         self._tracker = UpdateTracker(affected)
         self._on_change = [id for id, stream in streams.items() if stream.on_change]
@@ -160,12 +159,12 @@ class MessageService(Service):
 
     def _on_update(self, message: Message, now: float) -> None:
         if self._tracker.mark(type(message), now):
-            asyncio.get_running_loop().call_soon(self._send_updated)
+            self.host.drone.after_read(self._send_updated)
 
     def mark_updated(self, id: int, at: float) -> None:
-        """Send this message at the end of the event-loop iteration."""
+        """Send this message soon, with what else is updated at the same time."""
         if self._tracker.mark(id, at):
-            asyncio.get_running_loop().call_soon(self._send_updated)
+            self.host.drone.after_read(self._send_updated)
 
     @property
     def needs_pictures(self) -> bool:
@@ -289,12 +288,12 @@ class MessageService(Service):
                 logger.error("%s: message %d cannot be made: %r", self.host.drone.name, id, error)
         return True
 
-    def _unstreamed(self, channel: Channel) -> Collection[int]:
-        """Return the messages that a channel does not get by default."""
-        filtered = {id for id, stream in self._table.items() if not (channel.can_stream(id) and _has(channel, stream))}
-        if channel.bytes_per_second is not None and channel.bytes_per_second < SMALL_LINE:
-            filtered |= {id for id, stream in self._table.items() if stream.spared}
-        return flavour_of(channel).unstreamed | filtered
+    def _is_streamed(self, channel: Channel, id: int) -> bool:
+        """Return True for a message that a channel gets by default."""
+        stream = self._table[id]
+        if id in flavour_of(channel).unstreamed or not (channel.can_stream(id) and _has(channel, stream)):
+            return False
+        return not stream.spared or channel.bytes_per_second is None or channel.bytes_per_second >= SMALL_LINE
 
     def _data_stream(self, inbound: Inbound) -> None:
         """REQUEST_DATA_STREAM, from clients of flavours with `data_streams`."""

@@ -2,7 +2,7 @@
 
 Time is a parameter.
 
-An ANAFI sends attitude, speed and height in one datagram: all updates of one event-loop iteration form one bundle, so
+An ANAFI sends attitude, speed and height in one datagram: all updates that are read together form one bundle, so
 that a message made of all three is sent once, with all three.
 """
 
@@ -18,7 +18,7 @@ MAX_BUNDLES = 256
 
 
 class _Bundle:
-    """Sources that were updated in one event-loop iteration."""
+    """Sources that were updated together."""
 
     __slots__ = ("at", "before", "count", "ids")
 
@@ -61,7 +61,7 @@ class UpdateTracker:
     def mark(self, source: Hashable, at: float) -> bool:
         """Record an update of a registered source.
 
-        Returns True for the first update of an event-loop iteration: `take` is to be called at its end.
+        Returns True for the first update since `take`, which is to be called when all are marked.
         """
         first = not self._updated
         self._updated[source] = None
@@ -69,7 +69,7 @@ class UpdateTracker:
         return first
 
     def take(self) -> tuple[tuple[int, ...], float]:
-        """Return the messages updated in this event-loop iteration, and when.
+        """Return the messages updated since the last call, and when.
 
         They are empty if `reset` was called meanwhile.
         """

@@ -1,8 +1,9 @@
-"""What notices an update of a drone's elements."""
+"""Updates of a drone's elements, and the watch that notices them."""
 
 from __future__ import annotations
 
 from anafi_mav.arsdk.messages import common
+from anafi_mav.drone import Drone
 from anafi_mav.drone.element import StateWatch
 from anafi_mav.drone.payload.camera_state import CamerasState, changed
 from anafi_mav.drone.status.battery import Battery
@@ -39,3 +40,10 @@ def test_camera_that_reports_a_value_again_keeps_its_state() -> None:
 
 def test_camera_that_reports_no_known_value_is_known_afterwards() -> None:
     assert 3 in changed(CamerasState(), 3, zoom=None).cameras
+
+
+async def test_drones_share_the_table_of_reducers() -> None:
+    one, other = Drone("127.0.42.1"), Drone("127.0.42.2")
+    assert one._routes is other._routes
+    one._receive(common.BatteryStateChanged(percent=70), 0.0)
+    assert (one.battery.state.percent, other.battery.state.percent) == (70, None)

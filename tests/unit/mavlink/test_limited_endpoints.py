@@ -41,4 +41,6 @@ def test_client_of_some_systems_is_seen_and_its_systems_are_heard() -> None:
     party.send("limited", STATION, (255, 190))
     text = dialect.MAVLink_statustext_message(dialect.MAV_SEVERITY_INFO, b"Companion started")
     party.send("limited", text, (OURS, 191), seq=1)
-    assert party.got("pilot") == [("HEARTBEAT", 255, 190), ("STATUSTEXT", OURS, 191)]
+    ack = dialect.MAVLink_command_ack_message(dialect.MAV_CMD_NAV_LAND, 0)  # as of older autopilots, without a target
+    party.send("limited", ack, (OURS, 191), seq=2)
+    assert party.got("pilot") == [("HEARTBEAT", 255, 190), ("STATUSTEXT", OURS, 191), ("COMMAND_ACK", OURS, 191)]

@@ -421,3 +421,40 @@ async def test_a_taken_port_raises() -> None:
                 info=INFO,
                 on_session=Drone().on_session,
             )
+
+
+async def test_calls_after_a_read_follow_all_its_messages() -> None:
+    """Both reports of the height travel in one datagram."""
+    order: list[str] = []
+    async with flying() as (drone, server):
+        session = await join(server)
+        arrived = asyncio.get_running_loop().create_future()
+
+        def on_message(message: Message | UnknownMessage, now: float) -> None:
+            if isinstance(message, ardrone3.AltitudeChanged):
+                order.append(f"height {message.altitude:g}")
+                if message.altitude == 1.0:
+                    session.after_read(lambda: order.append("failing") or 1 / 0)  # type: ignore[func-returns-value]
+                    session.after_read(lambda: order.append("after"))
+                else:
+                    asyncio.get_running_loop().call_soon(arrived.set_result, None)
+
+        session.on_message = on_message
+        asyncio.get_running_loop().set_exception_handler(lambda loop, context: order.append("reported"))
+        drone.sessions[0].send(ardrone3.AltitudeChanged(1.0))
+        drone.sessions[0].send(ardrone3.AltitudeChanged(2.0))
+        await asyncio.wait_for(arrived, 3)
+        asyncio.get_running_loop().set_exception_handler(None)
+        assert order == ["height 1", "height 2", "failing", "reported", "after"]
+        await session.close()
+
+
+async def test_call_after_a_read_is_soon_while_nothing_is_read() -> None:
+    called: list[bool] = []
+    async with flying() as (_, server):
+        session = await join(server)
+        session.after_read(lambda: called.append(True))
+        assert called == []
+        await asyncio.sleep(0)
+        assert called == [True]
+        await session.close()

@@ -74,6 +74,16 @@ def test_definition_changes_with_capabilities_alone() -> None:
     assert 4.0 in [option.value for option in second["CAM_EV"].options]
 
 
+def test_equal_cameras_of_two_drones_share_their_options() -> None:
+    catalogues = Catalogue(), Catalogue()
+    for one in catalogues:
+        one.learn(*states("4k"))
+    mine, others = ([entry.options for entry in one.entries] for one in catalogues)
+    assert sum(len(options) for options in mine) > 100
+    for options, same in zip(mine, others, strict=True):
+        assert all(one is other for one, other in zip(options, same, strict=True))
+
+
 def test_settings_of_a_4k_are_those_it_reports() -> None:
     found = catalogue("4k")
     assert "CAM_THERMAL" not in found.index
