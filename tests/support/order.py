@@ -1,12 +1,20 @@
 """Pytest plugin: the tests that last longest begin first, so that the end of a run does not wait for one of them.
 
-Workers get equal parts of the list and then take from each other (`--dist worksteal`): a long test at the end of the
-list would run alone while the other workers have nothing left.
+Workers get equal parts of the list and then take from the ends of each other's (`--dist worksteal`): a long test at
+the end of a part would run alone while the other workers have nothing left. The longest wait for programs that run in
+real time, and compute little. The parts of half of the workers begin with them, and the others compute meanwhile. All
+in one part would be one worker's work for longer than the rest of the run, and in all parts no processor would be busy.
 """
 
 from __future__ import annotations
 
+import os
+from itertools import islice
+
 import pytest
+
+WORKERS = "PYTEST_XDIST_WORKER_COUNT"
+"""Environment variable with their number, in a worker."""
 
 LONGEST = {
     "test_conf_075_121_every_sample_once_by_mavsdk": 70,
@@ -34,5 +42,20 @@ LONGEST = {
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Move the longest to the front, the longest of them first; all others keep their places."""
-    items.sort(key=lambda item: -LONGEST.get(item.name.partition("[")[0], 0))
+    """Move the longest to the fronts of parts, the longest of them first; all others keep their order."""
+    longest = sorted(filter(_seconds, items), key=_seconds, reverse=True)
+    others = iter([item for item in items if not _seconds(item)])
+    workers = int(os.environ.get(WORKERS, "1"))
+    waiting = max(1, workers // 2)
+    parts: list[pytest.Item] = []
+    left = len(items)
+    for worker in range(workers):
+        size = left // (workers - worker)  # as `WorkStealingScheduling.check_schedule` has it
+        left -= size
+        first = longest[worker::waiting] if worker < waiting else []
+        parts += [*first, *islice(others, max(0, size - len(first)))]
+    items[:] = [*parts, *others]
+
+
+def _seconds(item: pytest.Item) -> int:
+    return LONGEST.get(item.name.partition("[")[0], 0)

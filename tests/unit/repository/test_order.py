@@ -7,7 +7,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from support.order import LONGEST, pytest_collection_modifyitems
+import pytest
+from support.order import LONGEST, WORKERS, pytest_collection_modifyitems
 
 TESTS = next(folder for folder in Path(__file__).parents if folder.name == "tests")
 
@@ -23,8 +24,31 @@ def test_longest_tests_exist() -> None:
     assert set(LONGEST) - names == set()
 
 
-def test_collection_with_a_long_test_begins_with_it() -> None:
-    names = ["test_a", "test_mavsdk_offboard", "test_b", "test_conf_075_121_every_sample_once_by_mavsdk"]
+def ordered(names: list[str], workers: str | None, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    monkeypatch.delenv(WORKERS, raising=False)
+    if workers is not None:
+        monkeypatch.setenv(WORKERS, workers)
     items: list[Any] = [SimpleNamespace(name=f"{name}[px4]") for name in names]
     pytest_collection_modifyitems(items)
-    assert [item.name.partition("[")[0] for item in items] == [names[3], names[1], "test_a", "test_b"]
+    return [item.name.partition("[")[0] for item in items]
+
+
+FIRST, SECOND, THIRD = (
+    name for _, name in sorted({seconds: name for name, seconds in LONGEST.items()}.items())[:-4:-1]
+)
+
+
+def test_collection_with_a_long_test_begins_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ["test_a", SECOND, "test_b", FIRST]
+    assert ordered(names, None, monkeypatch) == [FIRST, SECOND, "test_a", "test_b"]
+
+
+def test_parts_of_half_of_the_workers_begin_with_long_tests(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ["test_a", THIRD, "test_b", "test_c", SECOND, "test_d", "test_e", "test_f", FIRST, "test_g"]
+    parts = [[FIRST, THIRD], [SECOND, "test_a"], ["test_b", "test_c", "test_d"], ["test_e", "test_f", "test_g"]]
+    assert ordered(names, "4", monkeypatch) == [name for part in parts for name in part]
+
+
+def test_more_long_tests_than_a_part_holds_are_all_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = [FIRST, SECOND, THIRD, "test_a"]
+    assert sorted(ordered(names, "4", monkeypatch)) == sorted(names)
