@@ -204,6 +204,8 @@ class FollowFlight(PlainTask):
         return height
 
     def _expired(self) -> None:
+        if not self.engaged:
+            return
         was, self._following = self._following.state, self._following.after(Event.SILENCE)
         self._vehicle.drone.piloting.hover()
         self._vehicle.control.release(self)
