@@ -1,12 +1,13 @@
 """MAVLink in, ARSDK out: how long the gateway takes, for a setpoint and for a command.
 
-    .venv/bin/python tests/bench/latency.py [SETPOINTS] [COMMANDS] [many]
+    .venv/bin/python tests/bench/latency.py [SETPOINTS] [COMMANDS] [DRONES] [many]
 
 Client, gateway and simulator are three processes. The client notes the monotonic clock before its send; the
 simulator's log has the same clock at the moment its socket was read. So the figures hold two hops over loopback and
 the waking up of two processes besides the gateway's own work. A setpoint is SET_ATTITUDE_TARGET, which becomes PCMD;
 each leans to the other side than the one before. A command is DO_REPOSITION, which becomes moveTo, found by its height.
-`many`: with several MAVLink frames per datagram (`frames=many`).
+`many`: with several MAVLink frames per datagram (`frames=many`). DRONES (0): as many others send attitude, speed and
+height 30 times a second, and the gateway streams all of it to a second endpoint.
 
 The last row has the same setpoints at the same intervals, but in the places of gateway and simulator two programs of
 asyncio that do nothing else: one sends on each datagram that it reads, the other notes the time. No gateway in Python
@@ -17,15 +18,18 @@ from __future__ import annotations
 
 import json
 import math
+import socket
 import subprocess
 import sys
 import tempfile
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import msgspec
-from common import Client, frames_option, loopback, machine, product, quantile
+import yaml
+from common import Client, consecutive, frames_option, loopback, machine, product, quantile
 from pymavlink import mavutil
 
 WARM_UP = 40
@@ -71,12 +75,24 @@ def main() -> None:
     words, query = frames_option(sys.argv[1:])
     setpoints = int(words[0]) if words else 1000
     commands = int(words[1]) if len(words) > 1 else 100
+    others = int(words[2]) if len(words) > 2 else 0
     drone, address = loopback(), loopback()
-    with tempfile.TemporaryDirectory() as folder:
-        log = Path(folder) / "sim.jsonl"
+    with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
+        log, config = Path(folder) / "sim.jsonl", Path(folder) / "fleet.yaml"
+        endpoints, drones = [f"udpout://{address}:14550{query}"], [drone]
+        if others:
+            drones += consecutive(loopback(), others)
+            station = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)  # its buffer fills: nothing reads it
+            station.bind((loopback(), 0))
+            host, port = stack.enter_context(station).getsockname()
+            endpoints = [f"{endpoints[0]}{'&' if query else '?'}systems=1", f"udpout://{host}:{port}{query}"]
+            fleet = ("--count", str(others), "--telemetry-rate", "30", "--http-port", "0")
+            stack.enter_context(product("sim", "--address", drones[1], *fleet))
+        entries = [{"name": f"d{number}", "sysid": number, "address": at} for number, at in enumerate(drones, 1)]
+        config.write_text(yaml.safe_dump({"endpoints": endpoints, "drones": entries}))
         with (
             product("sim", "--address", drone, "--log", str(log), "--http-port", "0"),
-            product("run", "--drone", drone, "--endpoint", f"udpout://{address}:14550{query}"),
+            product("run", "-c", str(config)),
         ):
             client = Client(f"udpin:{address}:14550")
             client.take_off(5.0)
@@ -84,7 +100,7 @@ def main() -> None:
             heights = _commands(client, commands)
         entries = [msgspec.json.decode(line) for line in log.read_bytes().splitlines()]
     received = [entry for entry in entries if entry["kind"] == "command"]
-    print(machine(), query)
+    print(machine(), query, f"beside {others} drones" if others else "")
     _say("SET_ATTITUDE_TARGET -> PCMD", _pcmd_delays(rolls, received))
     _say("DO_REPOSITION -> moveTo", _move_delays(heights, received))
     _say("SET_ATTITUDE_TARGET through a program that only sends it on", _bare_delays(setpoints))
