@@ -9,7 +9,7 @@ from anafi_mav.cli import main
 
 
 def test_endpoint_for_stations_beyond_loopback_warns_at_start(capsys: pytest.CaptureFixture[str]) -> None:
-    """192.0.2.1 is nobody's (RFC 5737): nothing is opened by this test."""
+    """192.0.2.1 is an address of no computer (RFC 5737): nothing is opened by this test."""
     fabric = f"zenoh://127.0.0.1:{free_port()}"
     assert main(["ground", "--zenoh", fabric, "--endpoint", "tcpin://192.0.2.1:5760"]) == 2
     warning, error = capsys.readouterr().err.splitlines()

@@ -453,7 +453,7 @@ async def test_a_mistake_is_one_line_and_nothing_is_started(tmp_path: Path, conf
 
 
 async def test_endpoint_open_to_the_network_warns_at_start(tmp_path: Path) -> None:
-    """192.0.2.1 is nobody's (RFC 5737): nothing is opened by this test."""
+    """192.0.2.1 is an address of no computer (RFC 5737): nothing is opened by this test."""
     config = f"""
         endpoints: ["tcpin://{loopback()}:5760", "tcpin://192.0.2.1:5760"]
         drones: [{{name: a, sysid: 1, address: {loopback()}}}]
