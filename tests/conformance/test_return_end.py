@@ -111,26 +111,27 @@ async def test_hold_above_home_cancels_the_landing() -> None:
         assert w.drone.flying_state.name == "HOVERING"
 
 
+async def landing_unheard(w: World) -> int:
+    """Return home, and land there by a command that the drone does not hear; the client's mark of before."""
+    await away(w)
+    mark = await go_home(w)
+    await said(w.client, "Landing in 5 s", mark)
+    await asyncio.sleep(4.5)  # nearly all of it
+    deaf(w, 6.0)
+    await said(w.client, "Landing at home failed, hovering", mark)
+    return mark
+
+
 async def test_landing_that_the_drone_does_not_hear_is_tried_again() -> None:
     async with world(speed=1.0) as w:
-        await away(w)
-        mark = await go_home(w)
-        await said(w.client, "Landing in 5 s", mark)
-        await asyncio.sleep(4.5)  # nearly all of it
-        deaf(w, 6.0)
-        await said(w.client, "Landing at home failed, hovering", mark)
+        mark = await landing_unheard(w)
         assert landings(w) == []
         await landed(w, mark)
 
 
 async def test_hold_between_two_landings_cancels_the_second() -> None:
     async with world(speed=1.0) as w:
-        await away(w)
-        mark = await go_home(w)
-        await said(w.client, "Landing in 5 s", mark)
-        await asyncio.sleep(4.5)  # nearly all of it
-        deaf(w, 6.0)
-        await said(w.client, "Landing at home failed, hovering", mark)
+        await landing_unheard(w)
         assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
         await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
         await asyncio.sleep(12.0)  # longer than until the second

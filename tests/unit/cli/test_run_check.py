@@ -101,7 +101,7 @@ def test_check_shows_the_warnings_of_a_start(tmp_path: Path, capsys: pytest.Capt
     ("folder", "wrong"),
     [
         ("FOLDER/fleet.yaml/x", "media.download_folder: WRONG: FOLDER/fleet.yaml/x: Not a directory"),
-        ("~nobody-of-this-name/x", "media.download_folder: WRONG: expected the path of a folder: "),
+        ("~no-such-user/x", "media.download_folder: WRONG: expected the path of a folder: "),
         ("FOLDER/photos", "media.download_folder: ok: folder can be written: FOLDER/photos"),
     ],
 )
