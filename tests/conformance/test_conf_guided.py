@@ -18,6 +18,8 @@ ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 REPOSITION = dialect.MAV_CMD_DO_REPOSITION
 SPEED = dialect.MAV_CMD_DO_CHANGE_SPEED
+CHANGE_MODE = dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
+RELATIVE_YAW = newer.MAV_DO_REPOSITION_FLAGS_RELATIVE_YAW
 YAW = dialect.MAV_CMD_CONDITION_YAW
 PAUSE = dialect.MAV_CMD_DO_PAUSE_CONTINUE
 ALTITUDE = dialect.MAV_CMD_DO_CHANGE_ALTITUDE
@@ -208,6 +210,18 @@ async def test_conf_143_relative_yaw_sent_twice_turns_twice() -> None:
         assert (await w.client.wait("COMMAND_ACK", lambda m: m.command == YAW, since=mark)).result == ACCEPTED
         # The climb to 5 m and two turns.
         assert len([move for move in sent(w, "ardrone3.Piloting.moveBy") if any(move.values())]) == 3
+
+
+async def test_conf_143_reposition_by_relative_yaw_sent_twice_turns_twice() -> None:
+    """A COMMAND_INT has no confirmation: two equal turns by an angle are two, as in PX4 and ArduCopter."""
+    async with world() as w:
+        await w.take_off(5.0)
+        for degrees in (30.0, 60.0):
+            turn = (-1, CHANGE_MODE | RELATIVE_YAW, 0, 30.0 * units.RAD_PER_DEG)
+            began = w.drone.log[-1].t
+            assert (await w.client.command(REPOSITION, *turn, frame=RELATIVE)).result == ACCEPTED
+            await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 20.0, since=began)
+            assert w.drone.pose.yaw * units.DEG_PER_RAD == pytest.approx(degrees, abs=3.0)
 
 
 async def test_conf_143_relative_yaw_can_be_cancelled() -> None:
