@@ -9,6 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.fault_scenarios import CANCELLED, IN_PROGRESS
 from support.flavours import both
+from support.params import write
 from support.world import HOME, World, world
 
 from anafi_mav import geo, units
@@ -115,6 +116,18 @@ async def test_conf_082_hold_that_arrives_with_a_change_of_speed_stops_the_move(
         )
         assert len(sent(w, "move.extended_move_to")) == moves
         assert w.drone.pose.north < 40.0
+
+
+@both
+async def test_conf_082_goto_repeated_after_a_parameter_has_changed_its_speed_is_accepted(flavour: str) -> None:
+    """The acknowledgement was lost, and the drone flies there: it is no other client's goto that flies."""
+    async with world(flavour=flavour, speed=1.0) as w:
+        await w.take_off(10.0)
+        await go_north(w)
+        await write(w.client, "ANF_CRUISE_SPEED", 4.0, flavour=flavour)
+        await w.drone.wait_log(lambda e: e.name == "move.extended_move_to")
+        await go_north(w)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 30.0, 20.0)
 
 
 @both
