@@ -9,6 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.fault_scenarios import CANCELLED, IN_PROGRESS
 from support.flavours import both
+from support.missions import put, start, takeoff, way
 from support.params import write
 from support.world import HOME, World, world
 
@@ -139,6 +140,26 @@ async def test_conf_082_a_speed_counts_for_later_moves_too(flavour: str) -> None
         await go_north(w)
         (move,) = sent(w, "move.extended_move_to")
         assert (move["max_horizontal_speed"], move["max_vertical_speed"]) == (4.0, 1.5)
+
+
+@both
+@pytest.mark.parametrize("mode", ["mission", "return", "landing"])
+async def test_conf_082_speed_of_what_the_drone_flies_alone_is_refused(flavour: str, mode: str) -> None:
+    """No command changes it: ACCEPTED would promise a speed that is not flown."""
+    async with world(flavour=flavour, web=True) as w:
+        if mode == "mission":
+            await put(w, [takeoff(10.0), way(60.0, 0.0, 10.0)])
+            await start(w)
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 5.0, 30.0)
+        else:
+            await w.take_off(10.0)
+            await go_north(w)
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 20.0, 20.0)
+            command = dialect.MAV_CMD_NAV_LAND if mode == "landing" else dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH
+            assert (await w.client.command(command)).result == ACCEPTED
+        mark = w.client.mark()
+        assert (await w.client.command(SPEED, 1, 3.0, -1, 0)).result == REJECTED
+        await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Speed refused: fixed in mode "), since=mark)
 
 
 @pytest.mark.parametrize(
