@@ -132,7 +132,10 @@ def _effect_of_arm(command: Command) -> Effect:
 
 
 def _heading(command: Command) -> float | None:
-    """Return the heading (rad) of a reposition; None: unset, which is 0 from ArduPilot's clients (conformance D1)."""
+    """Return the heading (rad) of a reposition; None: unset.
+
+    ArduPilot's clients send 0 for that (conformance D1).
+    """
     heading = command.params[3]
     return None if math.isnan(heading) or (heading == 0.0 and command.flavour.zero_is_unset) else heading
 
