@@ -50,6 +50,8 @@ class Wire(Protocol):
 
     def send(self, message: Message | UnknownMessage, rank: Rank = Rank.NORMAL) -> int: ...
 
+    def flush(self) -> None: ...
+
     def cancel(self, token: int) -> None: ...
 
 
@@ -239,6 +241,11 @@ class Commander:
                 logger.exception("%s: %s not recorded", self.name, type(message).__name__)
         return token
 
+    def flush(self) -> None:
+        """Let what was sent leave now: nothing follows soon that could share its frame."""
+        if self._wire is not None:
+            self._wire.flush()
+
     def deliver(self, message: Message, *, stops: bool = False) -> asyncio.Future[None]:
         """Send an acknowledged command; the future is done when the drone has received it.
 
@@ -407,10 +414,11 @@ class Commander:
         stops: bool = False,
         is_setting: bool = False,
     ) -> None:
-        """Send the command whose answer is expected. `stops` and `is_setting`: see `send`."""
+        """Send the command whose answer is expected, at once. `stops` and `is_setting`: see `send`."""
         try:
             expectation.token = self.send(command, stops=stops, is_setting=is_setting)
         except BaseException:
             expectation.close()
             raise
+        self.flush()
         expectation.expire_after(timeout, CommandTimeout(command.NAME, timeout))

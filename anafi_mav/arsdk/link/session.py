@@ -1,7 +1,7 @@
 """The asyncio shell around one `Transport`: a UDP socket and one timer.
 
-Messages that are sent within one event-loop iteration leave together, which packs them into few frames. The timer is
-restarted only when the next deadline is earlier; when it fires too early it is set again. At a hundred drones with a
+Messages that are sent within one event-loop iteration leave together, which packs them into few frames; `flush` ends
+the wait for others. The timer is restarted only when the next deadline is earlier; when it fires too early it is set again. At a hundred drones with a
 hundred events a second each, that is what keeps the loop idle.
 """
 
@@ -148,6 +148,11 @@ class Session(asyncio.DatagramProtocol):
         token = self._transport.send(message, self._loop.time(), rank)
         self._flush_soon()
         return token
+
+    def flush(self) -> None:
+        """Send now what is queued, or as soon as the messages that are read together are handled."""
+        if not self._is_reading:
+            self._flush()
 
     def cancel(self, token: int) -> None:
         """See `Transport.cancel`: the message is not sent (again)."""

@@ -161,6 +161,7 @@ class StickStream:
         """
         try:
             self._commander.send(message, stops=not is_deflected(message))
+            self._commander.flush()
         except LinkLost as error:
             log.debug("%s not sent: %s", message.NAME, error)
             self._sticks.stop()
