@@ -145,7 +145,10 @@ class Memory:
     """The file of one drone. `folder` None: nothing outlives the gateway."""
 
     def __init__(self, folder: Path | None, on_late: Callable[[OperatorText], None] = lambda text: None) -> None:
-        """`on_late` is called with a text when the disk delivers a file after its drone has become a system."""
+        """Create it, empty.
+
+        `on_late` is called with a text when the disk delivers a file after its drone has become a system.
+        """
         self.generation = 0
         """Grows whenever `load` has read stored data: of another drone, or late."""
         self.plans: dict[int, tuple[PlanItem, ...]] = {}
