@@ -48,9 +48,7 @@ class Wire(Protocol):
 
     on_delivered: Callable[[int, bool], None]
 
-    def send(self, message: Message | UnknownMessage, rank: Rank = Rank.NORMAL) -> int: ...
-
-    def flush(self) -> None: ...
+    def send(self, message: Message | UnknownMessage, rank: Rank = Rank.NORMAL, *, at_once: bool = False) -> int: ...
 
     def cancel(self, token: int) -> None: ...
 
@@ -218,12 +216,13 @@ class Commander:
         if task is not None and (task in self._silenced or (task in self._retired and not stops)):
             raise CommandRejected("replaced by a newer command")
 
-    def send(self, message: Message, *, stops: bool = False, is_setting: bool = False) -> int:
+    def send(self, message: Message, *, stops: bool = False, is_setting: bool = False, at_once: bool = False) -> int:
         """Hand a command to the transport; stops and landings go before settings there.
 
         Raises `LinkLost` when there is no link, or what the gate raises.
 
-        `stops`: it stops something. Raises `CommandRejected` in a task that may not send it (see `retire`).
+        `stops`: it stops something. Raises `CommandRejected` in a task that may not send it (see `retire`). `at_once`:
+        it leaves in this event-loop iteration, because nothing follows that could share its frame.
         """
         if self._wire is None:
             raise LinkLost("not connected")
@@ -233,18 +232,14 @@ class Commander:
         if message_log.isEnabledFor(logging.DEBUG):
             message_log.debug("%s: sent %r", self.name, without_secrets(message))
         is_urgent = stops or isinstance(message, ardrone3.Landing)
-        token = self._wire.send(message, Rank.URGENT if is_urgent else Rank.SETTING if is_setting else Rank.NORMAL)
+        rank = Rank.URGENT if is_urgent else Rank.SETTING if is_setting else Rank.NORMAL
+        token = self._wire.send(message, rank, at_once=at_once)
         if self.on_command is not None:
             try:
                 self.on_command(message)
             except Exception:  # what listens must not keep a command from the drone
                 logger.exception("%s: %s not recorded", self.name, type(message).__name__)
         return token
-
-    def flush(self) -> None:
-        """Let what was sent leave now: nothing follows soon that could share its frame."""
-        if self._wire is not None:
-            self._wire.flush()
 
     def deliver(self, message: Message, *, stops: bool = False) -> asyncio.Future[None]:
         """Send an acknowledged command; the future is done when the drone has received it.
@@ -416,9 +411,8 @@ class Commander:
     ) -> None:
         """Send the command whose answer is expected, at once. `stops` and `is_setting`: see `send`."""
         try:
-            expectation.token = self.send(command, stops=stops, is_setting=is_setting)
+            expectation.token = self.send(command, stops=stops, is_setting=is_setting, at_once=True)
         except BaseException:
             expectation.close()
             raise
-        self.flush()
         expectation.expire_after(timeout, CommandTimeout(command.NAME, timeout))

@@ -92,7 +92,8 @@ class StickStream:
         now = loop_time()
         self._after_gaz = False
         self._sticks.command(position, now, now - age)
-        self.pump()
+        self._next.cancel()
+        self._send_due(now)
 
     def centre(self) -> None:
         """Centred from now on, for two seconds, whether there was anything to send or not."""
@@ -121,7 +122,9 @@ class StickStream:
         lands = self._flight.state.flying == FlyingState.LANDING and not self.landings_asked
         if self.dead is not None and not (lands and self._after_gaz and self._commander.connected):
             self._sticks.stop()
-        now = loop_time()
+        self._send_due(loop_time())
+
+    def _send_due(self, now: float) -> None:
         pcmd = self._sticks.due(now)
         if pcmd is not None:
             self._send(pcmd)
@@ -160,8 +163,7 @@ class StickStream:
         So is a newer command, which lets the task that it has replaced centre nothing more.
         """
         try:
-            self._commander.send(message, stops=not is_deflected(message))
-            self._commander.flush()
+            self._commander.send(message, stops=not is_deflected(message), at_once=True)
         except LinkLost as error:
             log.debug("%s not sent: %s", message.NAME, error)
             self._sticks.stop()
