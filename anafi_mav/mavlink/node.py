@@ -354,7 +354,7 @@ class Node:
         return True
 
     def _stays_within(self, systems: Collection[int], received: ReceivedFrame) -> bool:
-        """Return True if a frame reaches none but these systems, those of its channel's option `systems`.
+        """Return True if a frame reaches these systems alone: the channel's option `systems`.
 
         The router decides about frames for one system. To all go a station's heartbeat, and what these systems send
         to no target: a command to system 0 would be one to the systems behind other endpoints. COMMAND_ACK of older

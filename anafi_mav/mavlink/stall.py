@@ -52,7 +52,9 @@ class StallWatch:
 
     @property
     def waited(self) -> float:
-        """How long what is read from a socket now may have waited there for a stall to end, s; 0 without one.
+        """How long what is read from a socket now may have waited there for a stall to end, s.
+
+        0 without a stall.
 
         An event loop reads its sockets before it runs its timers: the first look after a stall finds no beat.
         """
