@@ -344,16 +344,11 @@ class MissionFlight(PlainTask):
     async def _acquire(self, work: Acquire, by: Right | None) -> list[Effect]:
         """Acquire control, and hover; return the effects of the grant.
 
-        Without a client the mission has control since its mode was chosen. A mission that was replaced meanwhile
-        does not become active.
+        Without a client the mission has control since its mode was chosen, and its end cancels this work. A mission
+        that was replaced meanwhile does not become active.
         """
-        control = self._vehicle.control
-        if by is None and control.active is not self:
-            raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
-        async with contextlib.nullcontext() if by is None else control.acquire(self, by=by):
+        async with contextlib.nullcontext() if by is None else self._vehicle.control.acquire(self, by=by):
             await self._stop(work.prepared)
-            if by is None and control.active is not self:
-                raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
             if not (effects := self.machine.granted(work.attempt)):
                 self._require_same(work.attempt)
                 raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
