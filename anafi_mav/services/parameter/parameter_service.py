@@ -239,7 +239,10 @@ class ParameterService(Service):
             self._tell(name, listed.changed(range(len(listed))))
 
     def _make_lists(self) -> None:
-        """List the parameters that this aircraft has; models differ, and all have the address 192.168.42.1."""
+        """List the parameters that this aircraft has.
+
+        Models differ, and each aircraft has the same address in its Wi-Fi.
+        """
         before = self._lists
         self._lists = {flavour.name: ParameterList(self.host, flavour) for flavour in FLAVOURS.values()}
         for name, listed in before.items():
