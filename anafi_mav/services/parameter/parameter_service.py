@@ -195,7 +195,7 @@ class ParameterService(Service):
         self._lists: dict[str, ParameterList] = {}
         """By name of the flavour; empty until the drone has connected for the first time."""
         self._serial: str | None = None
-        """Serial number of the drone whose parameters and settings these are."""
+        """Serial number of the drone whose parameters these are."""
         self._own: list[Callable[[Host], float]] = []
         """Functions that read the gateway's own settings, each once."""
         self._own_packer = struct.Struct("")
@@ -206,6 +206,8 @@ class ParameterService(Service):
         """When a text was last sent about a refused write."""
         self._waiting: deque[tuple[Inbound, Parameter, float]] = deque()
         self._writers: set[asyncio.Task[None]] = set()
+        self._restored = -1
+        """Generation of the stored data that the settings are from."""
         self._locks: dict[str, asyncio.Lock] = {}
         """One for each value, by its native name: two writes of it are carried out in their order."""
         self._storing = asyncio.Lock()
@@ -231,9 +233,12 @@ class ParameterService(Service):
         return self._lists[flavour.name]
 
     def link_up(self) -> None:
-        if (serial := self.host.drone.identity.serial) != self._serial:
-            self._serial = serial
-            self._restore()
+        is_other = self.host.drone.identity.serial != self._serial
+        if is_other:
+            self._serial = self.host.drone.identity.serial
+            self.host.vehicle.settings = FlightSettings()  # speeds and hand launch were set for another aircraft
+        self._restore()
+        if is_other:
             self._make_lists()
         for name, listed in self._lists.items():
             self._tell(name, listed.changed(range(len(listed))))
@@ -274,11 +279,10 @@ class ParameterService(Service):
     # What outlives the gateway.
 
     def _restore(self) -> None:
-        """Restore the stored settings of this drone, and defaults for those absent or invalid.
-
-        What is not stored (speeds, hand launch) was set for another aircraft.
-        """
-        self.host.vehicle.settings = FlightSettings()
+        """Restore the stored settings of this drone, and defaults for those absent or invalid."""
+        if self.host.memory.generation == self._restored:
+            return
+        self._restored = self.host.memory.generation
         found = self.host.memory.settings.get(KEY)
         kept = found if isinstance(found, dict) else {}
         for parameter in KEPT:
