@@ -92,7 +92,7 @@ class Schedule(Generic[KeyT]):
         """When the first of them is due (s)."""
 
     def bring_forward(self, at: float) -> bool:
-        """Make every key due at this time (s) at the latest; return True when `next` is earlier by that."""
+        """Make every key due at this time (s) at the latest; return True if `next` changes."""
         self._all_at = min(self._all_at, at)
         if at >= self.next:
             return False
@@ -100,7 +100,7 @@ class Schedule(Generic[KeyT]):
         return True
 
     def run(self, now: float, call: Callable[[KeyT], float]) -> None:
-        """Call for the keys that are due, in their sequence. `call` returns when its key is due again."""
+        """Call `call` for each due key, in sequence; it returns when the key is due again (s)."""
         keys = self._keys
         if now >= self._all_at:
             self._all_at = NEVER

@@ -221,7 +221,10 @@ class Vehicle(Aircraft):
 
     @property
     def _position_expiry(self) -> float:
-        """When the newest location is old, if no other follows (s); `NEVER` on the ground and without one."""
+        """When the newest location becomes old, if no other follows (s).
+
+        `NEVER` on the ground and without a location.
+        """
         gps, facts = self.drone.gps.state, self.link_facts
         if not gps.fixed or gps.location is None or self.flying_state is None or self.on_ground:
             return NEVER

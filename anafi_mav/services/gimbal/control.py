@@ -170,7 +170,7 @@ class GimbalControl:
 
     @property
     def expires_at(self) -> float:
-        """When the control of a client ends without further heartbeats (s); `NEVER` without a client."""
+        """When the control of a client ends without further heartbeats (s), or `NEVER`."""
         if self.state is not State.CLIENT:
             return NEVER
         return min(self._silent_at(client) for client in (self.primary, self.secondary) if client != NO_CLIENT)
