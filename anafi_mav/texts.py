@@ -583,6 +583,7 @@ MISSION_RECORD_IGNORED = NoticeTemplate("Mission record in {path} ignored: other
 PLAN_IGNORED = NoticeTemplate("{kind} in {path} ignored: {reason}", kind="Mission", path="PI040.json", reason="no file")
 PLANS_NOT_KEPT = OperatorText("Plans not kept: state folder cannot be used")
 MEMORY_UNREADABLE = NoticeTemplate("{path}: {error}; no plans, new ones not kept", path="PI040.json", error="denied")
+MEMORY_LATE = OperatorText("Stored plans read late: unused until reconnection")
 MEMORY_INVALID = NoticeTemplate("{path}: {error}; put aside as {aside}", path="PI040.json", error="bad", aside="file")
 MEMORY_UNWRITABLE = NoticeTemplate("{path}: {error}; changes end with gateway", path="PI040.json", error="no space")
 
