@@ -105,7 +105,10 @@ class Listener(Endpoint):
         return True
 
     def _log_place(self, kind: str, text: str, now: float) -> None:
-        """Log who has got a place, or none: a line in ten seconds, so that a flood of addresses fills no log."""
+        """Log which client has got a place, or none.
+
+        One line in ten seconds: a flood of addresses fills no log.
+        """
         due, left_out = self._lines.get(kind, (now, 0))
         if now < due:
             self._lines[kind] = due, left_out + 1
