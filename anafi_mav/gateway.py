@@ -150,7 +150,7 @@ class _Supervised:
         self._contention = Contention()
         self._judged = drone.handshake_at
         """The handshake whose loss was judged last."""
-        drone.subscribe(self._on_event)
+        drone.subscribe(self._on_flying_state, (events.FlyingStateChanged,))
 
     async def run(self) -> None:
         """Keep the drone connected until cancelled."""
@@ -260,8 +260,8 @@ class _Supervised:
         logger.log(logging.WARNING, "%s: %s", self.config.name, text)
         self.system.announce(severity, text)
 
-    def _on_event(self, message: events.Message, now: float) -> None:
-        if type(message) is events.FlyingStateChanged and message.state in ON_GROUND:
+    def _on_flying_state(self, message: events.Message, now: float) -> None:
+        if self.drone.piloting.state.flying in ON_GROUND:
             self._contention.on_ground()
 
     def held(self) -> HeldDrone:

@@ -17,7 +17,7 @@ from typing import Any, TypeAlias, TypeVar
 
 from anafi_mav import models
 from anafi_mav.arsdk.codec.secret_fields import without_secrets
-from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
+from anafi_mav.arsdk.codec.wire import Message, PackedMessage, Received, UnknownMessage
 from anafi_mav.arsdk.link.controller import ControllerSession
 from anafi_mav.arsdk.link.handshake import DISCOVERY_PORT, DeviceInfo
 from anafi_mav.arsdk.messages import ardrone3, common, drone_manager, rth, skyctrl
@@ -58,6 +58,7 @@ from anafi_mav.drone.status.home import Home, modern
 from anafi_mav.drone.status.link import Link
 from anafi_mav.drone.status.product import MODELS, Identity, Product
 from anafi_mav.drone.status.sound import Sound
+from anafi_mav.drone.values import OnValues, Values
 from anafi_mav.drone.video.route import Direct, Mux, VideoRoute
 from anafi_mav.drone.video.stream_choice import StreamChoice
 from anafi_mav.drone.video.video import Video
@@ -188,7 +189,11 @@ class Drone:
             drone_manager.ConnectionState: self._controller_says,
             device_manager.State: self._controller_says,
         }
-        self._subscribers: tuple[Callback, ...] = ()
+        self._subscriptions: tuple[tuple[Callback, frozenset[type[Message]] | None], ...] = ()
+        """Each callback with the kinds of messages that it is called with; None: all."""
+        self._callbacks: dict[type[Message], tuple[Callback, ...]] = {}
+        """Those of each kind that was received since the subscriptions changed."""
+        self._on_values: tuple[OnValues, ...] = ()
 
         self._session: ControllerSession | None = None
         self._fading: ControllerSession | None = None
@@ -293,7 +298,7 @@ class Drone:
             raise
         self._drop_fading("replaced by a new session")
         self.handshake_at, self._dismissed, self.may_be_displaced = loop_time(), None, False
-        session.on_message = self._receive
+        session.on_messages = partial(self._receive, session)
         return session
 
     def _check_device(self, device: DeviceInfo) -> None:
@@ -702,16 +707,33 @@ class Drone:
         """Return `blockers` in words."""
         return [str(blocker) for blocker in self.blockers()]
 
-    def subscribe(self, callback: Callback) -> Callable[[], None]:
-        """Call `callback(message, time)` with every message, after the states are updated.
+    def subscribe(self, callback: Callback, kinds: Iterable[type[Message]] | None = None) -> Callable[[], None]:
+        """Call `callback(message, time)` with every message, or those of some kinds, after the states are updated.
 
         Returns the function that ends it. `time` is the event loop's. Messages during `connect` are included. What the
-        callback raises is logged.
+        callback raises is logged. Each message is decoded for it: for kinds that are sent many times a second and read
+        seldom see `subscribe_values`.
         """
-        self._subscribers = (*self._subscribers, callback)
+        subscription = callback, None if kinds is None else frozenset(kinds)
+        self._subscriptions = (*self._subscriptions, subscription)
+        self._callbacks = {}
 
         def undo() -> None:
-            self._subscribers = tuple(other for other in self._subscribers if other is not callback)
+            self._subscriptions = tuple(other for other in self._subscriptions if other is not subscription)
+            self._callbacks = {}
+
+        return undo
+
+    def subscribe_values(self, callback: OnValues) -> Callable[[], None]:
+        """Call `callback(values, time)` with the events of values, which follow one another in large numbers.
+
+        It is called once for those that arrive together: before the next message of another kind, before the next of
+        the same kind, and at the end of a frame. The states contain them. Otherwise as `subscribe`.
+        """
+        self._on_values = (*self._on_values, callback)
+
+        def undo() -> None:
+            self._on_values = tuple(other for other in self._on_values if other is not callback)
 
         return undo
 
@@ -794,8 +816,61 @@ class Drone:
             return modern(message)
         return message
 
-    def _receive(self, message: Message | UnknownMessage, now: float) -> None:
-        # Not by isinstance, which takes as long for these classes as a reducer.
+    def _receive(self, session: ControllerSession, messages: Sequence[Received], now: float) -> None:
+        """Handle the messages of a frame.
+
+        Events of values wait undecoded in their elements, unless their messages are wanted.
+        """
+        values: dict[type[Message], PackedMessage] = {}
+        waiting, callbacks = self._commander.waiting, self._callbacks
+        routes, elements = self._routes, self._elements
+        is_logged = message_log.isEnabledFor(logging.DEBUG)
+        for message in messages:
+            # Not by isinstance, which takes as long for these classes as a reducer.
+            if type(message) is PackedMessage:
+                kind = message.kind
+                wanted = callbacks.get(kind)
+                if wanted is None:
+                    wanted = self._callbacks_of(kind)
+                is_wanted = bool(wanted) or is_logged or kind in waiting
+                if values and (is_wanted or kind in values):
+                    self._report(values, now)
+                    values = {}
+                values[kind] = message
+                if not is_wanted:
+                    for place, _ in routes.get(kind, ()):
+                        elements[place].defer(message)
+                    continue
+                unpacked = message.unpack()
+            else:
+                if values:
+                    self._report(values, now)
+                    values = {}
+                unpacked = message
+            if session.lost.done():
+                return
+            try:
+                self._handle(unpacked, now)
+            except Exception as error:
+                session.report(error, unpacked)
+            callbacks = self._callbacks
+        if values:
+            self._report(values, now)
+
+    def _report(self, values: Values, now: float) -> None:
+        for callback in self._on_values:
+            try:
+                callback(values, now)
+            except Exception:
+                log.exception("%s: a subscriber failed on %s", self.name, ", ".join(kind.NAME for kind in values))
+
+    def _callbacks_of(self, kind: type[Message]) -> tuple[Callback, ...]:
+        found = tuple(callback for callback, kinds in self._subscriptions if kinds is None or kind in kinds)
+        self._callbacks[kind] = found
+        return found
+
+    def _handle(self, message: Message | UnknownMessage, now: float) -> None:
+        """Update the states by a message, then call what waits for it."""
         if type(message) is UnknownMessage:
             self._counters["unknown message"] += 1
             return
@@ -811,7 +886,8 @@ class Drone:
         if waiting := self._commander.waiting.get(kind):
             for expectation in tuple(waiting):
                 expectation.offer(message)
-        for callback in self._subscribers:
+        wanted = self._callbacks.get(kind)
+        for callback in self._callbacks_of(kind) if wanted is None else wanted:
             try:
                 callback(message, now)
             except Exception:

@@ -11,12 +11,13 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from operator import is_
 from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 
 import msgspec
 
-from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.codec.wire import Message, PackedMessage
 from anafi_mav.arsdk.messages.generic import ListFlags
 
 StateT = TypeVar("StateT")
@@ -55,18 +56,47 @@ class Position(msgspec.Struct, frozen=True):
 
 
 class Element(Generic[StateT]):
-    """One part of the aircraft. Subclasses declare `NOTHING` and `REDUCERS`; some add verbs."""
+    """One part of the aircraft. Subclasses declare `NOTHING` and `REDUCERS`; some add verbs.
+
+    Events of values wait undecoded until the state is read, each only as long as none of the same value follows. The
+    result is that of reducing each at once: such an event replaces what an earlier one reported, and nothing else.
+    """
 
     NOTHING: ClassVar[Any]
     """The state in which nothing has been reported."""
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]]
 
     def __init__(self) -> None:
-        self.state: StateT = self.NOTHING
+        self.state = self.NOTHING
+        self._before: Any = self.NOTHING
+        """The state before the waiting events."""
+        self._deferred: dict[bytes, PackedMessage] = {}
 
     def reset(self) -> None:
         """Forget everything the drone reported."""
+        self._deferred.clear()
         self.state = self.NOTHING
+
+    def defer(self, message: PackedMessage) -> None:
+        """Reduce an event of values when the state is read."""
+        if not self._deferred:
+            self._before = self.state
+            del self.state
+        self._deferred[message.key] = message
+
+    @cached_property
+    def state(self) -> StateT:
+        """The last state reported by the drone; evaluated only while events wait."""
+        state: StateT = self._before
+        deferred, self._deferred = self._deferred, {}
+        for message in deferred.values():
+            state = self.REDUCERS[message.kind](state, message.unpack())
+        return state
+
+    @property
+    def settled(self) -> StateT:
+        """The state without the events that wait: for fields that no value changes. Nothing is decoded."""
+        return self._before if self._deferred else self.state
 
 
 class StateWatch:

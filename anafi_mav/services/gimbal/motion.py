@@ -90,7 +90,7 @@ class GimbalMotion:
         self._still_zeros = 0
         """Zero rates of these that are still to be sent."""
         self._seen: GimbalAttitude | None = None
-        """The attitude reported last."""
+        """While some axes are to stand, the attitude reported last."""
         self._repeat: tuple[Mapping[Axis, Aim], int, float] | None = None
         """Angles of a message, how often they are to be sent again, and when next."""
         self._was_turning = False
@@ -258,6 +258,7 @@ class GimbalMotion:
         if not still <= self._still:
             self._still_zeros = STOPS
         self._still = still
+        self._seen = self._gimbal.attitude if still else None
         if self._command is not None and self._command is not asyncio.current_task():
             self._command.cancel()
             self._command = self._waiting = None
@@ -374,6 +375,8 @@ class GimbalMotion:
         """
         if self.is_neutral and self._has_left_reference():
             self.is_neutral, self._reference = False, None
+        if not self._still:
+            return  # an attitude is decoded when it is read
         last, attitude = self._seen, self._gimbal.attitude
         self._seen = attitude
         if last is None or attitude is None:
