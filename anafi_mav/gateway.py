@@ -323,13 +323,13 @@ class Gateway:
         state = state_folder(config.state)
         self._saves = saves
         self._keys = KeyRing(None if state is None else folder_of(state), self._clock, saves=saves)
-        signing = SigningSetup(self._keys, lambda: self._node.channels, lambda: self.systems)
+        self._signing_setup = SigningSetup(self._keys, lambda: self._node.channels, lambda: self.systems)
         self._node = Node(
             on_channel=self._on_channel,
             clock=self._clock,
             flavours=tuple(FLAVOURS),
             keys=self._keys,
-            on_setup_signing=signing.receive,
+            on_setup_signing=self._signing_setup.receive,
             factories={"zenoh": self._fabric_endpoint},
         )
         video = config.video_server
@@ -583,6 +583,7 @@ class Gateway:
 
     async def _close_node(self) -> None:
         """Close endpoints and files. What waits for a disk comes last, each within a bound."""
+        await self._signing_setup.close()
         await self._node.close()
         if await STATE_WRITER.drain(DISK_LIMIT):
             self._unlock_state()

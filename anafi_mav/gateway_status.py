@@ -57,6 +57,7 @@ REFUSALS = {
     "refused_unsigned": "frame without a signature",
     "refused_signature": "wrong signature",
     "refused_replay": "frame with an old time stamp",
+    "refused_unsaved": "frame with a time stamp that is not saved yet",
     "refused_forwards": "frame that the endpoint must not sign",
     "withheld_frames": "frames to a peer that has not proved its address",
     "late_frames": "frame too old on arrival",

@@ -1,4 +1,4 @@
-"""Reads from sockets: the buffer of each, and how many datagrams are read at once.
+"""Reads from sockets: their size and their order.
 
 asyncio allocates 256 KiB for each datagram. The C library maps a block of that size into memory and unmaps it again,
 which takes 12 us of 18 us: with 250 drones a tenth of a core.
@@ -10,8 +10,9 @@ Streams of TCP are read 64 KiB at once.
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 SIZE = 64 * 1024
 """Bytes: the longest UDP datagram, and less than what the C library maps (128 KiB, mallopt(3) M_MMAP_THRESHOLD)."""
@@ -47,3 +48,20 @@ def read_waiting(transport: Any, received: Callable[[bytes, Any], None], failed:
             failed(error)
             return
         received(data, address)
+
+
+class OpenSocket(Protocol):
+    """A socket, or asyncio's proxy of one."""
+
+    def fileno(self) -> int:
+        """Return the file descriptor; -1 once it is closed."""
+
+
+def read_after_clients(sock: OpenSocket) -> None:
+    """Have the running event loop read this socket after those of clients: a drone sends to it.
+
+    That of the gateway can (`cli.event_loop`); others read all sockets alike.
+    """
+    read_last = getattr(asyncio.get_running_loop(), "read_after_clients", None)
+    if read_last is not None:
+        read_last(sock)

@@ -20,6 +20,7 @@ import msgspec
 
 from anafi_mav.arsdk.link.interface import bind_to_interface
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, RemoteProtocolError
+from anafi_mav.receive_buffer import read_after_clients
 
 HTTP_PORT = 80
 """Of the drone's web server when nothing stands between."""
@@ -182,11 +183,9 @@ class Rest:
 
     def _session(self) -> aiohttp.ClientSession:
         if self._client is None or self._client.closed:
-            options: dict[str, Any] = {"limit_per_host": CONNECTIONS}
+            options: dict[str, Any] = {"limit_per_host": CONNECTIONS, "socket_factory": self._make_socket}
             if self._local_address is not None and not self._local:
                 options["local_addr"] = (self._local_address, 0)
-            if self._interface is not None and not self._local:
-                options["socket_factory"] = self._make_socket
             timeout = aiohttp.ClientTimeout(total=None, sock_connect=ANSWER_TIMEOUT, sock_read=ANSWER_TIMEOUT)
             self._client = aiohttp.ClientSession(connector=aiohttp.TCPConnector(**options), timeout=timeout)
         return self._client
@@ -196,7 +195,8 @@ class Rest:
         sock = socket.socket(family, kind, protocol)
         try:
             sock.setblocking(False)
-            bind_to_interface(sock, self._interface)
+            bind_to_interface(sock, None if self._local else self._interface)
+            read_after_clients(sock)
         except BaseException:
             sock.close()
             raise

@@ -59,6 +59,8 @@ class Verdict(Enum):
     """The signature is of another key, or of another frame."""
     REPLAYED = "refused_replay"
     """The signature is right and the timestamp is not newer than one that was accepted."""
+    UNSAVED = "refused_unsaved"
+    """The signature is right and the timestamp is beyond the one in the key file, which is being written."""
 
     is_refusal: bool
 

@@ -9,13 +9,15 @@ nothing. Frames that are refused are reported by one line every ten seconds, how
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import errno
 import logging
 import os
 import re
 import stat
-import threading
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from anafi_mav.clock import Alarm, Clock
@@ -42,6 +44,13 @@ LOOK_EVERY = 1.0
 REPORT_EVERY = 10.0
 """s between two lines in the log about refused frames of one key."""
 
+SAVE_LIMIT = 1.0
+"""s in which a timestamp is written. Behind a slower disk frames are accepted without it, so that a disk that hangs
+stops no pilot."""
+
+REPLACE_LIMIT = 3.0
+"""s in which another key is written. QGroundControl waits 5 s for a frame that verifies (qgroundcontrol#14268)."""
+
 CLOSE_LIMIT = 1.0
 """s that closing waits for the disk."""
 
@@ -65,7 +74,8 @@ class KeyRing:
         self._keys: dict[str, Signing] = {}
         self._alarm = Alarm(self._look)
         self._saving: asyncio.Task[None] | None = None
-        self._file_lock = threading.Lock()
+        self._replaced: set[str] = set()
+        """Keys that are being replaced: their timestamps are not saved meanwhile."""
         self._reported: dict[str, Counter[str]] = {}
         self._report_at = 0.0
 
@@ -96,6 +106,7 @@ class KeyRing:
         if not self._saves:
             content = content[:KEY_BYTES] + bytes(CONTENT_BYTES - KEY_BYTES)
         signing = self._keys[name] = Signing(name, content)
+        signing.on_due = self._save_soon
         if is_required and not signing.is_on:
             logger.warning("key %s: switched off by SETUP_SIGNING, its endpoints do not sign", name)
         return signing
@@ -127,26 +138,49 @@ class KeyRing:
         if saving is not None:
             await asyncio.wait([saving])
         for signing in keys:
-            await self._write(signing, signing.timestamp, is_last=True)
+            await self._write(signing, signing.timestamp)
 
-    def replace(self, signing: Signing, secret: bytes, timestamp: int, *, before_use: Callable[[], None]) -> None:
-        """Store another key, keep the old one's file, and use the new one from now on.
+    async def replace(self, signing: Signing, secret: bytes, timestamp: int, *, before_use: Callable[[], bool]) -> bool:
+        """Store another key and keep the old one's file; return True if the new one is used.
 
-        Zeros stand for no key. `before_use` is called when the files are written. Until then this blocks, which it may
-        while nothing is armed. Raises `OSError`; the old key then remains in use.
+        Zeros stand for no key. `before_use` is called when the files are written; False keeps the old key. Raises
+        `OSError`, for a disk that does not answer in time, too; the old key then remains in use.
         """
         assert self._folder is not None
+        self._replaced.add(signing.name)
+        try:
+            if self._saving is not None:
+                await _in_time(self._saving)
+            is_used = await self._replace(self._folder, signing, secret, timestamp, before_use)
+        finally:
+            self._replaced.discard(signing.name)
+        self._look()
+        return is_used
+
+    async def _replace(
+        self, folder: Path, signing: Signing, secret: bytes, timestamp: int, before_use: Callable[[], bool]
+    ) -> bool:
         now = self._clock.time()
         new = Signing(signing.name, signing.content())
         new.replace(secret, timestamp)
         new.advance(now)
-        saved = new.due(now) or new.timestamp
-        with self._file_lock:
-            write_new_key(self._folder, signing.name, new.content(saved), signing.content())
-        before_use()
-        signing.replace(secret, timestamp)
-        signing.saved = saved
-        self._look()
+        saved, old = max(new.due(now) or new.timestamp, signing.saved), signing.content(signing.saved)
+        arguments = (folder, signing.name, new.content(saved), old)
+        writing = asyncio.get_running_loop().run_in_executor(STATE_WRITER, write_new_key, *arguments)
+        is_used, is_written = False, True
+        try:
+            await _in_time(writing)
+            is_written = writing.exception() is None
+            writing.result()
+            is_used = before_use()
+            if is_used:
+                signing.replace(secret, timestamp)
+                signing.saved, signing.is_kept = saved, True
+        finally:
+            if is_written and not is_used:
+                writing.cancel()
+                STATE_WRITER.post(partial(_write_again, folder, signing.name, old))  # behind what is late
+        return is_used
 
     def _look(self) -> None:
         now = self._clock.time()
@@ -155,25 +189,43 @@ class KeyRing:
             if signing.is_on:
                 signing.advance(now)
                 due = due or (self._saves and signing.due(now) is not None)
-        if due and (self._saving is None or self._saving.done()):
-            self._saving = asyncio.get_running_loop().create_task(self._save_due())
+        if due:
+            self._save_soon()
         self._report()
         if any(signing.is_on for signing in self._keys.values()):
             self._alarm.set_in(LOOK_EVERY)
+
+    def _save_soon(self) -> None:
+        """Begin to save the timestamps that are due, unless that is going on."""
+        if self._saving is None or self._saving.done():
+            self._saving = asyncio.get_running_loop().create_task(self._save_due())
 
     async def _save_due(self) -> None:
         now = self._clock.time()
         for signing in tuple(self._keys.values()):
             signing.advance(now)
-            if self._saves and (timestamp := signing.due(now)) is not None:
+            if self._saves and signing.name not in self._replaced and (timestamp := signing.due(now)) is not None:
                 await self._write(signing, timestamp)
 
-    async def _write(self, signing: Signing, timestamp: int, *, is_last: bool = False) -> None:
+    async def _write(self, signing: Signing, timestamp: int) -> None:
+        assert self._folder is not None
+        arguments = (self._folder, signing.name, signing.content(timestamp))
+        writing = asyncio.get_running_loop().run_in_executor(STATE_WRITER, write_key, *arguments)
         try:
-            await asyncio.get_running_loop().run_in_executor(STATE_WRITER, self._write_now, signing, timestamp, is_last)
+            done, _ = await asyncio.wait([writing], timeout=SAVE_LIMIT)
+            if not done:
+                signing.is_kept = False
+                self._warn(signing.name, HANGS)
+            await asyncio.wait([writing])
+            writing.result()
         except OSError as error:
+            signing.is_kept = False
             self._warn(signing.name, error.strerror or str(error))
+        except asyncio.CancelledError:
+            writing.cancel()
+            raise
         else:
+            signing.saved, signing.is_kept = max(timestamp, signing.saved), True
             self.problem = ""
 
     def _warn(self, names: str, reason: str) -> None:
@@ -182,15 +234,6 @@ class KeyRing:
         if problem != self.problem:
             logger.warning("%s", problem)
         self.problem = problem
-
-    def _write_now(self, signing: Signing, timestamp: int, is_last: bool) -> None:
-        """In the thread of files; the lock keeps a replaced key from coming back."""
-        assert self._folder is not None
-        with self._file_lock:
-            timestamp = timestamp if is_last else max(timestamp, signing.saved)
-            if signing.is_on:
-                write_key(self._folder, signing.name, signing.content(timestamp))
-                signing.saved = timestamp
 
     def _report(self) -> None:
         """Write how many frames were refused since the last line."""
@@ -254,6 +297,19 @@ def write_new_key(folder: Path, name: str, content: bytes, old: bytes) -> None:
     """Replace a key and keep the old one. Raises `OSError`; the key is then the old one."""
     write_key(folder, name, old, OLD_SUFFIX)
     write_key(folder, name, content)
+
+
+async def _in_time(work: asyncio.Future[None]) -> None:
+    """Wait for the disk. Raises `TimeoutError`."""
+    await asyncio.wait([work], timeout=REPLACE_LIMIT)
+    if not work.done():
+        raise TimeoutError(errno.ETIMEDOUT, HANGS)
+
+
+def _write_again(folder: Path, name: str, content: bytes) -> None:
+    """Write the key that remains in use over another one. In the thread of files."""
+    with contextlib.suppress(OSError):
+        write_key(folder, name, content)
 
 
 def _check(path: Path, status: os.stat_result, mode: str) -> None:

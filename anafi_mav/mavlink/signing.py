@@ -2,8 +2,9 @@
 
 A signature is the first 48 bits of SHA-256 over key, frame, link id and timestamp (MAVLink message_signing.md). Time
 stamps count 10 µs since 2015 and only grow, so that a recorded frame cannot be sent again. They are saved ahead: the
-file holds a timestamp that has not been reached yet, and after a crash everything up to it counts as used. A shell,
-`key_ring`, keeps the time and the file. Next floor: `channel`.
+file holds a timestamp that has not been reached yet, and after a crash everything up to it counts as used. What is
+beyond it is not used before the file is written. A shell, `key_ring`, keeps the time and the file. Next floor:
+`channel`.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import hashlib
 import hmac
 import struct
 from collections import Counter
+from collections.abc import Callable
 
 from anafi_mav.errors import LocalProtocolError
 from anafi_mav.mavlink import dialect
@@ -42,8 +44,9 @@ SAVED_AHEAD = 10 * TICKS
 """How far the saved timestamp is ahead. After a crash a station that hears nothing of us waits so long at most."""
 
 SAVED_AHEAD_BURST = TICKS
-"""The same while our timestamp is ahead of the clock already: 100 000 frames. Restarts in quick succession then do not
-carry the timestamp further and further away from the clock."""
+"""How far our timestamp stays behind the saved one: 100 000 frames that we sign while a slow disk is written. While our
+timestamp is ahead of the clock already, four times this is saved ahead: restarts in quick succession do not carry the
+timestamp further and further away from the clock."""
 
 MAX_STREAMS = 1024
 """Streams whose timestamps are remembered: those of 250 systems with four components."""
@@ -145,6 +148,12 @@ class Signing:
         """True while frames are signed and verified."""
         self.saved: int = timestamp
         """The timestamp in the file."""
+        self.is_kept = False
+        """True while the file is written in time: then no timestamp beyond it is used, and no crash repeats one."""
+        self.on_due: Callable[[], None] | None = None
+        """Called when `due` has a timestamp to save, once or more often until it is saved."""
+        self._wanted = 0
+        """The newest timestamp of a verified frame that was refused because it is not covered by the file."""
         self.timestamp: int = timestamp
         """The newest that was used by us or seen in a verified frame."""
         self._floor = self.saved
@@ -177,6 +186,7 @@ class Signing:
         if len(secret) != KEY_BYTES:
             raise LocalProtocolError(f"a key has {KEY_BYTES} bytes, not {len(secret)}")
         self._secret, self.is_on = secret, secret != _NO_KEY
+        self._wanted = 0
         self._streams.clear()
         self._floor = self.timestamp
         if timestamp < self._limit:
@@ -199,17 +209,23 @@ class Signing:
     # Time.
 
     def advance(self, now: float) -> None:
-        """Let the timestamp follow the clock (s since 1970). It never steps back."""
+        """Let the timestamp follow the clock (s since 1970). It never steps back.
+
+        Behind a clock that leaps it waits until the file is written.
+        """
         clock = ticks(now)
         if clock < LATEST:
-            self.timestamp = max(self.timestamp, clock)
+            reached = min(clock, self.saved - SAVED_AHEAD_BURST) if self.is_kept else clock
+            self.timestamp = max(self.timestamp, reached)
             self._latest = max(self._latest, min(clock + FARTHEST_AHEAD, LATEST))
 
     def due(self, now: float) -> int | None:
         """Return the timestamp to save, or None while the saved one is far enough ahead."""
-        if not self.is_on or self.timestamp + SAVED_AHEAD_BURST < self.saved:
+        clock = ticks(now) if ticks(now) < LATEST else 0
+        reached = max(self.timestamp, self._wanted)
+        if not self.is_on or max(reached, clock) + 2 * SAVED_AHEAD_BURST < self.saved:
             return None
-        return max(self.timestamp + 2 * SAVED_AHEAD_BURST, ticks(now) + SAVED_AHEAD)
+        return max(reached + 4 * SAVED_AHEAD_BURST, clock + SAVED_AHEAD)
 
     @property
     def _limit(self) -> int:
@@ -255,6 +271,13 @@ class Signing:
                 return Verdict.REPLAYED
         elif memory.has_used(stamp, raw[-12:]):
             return Verdict.REPLAYED
+        if self.is_kept and stamp + 2 * SAVED_AHEAD_BURST >= self.saved:
+            is_covered = stamp + SAVED_AHEAD_BURST < self.saved
+            self._wanted = max(self._wanted, stamp)
+            if self.on_due is not None:
+                self.on_due()
+            if not is_covered:
+                return Verdict.UNSAVED
         self._use(stream, stamp, raw[-12:])
         if len(newest) >= MAX_STREAMS:
             newest.clear()  # the memories of the streams still refuse what was used

@@ -11,7 +11,7 @@ import asyncio
 import logging
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -43,7 +43,7 @@ _SERIAL = re.compile(r"[A-Za-z0-9_-]{1,64}")
 
 DISK_LIMIT = 3.0
 """s that a client waits for the disk, and a drone for its stored data. A memory card may take one; behind a disk that
-hangs the client gets its answer, and the drone is a system without stored data."""
+hangs the client gets its answer, and the drone is a system without stored data until its next connection."""
 
 Number = Annotated[float, Meta(ge=-3.5e38, le=3.5e38)] | Literal["inf", "-inf"] | None
 """A single-precision number as JSON can have it; None is NaN."""
@@ -99,7 +99,7 @@ def _loaded(item: _Item) -> PlanItem:
 
 
 class _Stored(msgspec.Struct, frozen=True):
-    """Content of a drone's file, and the line for people when it could not be read."""
+    """Content of a drone's file, and the line for people when something is wrong with it."""
 
     plans: dict[int, tuple[PlanItem, ...]] = {}
     settings: dict[str, Any] = {}
@@ -144,7 +144,13 @@ def _put_aside(path: Path) -> str:
 class Memory:
     """The file of one drone. `folder` None: nothing outlives the gateway."""
 
-    def __init__(self, folder: Path | None) -> None:
+    def __init__(self, folder: Path | None, on_late: Callable[[OperatorText], None] = lambda text: None) -> None:
+        """Create it, empty.
+
+        `on_late` is called with a text when the disk delivers a file after its drone has become a system.
+        """
+        self.generation = 0
+        """Grows whenever `load` has read stored data: of another drone, or late."""
         self.plans: dict[int, tuple[PlanItem, ...]] = {}
         """By MAV_MISSION_TYPE."""
         self.settings: dict[str, Any] = {}
@@ -152,7 +158,10 @@ class Memory:
         self.problem: OperatorText | None = None
         """Why what is here could not be read or written; None while all is well."""
         self._folder = folder
+        self._on_late = on_late
         self._serial = ""
+        self._reading: asyncio.Future[_Stored] | None = None
+        """Reads an unreadable file; done when the disk has delivered it late."""
         self._unreadable = False
         """The file is there and cannot be read now: it may be another time, and must not be replaced."""
 
@@ -171,25 +180,40 @@ class Memory:
 
         Of a drone that is back after a loss of the link there is nothing to read: what is here is as new as its file,
         or newer, if that could not be written. A file that the disk does not deliver in time counts as unreadable.
+
+        An unreadable file is read at the next connection: there it is added to what has been set meanwhile.
         """
-        if serial and serial == self._serial:
+        is_back = bool(serial) and serial == self._serial
+        if is_back and not self._unreadable:
             return None
-        stored = _Stored()
-        path = self._path_of(serial)
+        reading, stored, path = self._reading if is_back else None, _Stored(), self._path_of(serial)
         if path is not None:
-            reading = asyncio.get_running_loop().run_in_executor(STATE_WRITER, _read_file, path, serial)
-            await asyncio.wait([reading], timeout=DISK_LIMIT)
+            if reading is None:
+                reading = asyncio.get_running_loop().run_in_executor(STATE_WRITER, _read_file, path, serial)
+                await asyncio.wait([reading], timeout=DISK_LIMIT)
             if reading.done():
-                stored = reading.result()
-            else:
-                reading.cancel()  # what has not begun puts no file aside later
+                stored, reading = reading.result(), None
+            elif not is_back:
                 problem = texts.MEMORY_UNREADABLE.fill(path=path, error=HANGS)
                 stored = _Stored(problem=problem, is_unreadable=True)
+                reading.add_done_callback(partial(self._arrived, serial))
+            else:
+                stored = _Stored(is_unreadable=True)
+        self._reading = reading
+        if is_back and stored.is_unreadable:
+            return None  # as it was reported
+        self.generation += is_back or serial != self._serial
         self._serial = serial
-        self.plans, self.settings = stored.plans, stored.settings
+        self.plans = {**stored.plans, **self.plans} if is_back else stored.plans
+        self.settings = {**stored.settings, **self.settings} if is_back else stored.settings
         self._unreadable = stored.is_unreadable
         self.problem = stored.problem if stored.is_unreadable else None
         return stored.problem
+
+    def _arrived(self, serial: str, reading: asyncio.Future[_Stored]) -> None:
+        """Report a file that the disk delivered late."""
+        if reading is self._reading and serial == self._serial and not reading.result().is_unreadable:
+            self._on_late(texts.MEMORY_LATE)
 
     def put(self, mission_type: int, items: Sequence[PlanItem]) -> None:
         """Remember a plan; `save` writes it."""

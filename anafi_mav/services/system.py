@@ -11,6 +11,7 @@ import asyncio
 import logging
 import math
 from collections.abc import Callable, Coroutine, Hashable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -208,7 +209,7 @@ class System:
         """Texts that are true whatever the drone does: a client that connects later gets them with its banner."""
         self.drone = drone
         self.clock = clock
-        self.memory = Memory(state)
+        self.memory = Memory(state, partial(self.text, Severity.WARNING))
         self.download_folder = download_folder
         self.uris = uris
         self.active = False

@@ -815,6 +815,10 @@ class Vehicle(Aircraft):
             if self.drone.piloting.about_to_fly:
                 await self.drone.piloting.land()
             return
+        await self.control.perform(self._stay())
+
+    async def _stay(self) -> None:
+        """Hover, or stay on the ground."""
         async with self.control.acquire(Hover(), by=Source.GATEWAY):
             if self.drone.piloting.about_to_fly:
                 await self.drone.piloting.land()

@@ -9,6 +9,8 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.fault_scenarios import CANCELLED, IN_PROGRESS
 from support.flavours import both
+from support.missions import put, start, takeoff, way
+from support.params import write
 from support.world import HOME, World, world
 
 from anafi_mav import geo, units
@@ -18,6 +20,8 @@ ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 REPOSITION = dialect.MAV_CMD_DO_REPOSITION
 SPEED = dialect.MAV_CMD_DO_CHANGE_SPEED
+CHANGE_MODE = dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
+RELATIVE_YAW = newer.MAV_DO_REPOSITION_FLAGS_RELATIVE_YAW
 YAW = dialect.MAV_CMD_CONDITION_YAW
 PAUSE = dialect.MAV_CMD_DO_PAUSE_CONTINUE
 ALTITUDE = dialect.MAV_CMD_DO_CHANGE_ALTITUDE
@@ -116,6 +120,18 @@ async def test_conf_082_hold_that_arrives_with_a_change_of_speed_stops_the_move(
 
 
 @both
+async def test_conf_082_goto_repeated_after_a_parameter_has_changed_its_speed_is_accepted(flavour: str) -> None:
+    """The acknowledgement was lost, and the drone flies there: it is no other client's goto that flies."""
+    async with world(flavour=flavour, speed=1.0) as w:
+        await w.take_off(10.0)
+        await go_north(w)
+        await write(w.client, "ANF_CRUISE_SPEED", 4.0, flavour=flavour)
+        await w.drone.wait_log(lambda e: e.name == "move.extended_move_to")
+        await go_north(w)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 30.0, 20.0)
+
+
+@both
 async def test_conf_082_a_speed_counts_for_later_moves_too(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         assert (await w.client.command(SPEED, 0, 4.0, 0, 0)).result == ACCEPTED
@@ -124,6 +140,26 @@ async def test_conf_082_a_speed_counts_for_later_moves_too(flavour: str) -> None
         await go_north(w)
         (move,) = sent(w, "move.extended_move_to")
         assert (move["max_horizontal_speed"], move["max_vertical_speed"]) == (4.0, 1.5)
+
+
+@both
+@pytest.mark.parametrize("mode", ["mission", "return", "landing"])
+async def test_conf_082_speed_of_what_the_drone_flies_alone_is_refused(flavour: str, mode: str) -> None:
+    """No command changes it: ACCEPTED would promise a speed that is not flown."""
+    async with world(flavour=flavour, web=True) as w:
+        if mode == "mission":
+            await put(w, [takeoff(10.0), way(60.0, 0.0, 10.0)])
+            await start(w)
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 5.0, 30.0)
+        else:
+            await w.take_off(10.0)
+            await go_north(w)
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 20.0, 20.0)
+            command = dialect.MAV_CMD_NAV_LAND if mode == "landing" else dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH
+            assert (await w.client.command(command)).result == ACCEPTED
+        mark = w.client.mark()
+        assert (await w.client.command(SPEED, 1, 3.0, -1, 0)).result == REJECTED
+        await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Speed refused: fixed in mode "), since=mark)
 
 
 @pytest.mark.parametrize(
@@ -208,6 +244,18 @@ async def test_conf_143_relative_yaw_sent_twice_turns_twice() -> None:
         assert (await w.client.wait("COMMAND_ACK", lambda m: m.command == YAW, since=mark)).result == ACCEPTED
         # The climb to 5 m and two turns.
         assert len([move for move in sent(w, "ardrone3.Piloting.moveBy") if any(move.values())]) == 3
+
+
+async def test_conf_143_reposition_by_relative_yaw_sent_twice_turns_twice() -> None:
+    """A COMMAND_INT has no confirmation: two equal turns by an angle are two, as in PX4 and ArduCopter."""
+    async with world() as w:
+        await w.take_off(5.0)
+        for degrees in (30.0, 60.0):
+            turn = (-1, CHANGE_MODE | RELATIVE_YAW, 0, 30.0 * units.RAD_PER_DEG)
+            began = w.drone.log[-1].t
+            assert (await w.client.command(REPOSITION, *turn, frame=RELATIVE)).result == ACCEPTED
+            await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 20.0, since=began)
+            assert w.drone.pose.yaw * units.DEG_PER_RAD == pytest.approx(degrees, abs=3.0)
 
 
 async def test_conf_143_relative_yaw_can_be_cancelled() -> None:

@@ -454,6 +454,19 @@ async def test_moving_position_setpoint_is_followed_in_steps() -> None:
         assert final[0] == pytest.approx(3.0 * (moves[-1].t - began), abs=0.6)
 
 
+async def test_speed_command_changes_the_move_to_a_streamed_position() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off(8.0)
+        async with streaming(w.client, local(POSITION_ONLY, at=(60.0, 0.0, -8.0))):
+            await engage(w.client, "px4")
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 4.0, 20.0)
+            assert (await w.client.command(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1, 2.0, -1)).result == 0
+            move = await w.drone.wait_log(lambda e: e.name == "move.extended_move_to", 5.0)
+            assert move.args["max_horizontal_speed"] == 2.0
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] == pytest.approx(2.0, abs=0.2), 10.0)
+            assert w.drone.pose.north < 50.0
+
+
 async def test_from_a_position_to_a_velocity_and_back() -> None:
     async with world(speed=1.0) as w:
         await w.take_off(8.0)

@@ -124,6 +124,26 @@ async def test_return_of_a_station_loss_that_fails_is_tried_again() -> None:
         assert heard(w, "return_to_home") == ["return_to_home"]
 
 
+async def test_landing_of_a_station_loss_follows_a_return_that_ends_in_a_hover() -> None:
+    """The return that a client commanded goes on; with no station left its end is no place to stay."""
+    async with world(speed=1.0) as w:
+        await write(w.client, "ANF_GCS_LOSS", 3, dialect.MAV_PARAM_TYPE_INT32)
+        await write(w.client, "ANF_GCS_LOSS_T", 2.0)
+        await write(w.client, "ANF_RTL_END", 1, dialect.MAV_PARAM_TYPE_INT32)
+        await w.take_off(10.0)
+        assert await goto(w, 60.0, 10.0) == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 55.0, 40.0)
+        assert (await w.client.command(RTL)).result == ACCEPTED
+        w.client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+        mark = w.client.mark()
+        await w.client.wait(
+            "STATUSTEXT", lambda m: m.text == "No ground station for 2 s: drone is returning", since=mark
+        )
+        await w.drone.wait_log(lambda e: e.name == "rth.state" and e.args["reason"] == 3, 60.0)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 40.0)
+        assert abs(w.drone.pose.north) < 2.0
+
+
 async def test_return_of_a_station_loss_that_failed_yields_to_a_later_command() -> None:
     """A program flies on by a goto of its own after the return has failed."""
     async with world(speed=1.0) as w:

@@ -182,7 +182,7 @@ MEANWHILE: dict[str, tuple[Callable[[World], Any], str, str]] = {
         "drone is landing",
         "goto turn offboard follow orbit mission",
     ),
-    "own return": (return_by_itself, "the drone returns home by itself", "goto turn offboard follow orbit mission"),
+    "own return": (return_by_itself, " refused: drone is returning", "goto turn offboard follow orbit mission"),
     "lost fix": (lambda w: setattr(w.drone.faults, "gps", False), " refused: no GPS fix", "follow orbit"),
     "camera sticks": (
         lambda w: somebody_else(w, piloting_style.SetStyle(CAMERA)),

@@ -17,6 +17,7 @@ import sys
 from pathlib import Path
 
 from anafi_mav.errors import LinkLost
+from anafi_mav.receive_buffer import read_after_clients
 
 ROUTES = Path("/proc/net/route")
 _ROUTE_UP = 1
@@ -49,7 +50,17 @@ async def open_connection(
     """
     if interface is None:
         local = None if local_address is None else (local_address, 0)
-        return await asyncio.open_connection(host, port, family=socket.AF_INET, local_addr=local)
+        reader, writer = await asyncio.open_connection(host, port, family=socket.AF_INET, local_addr=local)
+    else:
+        reader, writer = await _open_connection(host, port, local_address, interface)
+    read_after_clients(writer.get_extra_info("socket"))
+    return reader, writer
+
+
+async def _open_connection(
+    host: str, port: int, local_address: str | None, interface: str
+) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+    """Open a connection that uses one interface only."""
     loop = asyncio.get_running_loop()
     found = await loop.getaddrinfo(host, port, family=socket.AF_INET, type=socket.SOCK_STREAM)
     sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)

@@ -30,7 +30,7 @@ from anafi_mav.arsdk.link.transport import (
     Transport,
     Undelivered,
 )
-from anafi_mav.receive_buffer import limit_reads, read_waiting
+from anafi_mav.receive_buffer import limit_reads, read_after_clients, read_waiting
 
 log = logging.getLogger("anafi_mav.arsdk")
 raw_log = logging.getLogger("anafi_mav.raw")
@@ -113,6 +113,7 @@ class Session(asyncio.DatagramProtocol):
         """Begin on this bound socket, which belongs to the session from now on."""
         sock.setblocking(False)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, SOCKET_BUFFER)
+        read_after_clients(sock)
         await self._loop.create_datagram_endpoint(lambda: self, sock=sock)
         self._flush()
 

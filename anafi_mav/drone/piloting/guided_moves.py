@@ -16,7 +16,7 @@ from anafi_mav.drone.expectation import Commander, loop_time
 from anafi_mav.drone.piloting.moves import Displacement, Move, Moves
 from anafi_mav.drone.piloting.state import PilotingState, in_state
 from anafi_mav.drone.piloting.stick_stream import StickStream
-from anafi_mav.drone.status.home import Home
+from anafi_mav.drone.status.home import BY_ITSELF, Home
 from anafi_mav.errors import CommandRejected, LocalProtocolError, NotSupported
 from anafi_mav.units import RAD_PER_DEG, wrap_360
 
@@ -176,7 +176,7 @@ class GuidedMoves:
 
     def require_free(self) -> None:
         if self._home.state.returning_by_itself:
-            raise CommandRejected("the drone returns home by itself")
+            raise CommandRejected(BY_ITSELF)
         if self._flight.state.flying in (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING):
             raise CommandRejected(in_state(self._flight.state.flying))
 

@@ -16,7 +16,7 @@ from anafi_mav.drone.piloting.moves import Move, MoveEnd, Moves
 from anafi_mav.drone.piloting.state import PilotingState, in_state
 from anafi_mav.drone.piloting.stick_stream import StickStream
 from anafi_mav.drone.status.alerts import spoken
-from anafi_mav.drone.status.home import Home
+from anafi_mav.drone.status.home import BY_ITSELF, Home
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost
 
 _TAKES_OFF = frozenset({FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF, FlyingState.TAKINGOFF})
@@ -98,7 +98,7 @@ class ReturnHome:
         self._commander.require_link()
         home = self._home.state
         if home.returning_by_itself and not even_its_own:
-            raise CommandRejected("the drone returns home by itself")
+            raise CommandRejected(BY_ITSELF)
         asked = self.drop("the return was cancelled")
         if not home.returning and not asked and not self._moves.aborting:
             return
@@ -153,12 +153,12 @@ class ReturnHome:
         self._moves.on_return(message, now)
         if self._home.state.returning_by_itself and self._abortion is not None and not self._abortion_insists:
             # It was given against a return that a user had asked for.
-            self._commander.withdraw(self._abortion, CommandRejected("the drone returns home by itself"))
+            self._commander.withdraw(self._abortion, CommandRejected(BY_ITSELF))
 
     def ends_ours(self, message: rth.State) -> bool | AnafiMavError | None:
         """A judge: has the return that we asked for ended?"""
         if self._home.state.returning_by_itself:
-            return CommandRejected("the drone returns home by itself")
+            return CommandRejected(BY_ITSELF)
         return _ends_return(message)
 
 

@@ -16,7 +16,7 @@ from anafi_mav.drone.expectation import Commander, loop_time
 from anafi_mav.drone.piloting.state import PilotingState, in_state
 from anafi_mav.drone.piloting.sticks import CENTRED, Percent, StickSchedule, is_deflected
 from anafi_mav.drone.status.alerts import spoken
-from anafi_mav.drone.status.home import Home
+from anafi_mav.drone.status.home import BY_ITSELF, Home
 from anafi_mav.errors import CommandRejected, LinkLost
 
 log = logging.getLogger("anafi_mav")
@@ -81,7 +81,7 @@ class StickStream:
         if self.landings_asked:
             return "the drone is about to land"
         if self._home.state.returning_by_itself and self._home.state.reason is not None:
-            return f"the drone returns home by itself: {spoken(self._home.state.reason)}"
+            return f"{BY_ITSELF}: {spoken(self._home.state.reason)}"
         return None
 
     def hold(self, position: Percent, age: float) -> None:

@@ -33,6 +33,9 @@ from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, Loc
 _SAME_PLACE_DEG = 1e-7
 """About a centimetre: an echo that went through single precision is further off than that."""
 
+BY_ITSELF = "drone is returning by itself"
+"""Reason of a command that is rejected during a return of the drone's own."""
+
 _RETURNING = (RthState.IN_PROGRESS, RthState.PENDING)
 _ASKED_FOR = (StateReason.USER_REQUEST, StateReason.FLIGHTPLAN)
 _NO_CAUSE = (StateReason.FINISHED, StateReason.STOPPED, StateReason.DISABLED, StateReason.ENABLED)

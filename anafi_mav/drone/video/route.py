@@ -14,7 +14,7 @@ from anafi_mav.arsdk.mux.mux_link import MuxControllerSession
 from anafi_mav.arsdk.mux.mux_udp import UdpTunnel
 from anafi_mav.drone.video.rtsp_client import RtspClient
 from anafi_mav.errors import LinkLost
-from anafi_mav.receive_buffer import limit_reads
+from anafi_mav.receive_buffer import limit_reads, read_after_clients
 
 log = logging.getLogger("anafi_mav")
 
@@ -83,6 +83,7 @@ class _Socket(asyncio.DatagramProtocol):
         self._peer = peer
         # The system drops what comes from elsewhere; what came before that is seen to below.
         self._sock.connect(peer)
+        read_after_clients(self._sock)
         await asyncio.get_running_loop().create_datagram_endpoint(lambda: self, sock=self._sock)
         self._sock = None
 

@@ -57,7 +57,7 @@ class PhotoReporter:
     def __init__(self, host: Host) -> None:
         self.host = host
         self._log = PhotoLog()
-        self._serial = ""
+        self._generation = -1
         self._shots = ShotTracker()
         self._track = PoseTrack()
         self._poses: dict[float, CameraPose] = {}
@@ -87,8 +87,8 @@ class PhotoReporter:
     def link_up(self) -> None:
         """Continue the index of this drone."""
         drone = self.host.drone
-        if drone.identity.serial != self._serial:
-            self._serial = drone.identity.serial
+        if self.host.memory.generation != self._generation:
+            self._generation = self.host.memory.generation
             self._log = PhotoLog(PhotoLog.stored_count(self.host.memory.settings))
         self._shots, self._poses = ShotTracker(self._shots.capture), {}
         self._turn = asyncio.Lock()

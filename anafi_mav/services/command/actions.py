@@ -66,29 +66,24 @@ async def reposition(vehicle: Vehicle, command: Command) -> None:
     param1 speed in m/s (unset or <= 0: the drone's own), param4 heading in rad, x, y, z.
 
     param2 bit 0 (CHANGE_MODE): see `_require_change_of_mode`; bit 1 (RELATIVE_YAW): the heading is relative to the
-    present one. z obeys the frame: 0 and 5 AMSL, 3 and 6 above take-off. ArduPilot's clients send a heading of 0 for
-    an unset one (conformance D1). All unset is pause, with or without CHANGE_MODE: it stops something. A speed alone
-    is refused.
+    present one. z obeys the frame: 0 and 5 AMSL, 3 and 6 above take-off. All unset is pause, with or without
+    CHANGE_MODE: it stops something. A speed alone is refused.
     """
-    speed, flags, yaw = command.params[0], command.params[1], command.params[3]
-    if math.isinf(speed) or abs(yaw) > 2.0 * math.pi:
+    speed = command.params[0]
+    if math.isinf(speed) or abs(command.params[3]) > 2.0 * math.pi:
         raise Refused(texts.GOTO, texts.PARAM1_SPEED_HEADING, lasting=True)
     if speed > 0.0 and not SLOWEST <= speed <= FASTEST:
         raise Refused(texts.SPEED, texts.SPEED_RANGE.fill(slowest=SLOWEST, fastest=FASTEST), lasting=True)
-    where, ato = place(command), height(vehicle, command)
-    heading = None if math.isnan(yaw) else yaw
-    if heading == 0.0 and command.flavour.zero_is_unset:
-        heading = None
+    where, ato, heading = place(command), height(vehicle, command), _heading(command)
     mode = command.flavour.guided_mode
     if where is None and ato is None and heading is None:
         if speed > 0.0:
             raise Refused(texts.GOTO, texts.SPEED_ALONE, lasting=True)
         await vehicle.hold(mode, command.right, pause=True)
         return
-    bits = int(flags) if math.isfinite(flags) else 0
-    if not bits & CHANGE_MODE:
+    if not _flags(command) & CHANGE_MODE:
         _require_change_of_mode(vehicle, command)
-    if heading is not None and bits & RELATIVE_YAW:
+    if heading is not None and _flags(command) & RELATIVE_YAW:
         attitude = vehicle.drone.piloting.state.attitude
         if attitude is None:
             raise Refused(texts.GOTO, texts.HEADING_UNKNOWN)
@@ -136,12 +131,31 @@ def _effect_of_arm(command: Command) -> Effect:
     return Effect.KILL if command.params[1] == FORCE else Effect.STOP
 
 
-def _effect_of_reposition(command: Command) -> Effect:
-    """A reposition with nothing set is a pause."""
+def _heading(command: Command) -> float | None:
+    """Return the heading (rad) of a reposition; None: unset.
+
+    ArduPilot's clients send 0 for that (conformance D1).
+    """
     heading = command.params[3]
-    no_heading = math.isnan(heading) or (heading == 0.0 and command.flavour.zero_is_unset)
-    unset = no_heading and all(math.isnan(value) for value in (command.x, command.y, command.z))
-    return Effect.HOLD if unset else Effect.CHANGE
+    return None if math.isnan(heading) or (heading == 0.0 and command.flavour.zero_is_unset) else heading
+
+
+def _flags(command: Command) -> int:
+    """Return the MAV_DO_REPOSITION_FLAGS of a reposition."""
+    flags = command.params[1]
+    return int(flags) if math.isfinite(flags) else 0
+
+
+def _effect_of_reposition(command: Command) -> Effect:
+    """A reposition with nothing set is a pause.
+
+    A turn by an angle counts each time, as that of CONDITION_YAW: a COMMAND_INT has no confirmation by which a second
+    turn differs from a retransmission, and PX4 and ArduCopter carry out each one.
+    """
+    heading = _heading(command)
+    if heading is None and all(math.isnan(value) for value in (command.x, command.y, command.z)):
+        return Effect.HOLD
+    return Effect.EACH if heading is not None and _flags(command) & RELATIVE_YAW else Effect.CHANGE
 
 
 def flight_actions(vehicle: Vehicle) -> dict[int, Action]:

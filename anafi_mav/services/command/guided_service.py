@@ -40,6 +40,9 @@ _AIRSPEED, _GROUNDSPEED = 0.0, 1.0
 _UPWARDS, _DOWNWARDS = 2.0, 3.0
 """SPEED_TYPE."""
 
+_OWN_SPEED = (FlightMode.MISSION, FlightMode.RETURN, FlightMode.LAND)
+"""Modes in which the drone flies at a speed that no command changes."""
+
 SLOWEST_TURN = 1.0
 """deg/s. A slower turn is a number in the wrong field, and would take forever."""
 
@@ -144,7 +147,8 @@ class GuidedService(Service):
     async def _change_speed(self, command: Command) -> None:
         """MAV_CMD_DO_CHANGE_SPEED: param1 SPEED_TYPE, param2 m/s.
 
-        A move that is under way changes its speed at once.
+        A move that is under way changes its speed at once. A mission, a return and a landing are flown at a speed of
+        the drone's own, so it is refused there (ArduCopter: FAILED in modes without a speed).
 
         Unset and -1 change nothing, -2 restores the drone's own speed. The drone itself limits a value above its
         maximum. An ANAFI measures no airspeed: both horizontal types are over ground.
@@ -162,6 +166,8 @@ class GuidedService(Service):
             raise Refused(texts.SPEED, texts.PARAM2_SPEED.fill(slowest=SLOWEST, fastest=FASTEST), lasting=True)
         wanted = None if speed == DEFAULT else speed
         vehicle, settings = self.host.vehicle, self.host.vehicle.settings
+        if vehicle.mode in _OWN_SPEED:
+            raise Refused(texts.SPEED, texts.FIXED_IN_MODE.fill(mode=vehicle.mode.value))
         if kind in (_AIRSPEED, _GROUNDSPEED):
             vehicle.settings = replace(settings, cruise_speed=wanted)
         else:

@@ -23,11 +23,11 @@ RETRY = 10.0
 """s until an action that has failed is tried again: a bad link, or a lost GPS fix, may be better by then."""
 
 
-class FailedAction(NamedTuple):
-    """An action for a loss that was not carried out."""
+class LaterAction(NamedTuple):
+    """An action for a loss that has failed, or that a return precedes."""
 
     at: float
-    """When it is tried again."""
+    """When it is tried next."""
     epoch: int
     """Of the vehicle's control: what was commanded since has priority."""
 
@@ -40,12 +40,12 @@ class LinkLossService(Service):
         self._watch = GcsWatch()
         self._ticked = math.inf
         """Time of the last check; infinite before the first one of a connection."""
-        self._failed: FailedAction | None = None
+        self._later: LaterAction | None = None
 
     def link_up(self) -> None:
         self._watch.restart(self.host.clock.monotonic())
         self._ticked = math.inf
-        self._failed = None
+        self._later = None
 
     def tick(self, now: float) -> None:
         if (gap := now - self._ticked) >= STALL:
@@ -54,11 +54,14 @@ class LinkLossService(Service):
         policy = self.host.vehicle.gcs_loss
         if policy.action is not LossAction.NOTHING and self._watch.expire(now, policy.after):
             self._lost(policy.after)
-        elif self._failed is not None and now >= self._failed.at:
-            failed, self._failed = self._failed, None
-            is_newest = failed.epoch == self.host.vehicle.control.epoch
+        elif self._later is not None and now >= self._later.at:
+            later, self._later = self._later, None
+            is_newest = later.epoch == self.host.vehicle.control.epoch
             if is_newest and self._watch.lost and policy.action is not LossAction.NOTHING:
-                self._lost(policy.after)
+                if self.host.vehicle.mode is FlightMode.RETURN:
+                    self._later = later._replace(at=now + RETRY)
+                else:
+                    self._lost(policy.after)
 
     def heartbeat(self, inbound: Inbound) -> None:
         if inbound.message.type == dialect.MAV_TYPE_GCS and self._watch.heard(inbound.now, inbound.channel):
@@ -77,6 +80,8 @@ class LinkLossService(Service):
             self.host.text(Severity.WARNING, texts.STATION_LOST.fill(seconds=seconds))
         elif vehicle.mode is FlightMode.RETURN:
             self.host.text(Severity.WARNING, texts.STATION_LOST_STATE.fill(seconds=seconds, state=texts.RETURNS))
+            if policy.action is LossAction.LAND:  # the return may end in a hover
+                self._later = LaterAction(self.host.clock.monotonic() + RETRY, vehicle.control.epoch)
         elif vehicle.control.leaves_to_pilot(Source.LOST_LINK):
             self.host.text(Severity.WARNING, texts.STATION_LOST_STATE.fill(seconds=seconds, state=texts.MISSION_PILOT))
         else:
@@ -96,7 +101,7 @@ class LinkLossService(Service):
                     await self._perform(LossAction.HOLD)
                 except AnafiMavError as further:
                     self._report(LossAction.HOLD, further)
-            self._failed = FailedAction(self.host.clock.monotonic() + RETRY, self.host.vehicle.control.epoch)
+            self._later = LaterAction(self.host.clock.monotonic() + RETRY, self.host.vehicle.control.epoch)
 
     async def _perform(self, action: LossAction) -> None:
         vehicle = self.host.vehicle

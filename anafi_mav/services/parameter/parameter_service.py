@@ -192,8 +192,8 @@ class ParameterService(Service):
         """When a text was last sent about a refused write."""
         self._waiting: deque[tuple[Inbound, Parameter, float]] = deque()
         self._writers: set[asyncio.Task[None]] = set()
-        self._kept_of: str | None = None
-        """Serial number of the drone whose settings these are."""
+        self._restored = -1
+        """Generation of the stored data that the settings are from."""
         self._locks: dict[str, asyncio.Lock] = {}
         """One for each value, by its native name: two writes of it are carried out in their order."""
         self._storing = asyncio.Lock()
@@ -252,10 +252,9 @@ class ParameterService(Service):
 
     def _restore(self) -> None:
         """Restore the stored settings of this drone, and defaults for those absent or invalid."""
-        serial = self.host.drone.identity.serial
-        if serial == self._kept_of:
+        if self.host.memory.generation == self._restored:
             return
-        self._kept_of = serial
+        self._restored = self.host.memory.generation
         found = self.host.memory.settings.get(KEY)
         kept = found if isinstance(found, dict) else {}
         for parameter in KEPT:

@@ -493,7 +493,7 @@ async def _go_on(host: Host) -> None:
     """
     vehicle = host.vehicle
     if vehicle.control.is_settled and (goto := vehicle.guided.goto) is not None:
-        await vehicle.guided.go(goto, by=Source.GATEWAY)
+        await vehicle.control.perform(vehicle.guided.go(goto, by=Source.GATEWAY))
 
 
 def _climb_limits(host: Host) -> Limits | None:

@@ -21,8 +21,8 @@ from typing import Any, Protocol, TypeAlias
 
 from anafi_mav import texts
 from anafi_mav.drone import Drone
-from anafi_mav.errors import AnafiMavError
-from anafi_mav.texts import OperatorText, Subject
+from anafi_mav.errors import AnafiMavError, CommandRejected
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.control_machine import (
     ADOPTED,
     Attempt,
@@ -195,16 +195,17 @@ class Control:
         pauses: bool = False,
         rules: TaskRules | None = None,
     ) -> AsyncIterator[Grant]:
-        """Acquire control for a task; the block prepares and starts it.
+        """Acquire control for a task, in an action; the block prepares and starts it.
 
         The task becomes active by `Grant.begin`, at the end of the block at the latest. When the block raises, the
-        hovering mode of before is active again; after `begin` it is the one below the task. A newer request is not
-        disturbed by either.
+        hovering mode of before is active again; after `begin` it is the one below the task. A newer request cancels the
+        action, and is not disturbed by either.
 
         `below`: the hovering mode after the task; None: Hold. `pauses`: streams do not leave it. `rules`: for this
         request, instead of the task's own.
 
-        Raises `Refused` by the policy, for a need that is not met, and while the motors are being cut.
+        Raises `Refused` by the policy, for a need that is not met, while the motors are being cut, and when the drone
+        rejects what is sent to it.
         """
         rules = rules or task.rules
         self.check(task, by, rules)
@@ -215,13 +216,16 @@ class Control:
         try:
             await self._release(attempt, rules.wait)
             self.handle(Event.RELEASED, Input(attempt))
-            await self._prepare(attempt, Request(task, by, rules))
+            await self._prepare(Request(task, by, rules))
             grant = Grant(self, attempt)
             yield grant
             grant.begin()
-        except BaseException:
+        except BaseException as error:
             self.handle(Event.FAIL, Input(attempt))
             self.handle(Event.FINISH, Input(task=own, number=number))
+            if isinstance(error, CommandRejected):
+                reason = self._aircraft.lacking(rules.needs) or texts.from_below(error.reason)
+                raise Refused(rules.what, reason) from error
             raise
 
     def check(self, task: FlightTask, by: By, rules: TaskRules | None = None) -> None:
@@ -249,11 +253,6 @@ class Control:
         yields = isinstance(by, Source) and by.yields_to_pilot
         return yields and (controller.pilot_has_source or controller.pilot_acquired_control)
 
-    def _require_pending(self, attempt: Attempt[FlightTask], what: Subject) -> None:
-        """Raise `Refused` when something newer has replaced an attempt."""
-        if self._situation.pending is not attempt:
-            raise Refused(what, texts.MISSION_DISPLACED)
-
     async def _release(self, attempt: Attempt[FlightTask], limit: float | None) -> None:
         """End what flies, which can fly the drone no further, and wait for the end."""
         ending = [*self.actions.end_older(), *self.handle(Event.REQUEST, Input(attempt))]
@@ -265,20 +264,14 @@ class Control:
             _, late = await asyncio.wait(ending, timeout=limit)
             drone.silence(late)
 
-    async def _prepare(self, attempt: Attempt[FlightTask], request: Request) -> None:
-        """Stop the drone as the task needs it, and check policy and needs again.
-
-        An attempt that a newer one has replaced sends nothing more: it may be no action, which would be cancelled.
-        """
+    async def _prepare(self, request: Request) -> None:
+        """Stop the drone as the task needs it, and check policy and needs again."""
         rules, aircraft, piloting = request.rules, self._aircraft, self._aircraft.drone.piloting
-        self._require_pending(attempt, rules.what)
         if rules.start is Preparation.STOP:
             await piloting.stop()
-            self._require_pending(attempt, rules.what)
         if Needs.NO_DESCENT in rules.needs:
             # One asked for through another controller, or before the link was lost. Raises when it is the drone's own.
             await piloting.cancel_return_home()
-            self._require_pending(attempt, rules.what)
         if (reason := aircraft.lacking(rules.needs)) is not None:
             raise Refused(rules.what, reason)
         self.require_allowed(request.task, request.by, rules)

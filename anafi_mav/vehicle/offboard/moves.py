@@ -42,6 +42,13 @@ class _Wanted:
     goal: Goal
     yaw: float | None
     """rad from north; None keeps the present heading."""
+    speeds: tuple[float | None, float | None]
+    """m/s over ground and up or down; None: the drone's own."""
+
+    def is_same(self, other: _Wanted) -> bool:
+        """True when the other asks for nothing new. A moveBy has no speed."""
+        has_speed = self.goal.place is not None and self.goal.offset is None
+        return (self.goal, self.yaw) == (other.goal, other.yaw) and (not has_speed or self.speeds == other.speeds)
 
 
 @dataclass(frozen=True)
@@ -87,8 +94,9 @@ class OffboardMoves:
 
         Returns the reason for which the drone has not flown to this goal, which may be tried again; None without one.
         """
-        before, failure = self._attempt, None
-        if before is not None and (before.wanted.goal, before.wanted.yaw) == (goal, yaw):
+        before, failure, settings = self._attempt, None, self._vehicle.settings
+        wanted = _Wanted(goal, yaw, (settings.cruise_speed, settings.climb_speed))
+        if before is not None and before.wanted.is_same(wanted):
             failure = before.failure
             if not asked or now < before.retry_at:
                 return failure
@@ -97,7 +105,7 @@ class OffboardMoves:
         else:
             starter = before.starter
         waits = () if before is None else tuple(wait for wait in before.waits if not wait.done())
-        self._attempt = _Attempt(_Wanted(goal, yaw), starter, waits, failure=failure)
+        self._attempt = _Attempt(wanted, starter, waits, failure=failure)
         return failure
 
     def stop(self) -> list[asyncio.Task[None]]:
@@ -157,8 +165,8 @@ class OffboardMoves:
             goal.place.longitude,
             height,
             heading_deg=heading,
-            horizontal_speed=vehicle.settings.cruise_speed,
-            vertical_speed=vehicle.settings.climb_speed,
+            horizontal_speed=wanted.speeds[0],
+            vertical_speed=wanted.speeds[1],
             orientation=orientation,
         )
         self._note(wanted, failure=None)

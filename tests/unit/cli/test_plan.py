@@ -55,6 +55,7 @@ def test_show_on_a_terminal_folds_the_last_column_only(monkeypatch: pytest.Monke
     screen = _Terminal()
     monkeypatch.setattr("sys.stdout", screen)
     monkeypatch.setenv("COLUMNS", str(columns))
+    monkeypatch.setenv("LINES", "25")  # rich takes a dumb terminal for one of 80 columns unless both are set
     monkeypatch.setenv("TERM", "dumb")
     say_table(
         ("a", "number", "words"), [("48.8789000, 2.3677000", "12", "word " * 20), ("\x1b[2J", "7", "")], right=(1,)

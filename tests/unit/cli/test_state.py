@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import resource
 import signal
@@ -112,15 +111,6 @@ async def test_timestamps_that_are_not_kept_at_the_end_set_the_exit_status(tmp_p
         assert await p.end() == 1
         (line,) = (line for line in p.complaints if line.startswith("anafi-mav: not kept: "))
         assert line == "anafi-mav: not kept: key field: File exists; old frames may be accepted after a restart"
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
-async def test_unreadable_state_folder_is_reported(tmp_path: Path) -> None:
-    (tmp_path / "state").mkdir(mode=0o000)
-    async with product(tmp_path, fleet(loopback(), loopback(), f"state: {tmp_path / 'state'}")) as p:
-        assert any("state folder cannot be used" in line for line in p.complaints), p
-        p.process.send_signal(signal.SIGTERM)
-        assert await p.end() == 1
 
 
 async def test_run_with_every_message_logged_passes_no_escapes_on(tmp_path: Path) -> None:

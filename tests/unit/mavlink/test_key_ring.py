@@ -6,15 +6,19 @@ import asyncio
 import logging
 import os
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from support.hanging_disk import hanging
 
 from anafi_mav.clock import SystemClock
+from anafi_mav.disk_writer import HANGS
 from anafi_mav.errors import ConfigError
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.frames import SIGNED, Verdict, frame, pack
 from anafi_mav.mavlink.key_ring import OLD_SUFFIX, KeyRing, path_of, read_key, write_key
-from anafi_mav.mavlink.signing import SAVED_AHEAD, Signing, ticks
+from anafi_mav.mavlink.signing import SAVED_AHEAD, TICKS, Signing, ticks
 from anafi_mav.state_lock import STATE_WRITER
 
 SECRET = bytes(range(32))
@@ -41,6 +45,14 @@ def opened(one: KeyRing, name: str = "field") -> Signing:
 
 def saved(folder: Path) -> int:
     return int.from_bytes((read_key(folder, "field") or b"")[32:], "little")
+
+
+async def until(ready: Callable[[], bool]) -> None:
+    for _ in range(2000):
+        if ready():
+            return
+        await asyncio.sleep(0.01)  # the disk has no event of its own
+    raise AssertionError
 
 
 @posix
@@ -105,7 +117,12 @@ async def test_replaced_key_is_stored_and_the_old_one_kept(folder: Path) -> None
     signing = opened(one)
     await one.start()
     seen: list[bool] = []
-    one.replace(signing, bytes(reversed(SECRET)), 0, before_use=lambda: seen.append(signing.is_key(SECRET)))
+
+    def before_use() -> bool:
+        seen.append(signing.is_key(SECRET))
+        return True
+
+    assert await one.replace(signing, bytes(reversed(SECRET)), 0, before_use=before_use)
     assert seen == [True]
     assert signing.is_key(bytes(reversed(SECRET)))
     assert (read_key(folder, "field") or b"")[:32] == bytes(reversed(SECRET))
@@ -121,7 +138,9 @@ async def test_key_that_cannot_be_written_stays_in_use(folder: Path) -> None:
     await one.start()
     path_of(folder, "field", OLD_SUFFIX).mkdir()
     with pytest.raises(OSError):  # noqa: PT011  # which one is the system's matter
-        one.replace(signing, bytes(reversed(SECRET)), 0, before_use=lambda: pytest.fail("the new key is announced"))
+        await one.replace(
+            signing, bytes(reversed(SECRET)), 0, before_use=lambda: pytest.fail("the new key is announced")
+        )
     assert signing.is_key(SECRET)
     await one.close()
 
@@ -163,3 +182,24 @@ async def test_hanging_disk_at_the_end_leaves_the_timestamp_ahead(folder: Path) 
         assert one.problem.startswith("key field: the disk does not answer")
     assert await STATE_WRITER.drain(30.0)
     assert saved(folder) == ahead > signing.timestamp  # what was not begun in time is not written later
+
+
+async def test_hanging_disk_refuses_frames_ahead_of_it_for_a_second_only(folder: Path) -> None:
+    one = ring(folder)
+    signing = opened(one)
+    await one.start()
+    station = Signing("station", SECRET + (ticks(time.time()) + 3600 * TICKS).to_bytes(8, "little"))
+    beat = pack(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+
+    def verdict() -> Verdict:
+        return signing.judge(station.sign(frame(beat, 0, 255, 190, SIGNED), 1), 0, {})
+
+    with hanging(STATE_WRITER):
+        assert verdict() is Verdict.UNSAVED
+        await until(lambda: not signing.is_kept)
+        assert HANGS in one.problem
+        assert verdict() is Verdict.VERIFIED
+    await until(lambda: signing.is_kept)
+    assert one.problem == ""
+    assert verdict() is Verdict.VERIFIED
+    await one.close()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import sys
+import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
@@ -21,9 +23,29 @@ from anafi_mav.mavlink.frames import frame, pack
 from anafi_mav.mavlink.key_ring import KeyRing, path_of, write_key
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.mavlink.router import EVERY_COMPONENT
+from anafi_mav.mavlink.signing import TICKS, ticks
 
 BEAT = dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
 STOCK_BEAT = stock.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+
+
+GATEWAY = """
+import asyncio, sys
+from pathlib import Path
+from anafi_mav.clock import SystemClock
+from anafi_mav.mavlink.key_ring import KeyRing
+from anafi_mav.mavlink.node import Node
+
+async def main():
+    node = Node(keys=KeyRing(Path(sys.argv[1]), SystemClock()))
+    node.add_host(1, 0, lambda inbound: print(inbound.message.get_type(), flush=True))
+    await node.start([f"tcpin://{sys.argv[2]}:5760?signing=field"])
+    print("ready", flush=True)
+    await asyncio.sleep(60.0)
+
+asyncio.run(main())
+"""
+"""A node that prints what reaches its system, until it is killed."""
 
 
 class Station:
@@ -163,3 +185,46 @@ async def test_connections_without_the_key_keep_no_place(folder: Path) -> None:
             await until(lambda: len(gateway.inbound) == before + 2)  # no program lost its place
         for _, writer in (*strangers, *late):
             writer.close()
+
+
+async def test_no_frame_is_accepted_again_after_the_process_was_killed(folder: Path) -> None:
+    """The station's clock is a minute ahead, so that the saved timestamp is behind its frames."""
+    address, recorded = loopback(), []
+
+    @asynccontextmanager
+    async def gateway() -> AsyncIterator[asyncio.StreamReader]:
+        process = await asyncio.create_subprocess_exec(
+            sys.executable, "-c", GATEWAY, str(folder), address, stdout=asyncio.subprocess.PIPE
+        )
+        assert process.stdout is not None
+        try:
+            assert await process.stdout.readline() == b"ready\n"
+            yield process.stdout
+        finally:
+            process.kill()
+            await process.wait()
+
+    command = stock.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)
+    station = stock.MAVLink(None, 255, 190)
+    station.signing.secret_key, station.signing.sign_outgoing = SECRET, True
+    station.signing.timestamp = ticks(time.time()) + 60 * TICKS
+    async with gateway() as accepted:
+        _, writer = await asyncio.open_connection(address, 5760)
+        reading = asyncio.ensure_future(accepted.readline())
+        while not reading.done():  # as a station that repeats what has no answer
+            recorded.append(command.pack(station))
+            writer.write(recorded[-1])
+            await asyncio.wait([reading], timeout=0.02)
+        assert reading.result() == b"COMMAND_LONG\n"
+        writer.close()
+    async with gateway() as accepted:
+        _, writer = await asyncio.open_connection(address, 5760)
+        for raw in recorded:
+            writer.write(raw)
+        station.signing.timestamp += 120 * TICKS
+        reading = asyncio.ensure_future(accepted.readline())
+        while not reading.done():
+            writer.write(stock.MAVLink_request_data_stream_message(1, 1, 0, 1, 1).pack(station))
+            await asyncio.wait([reading], timeout=0.02)
+        assert reading.result() == b"REQUEST_DATA_STREAM\n"  # and no command before it
+        writer.close()

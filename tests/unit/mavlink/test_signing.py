@@ -175,7 +175,40 @@ def test_saving_is_due_before_the_saved_timestamp_is_reached() -> None:
     assert key.due(now + 9.5) == ticks(now + 9.5) + SAVED_AHEAD
     # A timestamp that is ahead of the clock, by restarts or by a client, is saved in small steps.
     ahead = signing(timestamp=START + 3600 * TICKS)
-    assert ahead.due(now) == START + 3600 * TICKS + 2 * SAVED_AHEAD_BURST
+    assert ahead.due(now) == START + 3600 * TICKS + 4 * SAVED_AHEAD_BURST
+
+
+def test_timestamp_beyond_the_file_is_refused_until_it_is_saved() -> None:
+    now, asked = 1_800_000_000.0, []
+    key = signing()
+    key.on_due = lambda: asked.append(key.due(now))
+    key.saved, key.is_kept = key.due(now) or 0, True  # 10 s ahead
+    assert judged(key, Peer(timestamp=START + 8 * TICKS - 1, sysid=1).frame()) is Verdict.VERIFIED
+    assert asked == []
+    # Within two seconds of the saved timestamp it is due, within one second it is refused until it is saved.
+    assert judged(key, Peer(timestamp=START + 8 * TICKS, sysid=2).frame()) is Verdict.VERIFIED
+    assert asked == [START + 12 * TICKS]
+    ahead = Peer(timestamp=START + 30 * TICKS, sysid=3)
+    assert judged(key, ahead.frame()) is Verdict.UNSAVED
+    assert asked[1:] == [START + 34 * TICKS]
+    assert key.timestamp == START + 8 * TICKS
+    key.saved = asked[-1] or 0
+    assert judged(key, ahead.frame()) is Verdict.VERIFIED
+    # A disk that is not written in time refuses no frame.
+    key.is_kept = False
+    assert judged(key, Peer(timestamp=START + 3600 * TICKS, sysid=4).frame()) is Verdict.VERIFIED
+
+
+def test_own_timestamp_waits_for_the_file_behind_a_clock_that_leaps() -> None:
+    now = 1_800_000_000.0
+    key = signing()
+    key.saved, key.is_kept = key.due(now) or 0, True
+    key.advance(now + 3600.0)
+    assert key.timestamp == START + SAVED_AHEAD - SAVED_AHEAD_BURST
+    key.saved = key.due(now + 3600.0) or 0
+    assert key.saved == START + 3600 * TICKS + SAVED_AHEAD
+    key.advance(now + 3600.0)
+    assert key.timestamp == START + 3600 * TICKS
 
 
 def test_another_key_keeps_the_timestamp_and_forgets_the_streams() -> None:

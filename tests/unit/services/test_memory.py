@@ -108,6 +108,45 @@ async def test_load_on_a_hanging_disk_ends_and_the_file_is_kept(tmp_path: Path) 
     assert again.settings == {"number": 7}
 
 
+async def test_late_file_is_reported_and_added_at_the_next_connection(tmp_path: Path) -> None:
+    stored, reported = Memory(tmp_path), asyncio.Queue[str]()
+    await stored.load(SERIAL)
+    stored.put(0, ITEMS)
+    stored.put(1, ITEMS)
+    stored.settings.update(number=7, name="old")
+    assert await stored.save() is None
+    memory = Memory(tmp_path, reported.put_nowait)
+    with hanging(STATE_WRITER):
+        await memory.load(SERIAL)
+        memory.put(1, ())  # a client clears the fence meanwhile
+        memory.settings["name"] = "new"
+        before = memory.generation
+        assert await memory.load(SERIAL) is None  # the link was lost, and the disk still hangs
+        assert (reported.qsize(), memory.generation) == (0, before)
+    assert await asyncio.wait_for(reported.get(), PATIENCE) == "Stored plans read late: unused until reconnection"
+    assert memory.plans == {1: ()}
+    assert memory.problem is not None
+    assert await memory.load(SERIAL) is None
+    assert memory.generation == before + 1
+    assert same(memory.plans[0], ITEMS)
+    assert (memory.plans[1], memory.settings) == ((), {"number": 7, "name": "new"})
+    assert memory.problem is None
+    assert await memory.save() is None
+    again = Memory(tmp_path)
+    await again.load(SERIAL)
+    assert (set(again.plans), again.settings) == ({0}, {"number": 7, "name": "new"})
+
+
+async def test_unreadable_file_that_can_be_read_later_is_read_at_the_next_connection(tmp_path: Path) -> None:
+    (tmp_path / f"{SERIAL}.json").mkdir()
+    memory = Memory(tmp_path)
+    assert await memory.load(SERIAL) is not None
+    (tmp_path / f"{SERIAL}.json").rmdir()
+    (tmp_path / f"{SERIAL}.json").write_text(json.dumps(valid()))
+    assert await memory.load(SERIAL) is None
+    assert (set(memory.plans), memory.problem) == ({1}, None)
+
+
 async def test_load_that_is_cancelled_leaves_the_drone_before_it(tmp_path: Path) -> None:
     memory = Memory(tmp_path)
     await memory.load("PI000000000000002")

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import asyncio
 import random
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import pytest
+from support.hanging_disk import PATIENCE, hanging
 
 from anafi_mav.clock import SystemClock
 from anafi_mav.drone.events import FlyingState
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.access import Access
 from anafi_mav.mavlink.channel import Channel
-from anafi_mav.mavlink.key_ring import KeyRing, write_key
+from anafi_mav.mavlink.key_ring import KeyRing, read_key, write_key
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.signing import LATEST
 from anafi_mav.services.ground_station.signing_setup import SigningSetup
+from anafi_mav.state_lock import STATE_WRITER
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
 
@@ -69,15 +72,20 @@ class Bench:
     def key(self) -> Any:
         return self.channels[0].signing
 
-    def send(self, secret: bytes, *, target: int = 2, timestamp: int = 0, is_permitted: bool = True) -> None:
+    def post(self, secret: bytes, *, target: int = 2, timestamp: int = 0, is_permitted: bool = True) -> None:
         message = dialect.MAVLink_setup_signing_message(target, 1, list(secret), timestamp)
         self.setup.receive(Inbound(message, self.channels[0], 255, 190, 0.0, is_permitted))
+
+    async def send(self, secret: bytes, *, target: int = 2, timestamp: int = 0, is_permitted: bool = True) -> None:
+        """Send it, and wait for its answer."""
+        self.post(secret, target=target, timestamp=timestamp, is_permitted=is_permitted)
+        await self.setup.settle()
 
 
 @pytest.mark.parametrize(("secret", "is_local"), [(SECRET, False), (SECRET, True), (None, True), (NONE, True)])
 async def test_signed_or_loopback_endpoint_takes_a_key(tmp_path: Path, secret: bytes | None, is_local: bool) -> None:
     bench = Bench(tmp_path / "keys", secret, is_local=is_local)
-    bench.send(OTHER)
+    await bench.send(OTHER)
     assert bench.key.is_key(OTHER)
     one, two, _ = bench.channels
     # The addressed system answers; all systems of the endpoint show themselves with the new key.
@@ -90,7 +98,7 @@ async def test_signed_or_loopback_endpoint_takes_a_key(tmp_path: Path, secret: b
     elsewhere = bench.channels[2].signing
     assert elsewhere is not None
     assert not elsewhere.is_on
-    bench.send(NONE)
+    await bench.send(NONE)
     assert not bench.key.is_on
     assert bench.drones[1].texts[-2:] == [
         (two, Severity.WARNING, "Signing switched off by system 255"),
@@ -101,7 +109,7 @@ async def test_signed_or_loopback_endpoint_takes_a_key(tmp_path: Path, secret: b
 
 async def test_same_key_again_is_confirmed_and_not_announced(tmp_path: Path) -> None:
     bench = Bench(tmp_path / "keys", SECRET, is_local=False)
-    bench.send(SECRET, timestamp=2**47)
+    await bench.send(SECRET, timestamp=2**47)
     assert bench.drones[1].texts == [(bench.channels[0], Severity.INFO, "Signing on: key in use")]
     assert bench.key.timestamp < 2**47
     assert not (tmp_path / "keys" / "field.key.old").exists()
@@ -111,7 +119,7 @@ async def test_same_key_again_is_confirmed_and_not_announced(tmp_path: Path) -> 
 @pytest.mark.parametrize("wanted", [OTHER, NONE])
 async def test_remote_unsigned_endpoint_takes_no_key(tmp_path: Path, secret: bytes | None, wanted: bytes) -> None:
     bench = Bench(tmp_path / "keys", secret, is_local=False)
-    bench.send(wanted)
+    await bench.send(wanted)
     assert not bench.key.is_on
     refusal = (bench.channels[0], Severity.ERROR, "Signing refused: endpoint is not on loopback")
     assert bench.drones[1].texts == [refusal]
@@ -121,7 +129,7 @@ async def test_remote_unsigned_endpoint_takes_no_key(tmp_path: Path, secret: byt
 async def test_observer_changes_no_key(tmp_path: Path) -> None:
     bench = Bench(tmp_path / "keys", SECRET, is_local=True)
     bench.channels[0].access = Access.OBSERVE
-    bench.send(OTHER, is_permitted=False)
+    await bench.send(OTHER, is_permitted=False)
     assert bench.key.is_key(SECRET)
     refusal = (bench.channels[0], Severity.ERROR, "Signing refused: access of endpoint is observe")
     assert bench.drones[1].texts == [refusal]
@@ -132,7 +140,7 @@ async def test_key_is_not_changed_while_any_drone_is_armed(tmp_path: Path, activ
     bench = Bench(tmp_path / "keys", SECRET, is_local=True)
     bench.drones[0].vehicle.armed, bench.drones[0].active = True, active  # also one whose link is lost
     for wanted in (OTHER, NONE):
-        bench.send(wanted)
+        await bench.send(wanted)
     assert bench.key.is_key(SECRET)
     refusal = (bench.channels[0], Severity.ERROR, "Signing refused: system 1 is armed")
     assert bench.drones[1].texts == [refusal, refusal]
@@ -142,7 +150,7 @@ async def test_key_is_not_changed_before_each_drone_was_heard(tmp_path: Path) ->
     bench = Bench(tmp_path / "keys", SECRET, is_local=True)
     bench.drones[0].vehicle.flying_state, bench.drones[0].active = None, False
     for wanted in (OTHER, NONE):
-        bench.send(wanted)
+        await bench.send(wanted)
     assert bench.key.is_key(SECRET)
     refusal = (bench.channels[0], Severity.ERROR, "Signing refused: state of system 1 is unknown")
     assert bench.drones[1].texts == [refusal, refusal]
@@ -155,7 +163,7 @@ async def test_random_setup_signing_is_a_key_or_a_refusal(tmp_path: Path, fuzz_s
         secret = chance.choice((SECRET, NONE, chance.randbytes(32)))
         bench.drones[0].vehicle.armed = is_armed = chance.random() < 0.3
         before = bench.key.timestamp
-        bench.send(secret, target=chance.randrange(256), timestamp=chance.getrandbits(chance.choice((8, 48, 64))))
+        await bench.send(secret, target=chance.randrange(256), timestamp=chance.getrandbits(chance.choice((8, 48, 64))))
         assert is_armed or bench.key.is_key(secret)
         assert before <= bench.key.timestamp < LATEST
         assert bench.keys.problem == ""
@@ -164,7 +172,68 @@ async def test_random_setup_signing_is_a_key_or_a_refusal(tmp_path: Path, fuzz_s
 async def test_key_that_cannot_be_stored_is_not_used(tmp_path: Path) -> None:
     bench = Bench(tmp_path / "keys", SECRET, is_local=True)
     (tmp_path / "keys" / "field.key.old").mkdir()
-    bench.send(OTHER)
+    await bench.send(OTHER)
     assert bench.key.is_key(SECRET)
     refusal = (bench.channels[0], Severity.ERROR, "Signing refused: key file cannot be written")
     assert bench.drones[1].texts == [refusal]
+
+
+async def test_key_is_written_outside_of_the_event_loop_and_used_afterwards(tmp_path: Path) -> None:
+    bench = Bench(tmp_path / "keys", SECRET, is_local=True)
+    with hanging(STATE_WRITER):
+        bench.post(OTHER)
+        bench.post(OTHER)  # some stations send it twice
+        assert bench.key.is_key(SECRET)
+        assert [drone.texts for drone in bench.drones] == [[], []]
+    await bench.setup.settle()
+    assert bench.key.is_key(OTHER)
+    one, two, _ = bench.channels
+    in_use = (one, Severity.INFO, "Signing on: key in use")
+    assert bench.drones[1].texts == [(two, Severity.WARNING, "Signing key changed by system 255"), in_use, in_use]
+    await bench.keys.close()
+
+
+async def test_drone_that_is_armed_while_the_key_is_written_keeps_the_old_one(tmp_path: Path) -> None:
+    bench = Bench(tmp_path / "keys", SECRET, is_local=True)
+    with hanging(STATE_WRITER):
+        bench.post(OTHER)
+        bench.drones[0].vehicle.armed = True
+    await bench.setup.settle()
+    assert bench.drones[1].texts == [(bench.channels[0], Severity.ERROR, "Signing refused: system 1 is armed")]
+    assert bench.key.is_key(SECRET)
+    assert await STATE_WRITER.drain(PATIENCE)
+    assert (read_key(tmp_path / "keys", "field") or b"")[:32] == SECRET
+
+
+async def test_key_behind_a_hanging_disk_is_refused_and_not_written_later(tmp_path: Path) -> None:
+    bench = Bench(tmp_path / "keys", SECRET, is_local=True)
+    with hanging(STATE_WRITER):
+        await bench.send(OTHER)
+        refusal = (bench.channels[0], Severity.ERROR, "Signing refused: key file cannot be written")
+        assert bench.drones[1].texts == [refusal]
+    assert await STATE_WRITER.drain(PATIENCE)
+    assert bench.key.is_key(SECRET)
+    assert (read_key(tmp_path / "keys", "field") or b"")[:32] == SECRET
+
+
+async def test_other_key_that_waited_for_the_disk_is_refused(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    bench = Bench(tmp_path / "keys", SECRET, is_local=True)
+    third = bytes(range(2, 34))
+    with hanging(STATE_WRITER):
+        bench.post(OTHER)
+        bench.post(third)  # it would not have arrived with the key that is in use then
+    await bench.setup.settle()
+    assert bench.key.is_key(OTHER)
+    assert "Signing refused: another key has been set" in caplog.text
+    assert third.hex() not in caplog.text
+
+
+async def test_end_of_the_gateway_leaves_the_old_key(tmp_path: Path) -> None:
+    bench = Bench(tmp_path / "keys", SECRET, is_local=True)
+    with hanging(STATE_WRITER):
+        bench.post(OTHER)
+        await asyncio.sleep(0)
+        await bench.setup.close()
+    assert await STATE_WRITER.drain(PATIENCE)
+    assert bench.key.is_key(SECRET)
+    assert (read_key(tmp_path / "keys", "field") or b"")[:32] == SECRET
