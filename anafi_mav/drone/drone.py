@@ -708,9 +708,9 @@ class Drone:
         return [str(blocker) for blocker in self.blockers()]
 
     def subscribe(self, callback: Callback, kinds: Iterable[type[Message]] | None = None) -> Callable[[], None]:
-        """Call `callback(message, time)` with every message, or those of some kinds, after the states are updated.
+        """Call `callback(message, time)` with every message, or with those of some kinds.
 
-        Returns the function that ends it. `time` is the event loop's. Messages during `connect` are included. What the
+        The states are updated before. Returns the function that ends it. `time` is the event loop's. Messages during `connect` are included. What the
         callback raises is logged. Each message is decoded for it: for kinds that are sent many times a second and read
         seldom see `subscribe_values`.
         """
@@ -725,7 +725,7 @@ class Drone:
         return undo
 
     def subscribe_values(self, callback: OnValues) -> Callable[[], None]:
-        """Call `callback(values, time)` with the events of values, which follow one another in large numbers.
+        """Call `callback(values, time)` with the events of values, which arrive often.
 
         It is called once for those that arrive together: before the next message of another kind, before the next of
         the same kind, and at the end of a frame. The states contain them. Otherwise as `subscribe`.

@@ -95,7 +95,10 @@ class Element(Generic[StateT]):
 
     @property
     def settled(self) -> StateT:
-        """The state without the events that wait: for fields that no value changes. Nothing is decoded."""
+        """The state without the events that wait, for fields that no value changes.
+
+        Nothing is decoded.
+        """
         return self._before if self._deferred else self.state
 
 

@@ -1,6 +1,6 @@
-"""Events of values: attitude, speed, heights, place, gimbal and zoom, which a drone sends again and again.
+"""Events of values: attitude, speed, heights, place, gimbal and zoom.
 
-Each replaces the one before. A drone keeps them undecoded until a state is read, and reports those that arrive together
+A drone sends them again and again. Each replaces the one before. A drone keeps them undecoded until a state is read, and reports those that arrive together
 with one call: of thirty a second most are read by nothing.
 """
 

@@ -195,7 +195,7 @@ def event(
 def value(
     name: str, project: int, cls: int, number: int, *, of: str | None = None
 ) -> Callable[[type[MessageT]], type[MessageT]]:
-    """Declare an event of values: each replaces the one before, and all arguments have a fixed size.
+    """Declare an event of values, which replaces the one before and has a fixed size.
 
     A device sends it without acknowledgement. `of`: the first argument, a byte, when it is the number of a camera or
     gimbal whose values these are.
@@ -392,7 +392,7 @@ def decode(data: bytes) -> Message | UnknownMessage | None:
 
 
 def receive(data: bytes) -> Received | None:
-    """Return the message in these command bytes, packed if it is an event of values; None when they are too short."""
+    """As `decode`, but leave events of values packed."""
     header = data[: HEADER.size]
     known = _VALUES.get(header)
     if known is None:
