@@ -710,9 +710,9 @@ class Drone:
     def subscribe(self, callback: Callback, kinds: Iterable[type[Message]] | None = None) -> Callable[[], None]:
         """Call `callback(message, time)` with every message, or with those of some kinds.
 
-        The states are updated before. Returns the function that ends it. `time` is the event loop's. Messages during `connect` are included. What the
-        callback raises is logged. Each message is decoded for it: for kinds that are sent many times a second and read
-        seldom see `subscribe_values`.
+        The states are updated before. Returns the function that ends it. `time` is the event loop's. Messages during
+        `connect` are included. What the callback raises is logged. Each message is decoded for it: for kinds that are
+        sent many times a second and read seldom see `subscribe_values`.
         """
         subscription = callback, None if kinds is None else frozenset(kinds)
         self._subscriptions = (*self._subscriptions, subscription)

@@ -1,7 +1,7 @@
 """Events of values: attitude, speed, heights, place, gimbal and zoom.
 
-A drone sends them again and again. Each replaces the one before. A drone keeps them undecoded until a state is read, and reports those that arrive together
-with one call: of thirty a second most are read by nothing.
+A drone sends them again and again, and each replaces the one before. They are kept undecoded until a state is read, and
+those that arrive together are reported with one call: of thirty a second most are read by nothing.
 """
 
 from __future__ import annotations
