@@ -29,6 +29,7 @@ from anafi_mav.disk_writer import HANGS
 from anafi_mav.drone import Drone, events
 from anafi_mav.drone.contention import Contention
 from anafi_mav.drone.rest import HTTP_PORT
+from anafi_mav.drone.values import VALUES
 from anafi_mav.errors import AnafiMavError, ConfigError, HandshakeRefused, WrongAircraft
 from anafi_mav.fabric.endpoint import FabricEndpoint
 from anafi_mav.fabric.sample_age import StopKind
@@ -150,7 +151,7 @@ class _Supervised:
         self._contention = Contention()
         self._judged = drone.handshake_at
         """The handshake whose loss was judged last."""
-        drone.subscribe(self._on_flying_state, (events.FlyingStateChanged,))
+        drone.subscribe(self._on_event, without=VALUES)
 
     async def run(self) -> None:
         """Keep the drone connected until cancelled."""
@@ -260,8 +261,8 @@ class _Supervised:
         logger.log(logging.WARNING, "%s: %s", self.config.name, text)
         self.system.announce(severity, text)
 
-    def _on_flying_state(self, message: events.Message, now: float) -> None:
-        if self.drone.piloting.state.flying in ON_GROUND:
+    def _on_event(self, message: events.Message, now: float) -> None:
+        if type(message) is events.FlyingStateChanged and message.state in ON_GROUND:
             self._contention.on_ground()
 
     def held(self) -> HeldDrone:
@@ -660,8 +661,10 @@ class Gateway:
         return sentences
 
     def _on_channel(self, channel: Channel, opened: bool) -> None:
-        if not opened:
-            for supervised in self._supervised:
+        for supervised in self._supervised:
+            if opened:
+                supervised.system.channel_opened()
+            else:
                 supervised.system.channel_closed(channel)
 
 

@@ -10,7 +10,7 @@ import contextlib
 import logging
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from datetime import datetime
 from functools import partial
 from typing import Any, TypeAlias, TypeVar
@@ -58,7 +58,7 @@ from anafi_mav.drone.status.home import Home, modern
 from anafi_mav.drone.status.link import Link
 from anafi_mav.drone.status.product import MODELS, Identity, Product
 from anafi_mav.drone.status.sound import Sound
-from anafi_mav.drone.values import OnValues, Values
+from anafi_mav.drone.values import VALUES, OnValues, Values
 from anafi_mav.drone.video.route import Direct, Mux, VideoRoute
 from anafi_mav.drone.video.stream_choice import StreamChoice
 from anafi_mav.drone.video.video import Video
@@ -189,10 +189,10 @@ class Drone:
             drone_manager.ConnectionState: self._controller_says,
             device_manager.State: self._controller_says,
         }
-        self._subscriptions: tuple[tuple[Callback, frozenset[type[Message]] | None], ...] = ()
-        """Each callback with the kinds of messages that it is called with; None: all."""
-        self._callbacks: dict[type[Message], tuple[Callback, ...]] = {}
-        """Those of each kind that was received since the subscriptions changed."""
+        self._subscriptions: tuple[tuple[Callback, frozenset[type[Message]]], ...] = ()
+        """Each callback with the kinds of messages that it is not called with."""
+        self._wanted: frozenset[type[Message]] = frozenset()
+        """Events of values that a callback is called with."""
         self._on_values: tuple[OnValues, ...] = ()
 
         self._session: ControllerSession | None = None
@@ -707,22 +707,24 @@ class Drone:
         """Return `blockers` in words."""
         return [str(blocker) for blocker in self.blockers()]
 
-    def subscribe(self, callback: Callback, kinds: Iterable[type[Message]] | None = None) -> Callable[[], None]:
-        """Call `callback(message, time)` with every message, or with those of some kinds.
+    def subscribe(self, callback: Callback, *, without: Collection[type[Message]] = frozenset()) -> Callable[[], None]:
+        """Call `callback(message, time)` with every message, after the states are updated.
 
-        The states are updated before. Returns the function that ends it. `time` is the event loop's. Messages during
-        `connect` are included. What the callback raises is logged. Each message is decoded for it: for kinds that are
-        sent many times a second and read seldom see `subscribe_values`.
+        Returns the function that ends it. `time` is the event loop's. Messages during `connect` are included. What the
+        callback raises is logged. It is not called with messages of the kinds `without`: events of values are decoded
+        for it, which `subscribe_values` avoids.
         """
-        subscription = callback, None if kinds is None else frozenset(kinds)
-        self._subscriptions = (*self._subscriptions, subscription)
-        self._callbacks = {}
+        subscription = callback, frozenset(without)
+        self._set_subscriptions((*self._subscriptions, subscription))
 
         def undo() -> None:
-            self._subscriptions = tuple(other for other in self._subscriptions if other is not subscription)
-            self._callbacks = {}
+            self._set_subscriptions(tuple(other for other in self._subscriptions if other is not subscription))
 
         return undo
+
+    def _set_subscriptions(self, subscriptions: tuple[tuple[Callback, frozenset[type[Message]]], ...]) -> None:
+        self._subscriptions = subscriptions
+        self._wanted = frozenset[type[Message]]().union(*(VALUES - without for _, without in subscriptions))
 
     def subscribe_values(self, callback: OnValues) -> Callable[[], None]:
         """Call `callback(values, time)` with the events of values, which arrive often.
@@ -822,17 +824,13 @@ class Drone:
         Events of values wait undecoded in their elements, unless their messages are wanted.
         """
         values: dict[type[Message], PackedMessage] = {}
-        waiting, callbacks = self._commander.waiting, self._callbacks
-        routes, elements = self._routes, self._elements
+        waiting, routes, elements = self._commander.waiting, self._routes, self._elements
         is_logged = message_log.isEnabledFor(logging.DEBUG)
         for message in messages:
             # Not by isinstance, which takes as long for these classes as a reducer.
             if type(message) is PackedMessage:
                 kind = message.kind
-                wanted = callbacks.get(kind)
-                if wanted is None:
-                    wanted = self._callbacks_of(kind)
-                is_wanted = bool(wanted) or is_logged or kind in waiting
+                is_wanted = kind in self._wanted or kind in waiting or is_logged
                 if values and (is_wanted or kind in values):
                     self._report(values, now)
                     values = {}
@@ -853,7 +851,6 @@ class Drone:
                 self._handle(unpacked, now)
             except Exception as error:
                 session.report(error, unpacked)
-            callbacks = self._callbacks
         if values:
             self._report(values, now)
 
@@ -863,11 +860,6 @@ class Drone:
                 callback(values, now)
             except Exception:
                 log.exception("%s: a subscriber failed on %s", self.name, ", ".join(kind.NAME for kind in values))
-
-    def _callbacks_of(self, kind: type[Message]) -> tuple[Callback, ...]:
-        found = tuple(callback for callback, kinds in self._subscriptions if kinds is None or kind in kinds)
-        self._callbacks[kind] = found
-        return found
 
     def _handle(self, message: Message | UnknownMessage, now: float) -> None:
         """Update the states by a message, then call what waits for it."""
@@ -886,8 +878,9 @@ class Drone:
         if waiting := self._commander.waiting.get(kind):
             for expectation in tuple(waiting):
                 expectation.offer(message)
-        wanted = self._callbacks.get(kind)
-        for callback in self._callbacks_of(kind) if wanted is None else wanted:
+        for callback, without in self._subscriptions:
+            if kind in without:
+                continue
             try:
                 callback(message, now)
             except Exception:

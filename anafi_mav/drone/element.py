@@ -11,7 +11,6 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Callable, Mapping
-from functools import cached_property
 from operator import is_
 from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 
@@ -67,31 +66,32 @@ class Element(Generic[StateT]):
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]]
 
     def __init__(self) -> None:
-        self.state = self.NOTHING
-        self._before: Any = self.NOTHING
-        """The state before the waiting events."""
+        self._state: Any = self.NOTHING
         self._deferred: dict[bytes, PackedMessage] = {}
+        """Events of values that are not part of the state yet, by their keys."""
 
     def reset(self) -> None:
         """Forget everything the drone reported."""
-        self._deferred.clear()
         self.state = self.NOTHING
 
     def defer(self, message: PackedMessage) -> None:
         """Reduce an event of values when the state is read."""
-        if not self._deferred:
-            self._before = self.state
-            del self.state
         self._deferred[message.key] = message
 
-    @cached_property
+    @property
     def state(self) -> StateT:
-        """The last state reported by the drone; evaluated only while events wait."""
-        state: StateT = self._before
-        deferred, self._deferred = self._deferred, {}
-        for message in deferred.values():
-            state = self.REDUCERS[message.kind](state, message.unpack())
-        return state
+        """The last state reported by the drone."""
+        if self._deferred:
+            reducers, state = self.REDUCERS, self._state
+            for message in self._deferred.values():
+                state = reducers[message.kind](state, message.unpack())
+            self.state = state
+        return self._state  # type: ignore[no-any-return]
+
+    @state.setter
+    def state(self, state: StateT) -> None:
+        self._deferred.clear()
+        self._state = state
 
     @property
     def settled(self) -> StateT:
@@ -99,7 +99,7 @@ class Element(Generic[StateT]):
 
         Nothing is decoded.
         """
-        return self._before if self._deferred else self.state
+        return self._state  # type: ignore[no-any-return]
 
 
 class StateWatch:

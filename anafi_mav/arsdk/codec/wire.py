@@ -153,7 +153,7 @@ class PackedMessage(msgspec.Struct, frozen=True, gc=False):
 
     def unpack(self) -> Any:
         """Return the message, of class `kind`."""
-        return _CODECS[self.data[: HEADER.size]].decode(self.data)
+        return _CODECS[self.data[:4]].decode(self.data)
 
 
 Received: TypeAlias = Message | UnknownMessage | PackedMessage
@@ -393,14 +393,14 @@ def decode(data: bytes) -> Message | UnknownMessage | None:
 
 def receive(data: bytes) -> Received | None:
     """As `decode`, but leave events of values packed."""
-    header = data[: HEADER.size]
+    header = data[:4]
     known = _VALUES.get(header)
     if known is None:
         return decode(data)
     kind, size, has_number = known
     if len(data) < size:
         return None
-    return PackedMessage(kind, data[: HEADER.size + 1] if has_number else header, data)
+    return PackedMessage(kind, data[:5] if has_number else header, data)
 
 
 def unpacked(received: Received) -> Message | UnknownMessage:

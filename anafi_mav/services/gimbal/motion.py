@@ -16,6 +16,8 @@ from typing import TypeAlias, TypedDict
 from anafi_mav import texts
 from anafi_mav.drone import Aim, GimbalAttitude, GimbalState
 from anafi_mav.drone.events import Axis, FrameOfReference, GimbalCalibrationState
+from anafi_mav.drone.payload.gimbal import main_frames
+from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError, LinkLost
 from anafi_mav.services.gimbal import targets
 from anafi_mav.services.gimbal.control import ClientId, Heartbeats
@@ -91,6 +93,8 @@ class GimbalMotion:
         """Zero rates of these that are still to be sent."""
         self._seen: GimbalAttitude | None = None
         """While some axes are to stand, the attitude reported last."""
+        self._frames = b""
+        """The frames of reference reported last, as on the wire."""
         self._repeat: tuple[Mapping[Axis, Aim], int, float] | None = None
         """Angles of a message, how often they are to be sent again, and when next."""
         self._was_turning = False
@@ -105,6 +109,11 @@ class GimbalMotion:
     def is_calibrating(self) -> bool:
         """True while the drone calibrates the gimbal and ignores targets."""
         return self._gimbal.calibration == GimbalCalibrationState.IN_PROGRESS
+
+    @property
+    def is_active(self) -> bool:
+        """True while `tick` may have something to send or to end."""
+        return self._rates.turns or self._zeros > 0 or bool(self._still) or self._repeat is not None
 
     @property
     def _gimbal(self) -> GimbalState:
@@ -355,6 +364,7 @@ class GimbalMotion:
             for _ in range(STOPS if rates else 0):  # the gateway ends, and the drone is still connected
                 self._turn({axis: Aim(0.0, aim.frame) for axis, aim in rates.items()})
         self._command = self._halt = self._repeat = self._waiting = self._seen = self._client = None
+        self._frames = b""
         self._zeros, self._still_zeros, self._still = 0, 0, frozenset()
         self.is_neutral = self._is_stopping = False
 
@@ -368,15 +378,24 @@ class GimbalMotion:
         with contextlib.suppress(AnafiMavError):
             self._send_again(now)
 
-    def watch_attitude(self) -> None:
+    def watch_attitude(self, values: Values) -> bool:
         """Notice a gimbal that leaves the reference orientation, and an axis that turns on.
 
-        To an axis that is to stand further zero rates are sent: earlier ones may be lost.
+        To an axis that is to stand further zero rates are sent: earlier ones may be lost. Returns True when flags of
+        the gimbal may have changed. The attitude is decoded only where its angles matter.
         """
-        if self.is_neutral and self._has_left_reference():
+        frames = main_frames(values)
+        if frames is None:
+            return False
+        before, self._frames = self._frames, frames
+        has_left = self.is_neutral and self._has_left_reference()
+        if has_left:
             self.is_neutral, self._reference = False, None
-        if not self._still:
-            return  # an attitude is decoded when it is read
+        if self._still:
+            self._watch_still()
+        return has_left or frames != before
+
+    def _watch_still(self) -> None:
         last, attitude = self._seen, self._gimbal.attitude
         self._seen = attitude
         if last is None or attitude is None:

@@ -429,6 +429,8 @@ class MissionFlight(PlainTask):
                 self._handle(self.machine.halted(stopped=stopped, report=self._report(), now=self._now))
 
     def _on_position(self, values: Values, now: float) -> None:
+        if self.machine.state is not State.ENDING:
+            return
         for kind in values:
             if kind in PROOF and self.machine.state is State.ENDING:
                 self._handle(self.machine.reported(self._report(), kind))

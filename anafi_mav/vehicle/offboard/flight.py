@@ -488,7 +488,9 @@ class OffboardFlight(PlainTask):
         self.after_takeoff()
 
     def _on_motion(self, values: Values, now: float) -> None:
-        self._unread.update((kind, now) for kind in values if kind in MOTION)
+        for kind in values:
+            if kind in MOTION:
+                self._unread[kind] = now
         if self._are_motors_off and self._stream.engagement is None:
             return  # the motion of a drone that stands is read when it is needed
         self._read_motion()
