@@ -8,9 +8,15 @@ unchanged.
 from __future__ import annotations
 
 import asyncio
+import math
 import time
-from collections.abc import Callable
-from typing import Protocol
+from collections.abc import Callable, Iterable, Sequence
+from typing import Generic, Protocol, TypeVar
+
+KeyT = TypeVar("KeyT")
+
+NEVER = math.inf
+"""Due time of what is not due by itself."""
 
 
 class Clock(Protocol):
@@ -71,3 +77,35 @@ class Alarm:
     def _fire(self) -> None:
         self._handle = self.at = None
         self._call()
+
+
+class Schedule(Generic[KeyT]):
+    """When each of several keys is due; all of them can be brought forward together. No clock."""
+
+    __slots__ = ("_all_at", "_due", "_keys", "next")
+
+    def __init__(self, keys: Iterable[KeyT]) -> None:
+        self._keys: Sequence[KeyT] = tuple(keys)
+        self._due = dict.fromkeys(self._keys, NEVER)
+        self._all_at = NEVER
+        self.next = NEVER
+        """When the first of them is due (s)."""
+
+    def bring_forward(self, at: float) -> bool:
+        """Make every key due at this time (s) at the latest; return True if `next` changes."""
+        self._all_at = min(self._all_at, at)
+        if at >= self.next:
+            return False
+        self.next = at
+        return True
+
+    def run(self, now: float, call: Callable[[KeyT], float]) -> None:
+        """Call `call` for each due key, in sequence; it returns when the key is due again (s)."""
+        keys = self._keys
+        if now >= self._all_at:
+            self._all_at = NEVER
+        else:
+            keys = [key for key, at in self._due.items() if now >= at]
+        for key in keys:
+            self._due[key] = call(key)
+        self.next = min(self._all_at, min(self._due.values(), default=NEVER))

@@ -660,8 +660,10 @@ class Gateway:
         return sentences
 
     def _on_channel(self, channel: Channel, opened: bool) -> None:
-        if not opened:
-            for supervised in self._supervised:
+        for supervised in self._supervised:
+            if opened:
+                supervised.system.channel_opened()
+            else:
                 supervised.system.channel_closed(channel)
 
 

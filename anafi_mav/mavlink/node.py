@@ -103,7 +103,7 @@ class Node:
         of schemes that this room has none for.
         """
         self.on_channel = on_channel
-        """Called with True when a channel opened and with False when it closed."""
+        """Called with True when a channel opened, or its peer has proved its address, and with False when it closed."""
         self.channels: list[Channel] = []
         """The channels that are open now. A new list whenever they change: safe to iterate over while sending."""
         self.endpoints: list[Endpoint] = []
@@ -240,6 +240,11 @@ class Node:
         """Return how late the event loop ran its timers within the last minute, s."""
         return [] if self._stalls is None else list(self._stalls.delays)
 
+    @property
+    def stalled(self) -> float:
+        """How long the host stalled since the start, s."""
+        return 0.0 if self._stalls is None else self._stalls.stalled
+
     def closed_counters(self, url: str) -> Counter[str]:
         """Return what the closed channels of an endpoint have counted."""
         return self._closed[url]
@@ -267,6 +272,8 @@ class Node:
     def proved(self, channel: Channel) -> None:
         logger.info("%s: proved its address", channel.name)
         self.channels = [*self.channels]
+        if self.on_channel is not None:
+            self._guarded(self.on_channel, channel, True)
 
     def closed(self, channel: Channel) -> None:
         _log_change("closed", channel)

@@ -35,6 +35,8 @@ class StallWatch:
         self._drained = self._beaten
         self._stalled_since = self._beaten
         """Time of the last beat before the newest stall."""
+        self._stalled = 0.0
+        """s of all stalls that are over."""
         self.delays: deque[float] = deque(maxlen=KEPT)
         """How late the last beats were, s."""
         self._timer: asyncio.TimerHandle | None = None
@@ -68,6 +70,12 @@ class StallWatch:
             return now - self._beaten
         return now - self._stalled_since if now < self._drained else 0.0
 
+    @property
+    def stalled(self) -> float:
+        """How long the host stalled since the start, s, with a stall that no beat has ended yet."""
+        gap = self._loop.time() - self._beaten
+        return self._stalled + gap if self._timer is not None and gap >= STALL else self._stalled
+
     def _beat(self) -> None:
         now = self._loop.time()
         before, late = self._beaten, now - self._beaten
@@ -76,4 +84,5 @@ class StallWatch:
         self._timer = self._loop.call_later(BEAT, self._beat)
         if late >= STALL:
             self._stalled_since, self._drained = before, now + DRAIN
+            self._stalled += late
             self._on_stall(late)

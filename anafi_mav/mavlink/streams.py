@@ -159,6 +159,14 @@ class Streams(Generic[ChannelT]):
         group.until = soonest
         return found
 
+    def next_on(self, channels: Sequence[ChannelT], ids: tuple[int, ...]) -> float:
+        """Return when the first of these messages may leave next (s); inf when none is streamed.
+
+        About their list see `due_on`.
+        """
+        audience = self._audience(channels)
+        return (audience.groups.get(ids) or self._new_group(audience, ids)).until
+
     def is_streamed(self, channels: Sequence[ChannelT], id: int) -> bool:
         """Return True if a message is streamed on one of these channels.
 

@@ -111,6 +111,9 @@ class ComponentSystem(Protocol):
     def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """Run in the background; cancelled when the drone's link goes down."""
 
+    def look_soon(self) -> None:
+        """Have the services tick soon."""
+
     def times(self, at: float | None = None, pose: VehiclePose = UNKNOWN_POSE) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
 
@@ -144,6 +147,7 @@ class Component:
         self.use_input = system.use_input
         self.send_heartbeat = system.send_heartbeat
         self.spawn = system.spawn
+        self.look_soon = system.look_soon
         self.times = system.times
         self.set_muted = system.set_muted
         self.commands = CommandService(self, system.running)
@@ -250,6 +254,8 @@ class Component:
         handler = self._handlers.get(id)
         if handler is None:
             return
+        if id != dialect.MAVLINK_MSG_ID_HEARTBEAT:
+            self.look_soon()
         try:
             if getattr(message, "target_system", 0) == self.sysid:
                 for service in self._receiving:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Coroutine, Hashable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
-from anafi_mav.clock import Clock
+from anafi_mav.clock import NEVER, Clock
 from anafi_mav.drone import Drone
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
@@ -32,6 +32,9 @@ from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.failsafe_settings import FailsafeLimits
 from anafi_mav.vehicle.vehicle import Vehicle
+
+LOOK_EVERY = 0.1
+"""s between two looks of the services at what may have changed."""
 
 MessageHandler = Callable[[Inbound], None]
 """Takes a message that is addressed to our autopilot, or to everybody."""
@@ -151,6 +154,9 @@ class Host(Protocol):
     @property
     def replaced_by_order(self) -> bool:
         """True in an action that a newer order of a client has ended."""
+
+    def look_soon(self) -> None:
+        """Have the services tick within `LOOK_EVERY`."""
 
     def times(self, at: float | None = None, pose: VehiclePose = UNKNOWN_POSE) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
@@ -282,8 +288,17 @@ class Service:
     def state_changed(self) -> None:
         """Handle a change of mode, armed state, health, flying state or another awaited state."""
 
-    def tick(self, now: float) -> None:
-        """About ten times a second while the link is up."""
+    def tick(self, now: float) -> float:
+        """Do what is due, while the link is up; return when more is due by itself (s), or `NEVER`.
+
+        Called at that time, once a second, and within `LOOK_EVERY` after whatever it may depend on: a message of a
+        client, an event of the drone that is not one of `SAMPLES`, a change of the vehicle, the end of a task that the
+        host has spawned, and `Host.look_soon`.
+        """
+        return NEVER
+
+    def host_stalled(self, seconds: float) -> None:
+        """Leave out a time in which no message could be read: it is no silence of a client."""
 
     def channel_closed(self, channel: Channel) -> None:
         """A client's channel is gone."""

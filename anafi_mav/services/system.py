@@ -16,9 +16,10 @@ from pathlib import Path
 from typing import Any
 
 from anafi_mav import texts
-from anafi_mav.clock import Alarm, Clock
-from anafi_mav.drone import Drone
+from anafi_mav.clock import NEVER, Alarm, Clock, Schedule
+from anafi_mav.drone import Drone, events
 from anafi_mav.drone.events import Message
+from anafi_mav.drone.payload.camera import Camera
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.access import COMMANDS
 from anafi_mav.mavlink.channel import Channel
@@ -69,7 +70,7 @@ from anafi_mav.services.plan.mission_service import MissionService
 from anafi_mav.services.plan.plan_service import PlanService
 from anafi_mav.services.plan.rally_service import RallyService
 from anafi_mav.services.pose import UNKNOWN_POSE, VehiclePose, reported_pose
-from anafi_mav.services.service import Service, channel_of
+from anafi_mav.services.service import LOOK_EVERY, Service, channel_of
 from anafi_mav.services.setpoint.follow_service import FollowService
 from anafi_mav.services.setpoint.manual_control_service import ManualControlService
 from anafi_mav.services.setpoint.offboard_service import OffboardService
@@ -158,8 +159,20 @@ MISSION_OVER = 0.25
 """s after the end of a mission before a heartbeat says Hold. A return or landing that follows by itself, at the end of
 the plan or for a low battery, is reported by then, and stations announce one change of mode instead of two."""
 
-LOOK_EVERY = 0.1
-"""s between looks at the other periodic messages; none of them is wanted more often."""
+SAMPLES: frozenset[type[Message]] = frozenset(
+    {
+        events.AltitudeAboveGroundChanged,
+        events.AltitudeChanged,
+        events.AttitudeChanged,
+        events.GimbalAttitudeChanged,
+        events.SpeedChanged,
+        *Camera.SAMPLES,
+    }
+)
+"""Events that a drone sends many times a second. What follows from one is done by its handlers."""
+
+SHORTEST = 0.001
+"""s between two ticks of a service, however often it wants to be called."""
 
 DESCENT_WAIT = 1.5
 """s that a landing or return may take to be confirmed when the gateway ends: it is not withdrawn."""
@@ -214,9 +227,11 @@ class System:
         self._texts = TextNumbers()
         self._undo: Callable[[], None] | None = None
         self._ticker = Alarm(self._tick)
+        self._stalled = 0.0
+        """How long the host had stalled at the last tick, s."""
         self._tasks: set[asyncio.Task[None]] = set()
         self._last_state: tuple[FlightMode, bool, Health, Landed] | None = None
-        self._next_heartbeat = self._next_look = 0.0
+        self._next_heartbeat = 0.0
         self._mission_over = Alarm(self._show_mode)
         """Runs while heartbeats still say Mission."""
         self._warned_at: dict[str, float] = {}
@@ -250,7 +265,7 @@ class System:
         for service in self._autopilot.services:
             if isinstance(service, PlanService):
                 service.take_tables(joined(service.item_commands() for service in self._autopilot.services))
-        self._ticking = [service for service in self.services if type(service).tick is not Service.tick]
+        self._schedule = Schedule(service for service in self.services if type(service).tick is not Service.tick)
         self._on_change = [
             service for service in self.services if type(service).state_changed is not Service.state_changed
         ]
@@ -297,9 +312,10 @@ class System:
             service.link_up()
         self._subscribed = in_order(self.subscriptions())
         self._changed()
-        self._next_look = self.clock.monotonic()
-        self._next_heartbeat = self._next_look + HEARTBEAT_EVERY
-        asyncio.get_running_loop().call_soon(self._tick)
+        now, self._stalled = self.clock.monotonic(), self._node.stalled
+        self._next_heartbeat = now + HEARTBEAT_EVERY
+        self._schedule.bring_forward(now)
+        self._ticker.set(now)
 
     async def settle(self) -> None:
         """End the commands that wait for the drone: the link is lost, but the system still exists."""
@@ -366,6 +382,7 @@ class System:
         else:
             self._muted.discard(channel)
         self._addressed = ([], [])
+        self.look_soon()
 
     def stop_of(self, inbound: Inbound) -> Effect | None:
         """Return the effect of a message that stops the flight; None for any other."""
@@ -449,8 +466,17 @@ class System:
         """Run in the background; cancelled when the drone's link goes down."""
         task = asyncio.get_running_loop().create_task(work)
         self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        task.add_done_callback(self._done)
         return task
+
+    def _done(self, task: asyncio.Task[None]) -> None:
+        self._tasks.discard(task)
+        self.look_soon()
+
+    def look_soon(self) -> None:
+        """Have the services tick within `LOOK_EVERY`: something has happened."""
+        if self.active and self._schedule.bring_forward(self.clock.monotonic() + LOOK_EVERY):
+            self._set_ticker()
 
     def times(self, at: float | None = None, pose: VehiclePose = UNKNOWN_POSE) -> Times:
         """A moment of the monotonic clock (None: now) in the clock of this system's messages."""
@@ -503,22 +529,43 @@ class System:
             if now >= self._next_heartbeat:
                 self._next_heartbeat = max(self._next_heartbeat + HEARTBEAT_EVERY, now + HEARTBEAT_EVERY / 2)
                 self._send_heartbeats()
-            if now >= self._next_look:
-                self._next_look = now + LOOK_EVERY
-                for service in self._ticking:
-                    try:
-                        service.tick(now)
-                    except Exception:  # the heartbeat goes on whatever happens to one service
-                        logger.exception("%s: %s failed", self.drone.name, type(service).__name__)
+                self._schedule.bring_forward(now)
+            self._note_stall()
+            self._schedule.run(now, lambda service: self._tick_service(service, now))
         finally:
             if self.active:
-                self._ticker.set(min(self._next_heartbeat, self._next_look))
+                self._set_ticker()
+
+    def _tick_service(self, service: Service, now: float) -> float:
+        if not self.active:  # an earlier one has ended the link
+            return NEVER
+        try:
+            return max(service.tick(now), now + SHORTEST)
+        except Exception:  # the heartbeat goes on whatever happens to one service
+            logger.exception("%s: %s failed", self.drone.name, type(service).__name__)
+            return now + LOOK_EVERY
+
+    def _set_ticker(self) -> None:
+        at = min(self._next_heartbeat, self._schedule.next)
+        if at != self._ticker.at:
+            self._ticker.set(at)
+
+    def _note_stall(self) -> None:
+        """Let the services leave out a stall of the host before they tick."""
+        stalled = self._node.stalled
+        if stalled > self._stalled:
+            seconds, self._stalled = stalled - self._stalled, stalled
+            for service in self.services:
+                service.host_stalled(seconds)
 
     # What the drone reports.
 
     def _on_event(self, message: Message, now: float) -> None:
-        for handler in self._subscribed.get(type(message), ()):
+        kind = type(message)
+        for handler in self._subscribed.get(kind, ()):
             handler(message, now)
+        if kind not in SAMPLES:
+            self.look_soon()
 
     def subscriptions(self) -> Iterator[Subscriptions]:
         """Yield all tables of event handlers, in the sequence in which the handlers are called.
@@ -539,6 +586,7 @@ class System:
         """
         if not self.active:
             return
+        self.look_soon()
         vehicle, last = self.vehicle, self._last_state
         state = (vehicle.mode, vehicle.armed, vehicle.health, vehicle.landed)
         changed = state != last
@@ -615,8 +663,13 @@ class System:
             answer = _answer(inbound, dialect.MAV_RESULT_UNSUPPORTED)
             self._node.send(answer, sysid=self.sysid, compid=message.target_component, to=inbound.channel)
 
+    def channel_opened(self) -> None:
+        """A client's channel is open, or its peer has proved its address."""
+        self.look_soon()
+
     def channel_closed(self, channel: Channel) -> None:
         """A client's channel is gone."""
+        self.look_soon()
         self._muted.discard(channel)
 
         def is_gone(client: Hashable) -> bool:

@@ -11,6 +11,8 @@ import enum
 from collections.abc import Hashable
 from dataclasses import dataclass
 
+from anafi_mav.clock import NEVER
+
 
 class LossAction(enum.IntEnum):
     """Action on the loss of the last ground station; the numbers are those of PX4's NAV_DLL_ACT."""
@@ -78,7 +80,11 @@ class GcsWatch:
 
     def expire(self, now: float, after: float) -> bool:
         """True at the first call after the ground stations have been silent for `after` s."""
-        if self._heard is None or self.lost or now - self._heard < after:
+        if now < self.expires_at(after):
             return False
         self.lost = True
         return True
+
+    def expires_at(self, after: float) -> float:
+        """Return when `expire` becomes true without further heartbeats (s), or `NEVER`."""
+        return NEVER if self._heard is None or self.lost else self._heard + after

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from anafi_mav import texts
-from anafi_mav.clock import Clock
+from anafi_mav.clock import NEVER, Clock
 from anafi_mav.drone import Drone
 from anafi_mav.drone.element import Position
 from anafi_mav.drone.events import (
@@ -217,11 +217,30 @@ class Vehicle(Aircraft):
 
     @property
     def position_is_old(self) -> bool:
+        return self._clock.monotonic() > self._position_expiry
+
+    @property
+    def _position_expiry(self) -> float:
+        """When the newest location becomes old, if no other follows (s).
+
+        `NEVER` on the ground and without a location.
+        """
         gps, facts = self.drone.gps.state, self.link_facts
         if not gps.fixed or gps.location is None or self.flying_state is None or self.on_ground:
-            return False
-        patience = max(POSITION_OLD, LOCATIONS_MISSED * facts.location_every)
-        return self._clock.monotonic() - facts.located_at > patience
+            return NEVER
+        return facts.located_at + max(POSITION_OLD, LOCATIONS_MISSED * facts.location_every)
+
+    def position_expires_at(self, now: float) -> float:
+        """Return when `position_is_old` becomes true by itself (s); `NEVER` when it is."""
+        expiry = self._position_expiry
+        return expiry if now <= expiry else NEVER
+
+    def mode_expires_at(self, now: float) -> float:
+        """Return when `mode` changes by itself (s), or `NEVER`."""
+        if self.link_facts.lands_next is None:
+            return NEVER
+        until = self.link_facts.lands_next[1]
+        return until if now < until else NEVER
 
     @property
     def landed(self) -> Landed:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import math
+import time
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.clock import everybodys
 from support.fault_scenarios import ACCEPTED, REJECTED, RTL, deaf, goto, heard
 from support.mav import Client
 from support.missions import said
@@ -24,6 +26,9 @@ AT_CONNECTION = {
     "user_storage.start_monitoring",
 }
 """Commands of every connection."""
+
+STALLED = 1.5
+"""s that the host stalls: more than a stall begins with."""
 
 DANGERS = (
     "Return at low battery is off (ANF_RTH_AUTO)",
@@ -159,3 +164,17 @@ async def test_return_of_a_station_loss_that_failed_yields_to_a_later_command() 
         assert await goto(w, 200.0, 10.0) == ACCEPTED
         await asyncio.sleep(15.0)
         assert heard(w, "return_to_home") == []
+
+
+async def test_stall_of_the_host_is_no_silence_of_the_ground_station() -> None:
+    async with world() as w:
+        await write(w.client, "ANF_GCS_LOSS", 2, dialect.MAV_PARAM_TYPE_INT32)
+        await write(w.client, "ANF_GCS_LOSS_T", 2.0)
+        w.client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+        mark, sent = w.client.mark(), time.monotonic()
+        await asyncio.sleep(0.3)
+        with everybodys():
+            await asyncio.sleep(0)  # the next callbacks run on the clock of everybody
+            time.sleep(STALLED)  # noqa: ASYNC251
+        await w.client.wait("STATUSTEXT", lambda m: "No ground station" in m.text, since=mark, timeout=10.0)
+        assert time.monotonic() - sent >= 2.0 + STALLED

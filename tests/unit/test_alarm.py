@@ -1,10 +1,10 @@
-"""The one timer: it calls once, at the time that was set last."""
+"""The one timer calls once, at the time that was set last; a schedule knows what is due next."""
 
 from __future__ import annotations
 
 import asyncio
 
-from anafi_mav.clock import Alarm
+from anafi_mav.clock import NEVER, Alarm, Schedule
 
 
 async def test_alarm_calls_once_at_its_time() -> None:
@@ -64,3 +64,53 @@ async def test_alarm_may_be_set_again_by_its_callback() -> None:
     await asyncio.sleep(20.0)
     assert len(times) == 3
     assert alarm.at is None
+
+
+def called(schedule: Schedule[str], now: float, again: dict[str, float]) -> list[str]:
+    """Run a schedule; return the keys that were due. `again`: when each is due next."""
+    keys: list[str] = []
+
+    def call(key: str) -> float:
+        keys.append(key)
+        return again.get(key, NEVER)
+
+    schedule.run(now, call)
+    return keys
+
+
+def test_schedule_calls_each_key_when_it_is_due_again() -> None:
+    schedule = Schedule(["fast", "slow", "idle"])
+    assert schedule.next == NEVER
+    assert schedule.bring_forward(10.0)
+    assert called(schedule, 10.0, {"fast": 11.0, "slow": 15.0}) == ["fast", "slow", "idle"]
+    assert schedule.next == 11.0
+    assert called(schedule, 10.9, {}) == []
+    assert called(schedule, 11.0, {"fast": 12.0}) == ["fast"]
+    assert called(schedule, 15.0, {"fast": 16.0}) == ["fast", "slow"]
+    assert schedule.next == 16.0
+
+
+def test_schedule_brought_forward_calls_all_keys_once() -> None:
+    schedule = Schedule(["one", "other"])
+    schedule.bring_forward(1.0)
+    called(schedule, 1.0, {"one": 5.0})
+    assert schedule.bring_forward(3.0)
+    assert not schedule.bring_forward(4.0)
+    assert schedule.next == 3.0
+    assert called(schedule, 2.9, {}) == []
+    assert called(schedule, 3.0, {"one": 5.0}) == ["one", "other"]
+    assert called(schedule, 4.0, {}) == []
+    assert schedule.next == 5.0
+
+
+def test_schedule_brought_forward_by_a_call_calls_again() -> None:
+    """A look of one key may be the cause of another one's."""
+    schedule = Schedule(["one"])
+    schedule.bring_forward(0.0)
+
+    def call(key: str) -> float:
+        schedule.bring_forward(0.1)
+        return NEVER
+
+    schedule.run(0.0, call)
+    assert schedule.next == 0.1

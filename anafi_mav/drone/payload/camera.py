@@ -86,6 +86,9 @@ class Camera(Commanding[CamerasState]):
     )
     """Events about a recording; `recording_update` reads them."""
 
+    ZOOM_EVENTS: ClassVar[tuple[type[Message], ...]] = (ClassicCamera.zoom_event, ModernCamera.zoom_event)
+    """Events that report the zoom; both have it as `level`."""
+
     @staticmethod
     def photo_update(message: Message) -> CaptureUpdate | None:
         """Return the progress that one of `PHOTO_EVENTS` reports, if any."""
@@ -102,6 +105,9 @@ class Camera(Commanding[CamerasState]):
         {*camera_classic.FREQUENT, *camera_modern.FREQUENT},
     )
     """Events that come several times a second, or with each picture, and report no setting."""
+
+    SAMPLES: ClassVar[frozenset[type[Message]]] = frozenset({*camera_classic.SAMPLES, *camera_modern.SAMPLES})
+    """Those of them that report zoom or exposure, and no progress of a photo or recording."""
 
     @property
     def active_id(self) -> int:

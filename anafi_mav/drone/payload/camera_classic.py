@@ -305,6 +305,8 @@ _STORED = frozenset(
     }
 )
 
+SAMPLES: tuple[type[Message], ...] = (wire.ZoomLevel,)
+
 FREQUENT: tuple[type[Message], ...] = (
     wire.ZoomLevel,
     wire.PhotoProgress,

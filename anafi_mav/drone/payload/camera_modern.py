@@ -315,6 +315,8 @@ REDUCERS: Mapping[type[Message], Reducer] = {
     mains.State: _antiflicker,
 }
 
+SAMPLES: tuple[type[Message], ...] = (wire.ZoomLevel, wire.Exposure)
+
 FREQUENT: tuple[type[Message], ...] = (
     wire.ZoomLevel,
     wire.Exposure,

@@ -8,9 +8,12 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Mapping
+from typing import Any
 
 from anafi_mav import texts
+from anafi_mav.clock import NEVER
 from anafi_mav.drone.element import StateWatch
+from anafi_mav.drone.payload.camera import Camera
 from anafi_mav.drone.payload.camera_enums import CameraMode
 from anafi_mav.drone.video.stream_choice import StreamKind
 from anafi_mav.mavlink import dialect
@@ -23,6 +26,7 @@ from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, 
 from anafi_mav.services.service import Answer, Host, Request, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
 
 ZOOM_SHOWN = 0.5
@@ -43,6 +47,8 @@ class CameraService(Service):
         self._sent_settings: tuple[CameraMode | None, float] | None = None
         """Mode and zoom of the last CAMERA_SETTINGS to all."""
         self._sent_flags: int | None = None
+        self._level: float | None = None
+        """Zoom of the newest event about it."""
         self._camera = StateWatch(host.drone.camera)
         host.definition.subscribe(self._send_information)
 
@@ -89,10 +95,21 @@ class CameraService(Service):
         if message is not None:
             self.host.send(message)
 
-    def tick(self, now: float) -> None:
+    def subscriptions(self) -> Subscriptions:
+        return dict.fromkeys(Camera.ZOOM_EVENTS, self._on_zoom)
+
+    def _on_zoom(self, message: Any, now: float) -> None:
+        if message.level != self._level:
+            self._level = message.level
+            self.host.look_soon()
+
+    def tick(self, now: float) -> float:
         """Send what has changed, by a client or otherwise."""
-        if not self._camera.has_changed():
-            return
+        if self._camera.has_changed():
+            self._send_changed()
+        return NEVER
+
+    def _send_changed(self) -> None:
         mode, zoom = self._settings()
         if self._sent_settings is not None and mode is not None:
             last_mode, last_zoom = self._sent_settings

@@ -12,6 +12,7 @@ import math
 from collections.abc import Awaitable, Callable, Mapping
 
 from anafi_mav import texts
+from anafi_mav.clock import NEVER
 from anafi_mav.drone import events
 from anafi_mav.drone.payload.camera import Camera
 from anafi_mav.drone.payload.camera_enums import CameraMode, PhotoMode
@@ -30,7 +31,7 @@ from anafi_mav.services.camera.camera_targets import (
 from anafi_mav.services.camera.photo_control import PhotoControl
 from anafi_mav.services.camera.photo_reporter import PhotoReporter
 from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect
-from anafi_mav.services.service import Host, Request, Service
+from anafi_mav.services.service import LOOK_EVERY, Host, Request, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
@@ -140,7 +141,7 @@ class CaptureService(Service):
             self._reporter.reset()
             self._send_changed()
 
-    def tick(self, now: float) -> None:
+    def tick(self, now: float) -> float:
         self._reporter.tick(now, is_series=self._photos.is_series)
         if self._recording_since is None:
             self._recording_since = self._found_recording(now)
@@ -153,6 +154,9 @@ class CaptureService(Service):
             elif now >= due:
                 self._rates[channel] = interval, max(due + interval, now)
                 self.host.send(self._message(self.host.vehicle, self.host.times()), channel)
+        if self._reporter.is_saving:
+            return now + LOOK_EVERY
+        return min((due for _, due in self._rates.values()), default=NEVER)
 
     @property
     def _records(self) -> bool:

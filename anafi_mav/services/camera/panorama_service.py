@@ -11,6 +11,7 @@ import math
 from collections.abc import Container, Mapping
 
 from anafi_mav import texts
+from anafi_mav.clock import NEVER
 from anafi_mav.drone.events import AnimationType, FlyingState
 from anafi_mav.drone.payload.camera_enums import CameraMode
 from anafi_mav.errors import AnafiMavError
@@ -60,9 +61,10 @@ class PanoramaService(Service, PlainTask):
             )
         }
 
-    def tick(self, now: float) -> None:
+    def tick(self, now: float) -> float:
         if self.host.vehicle.control.active is self and not self._is_active:
             self.host.vehicle.control.release(self)
+        return NEVER
 
     # Flight task.
 

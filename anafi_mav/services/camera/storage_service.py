@@ -11,6 +11,7 @@ import math
 from collections.abc import Mapping
 
 from anafi_mav import texts
+from anafi_mav.clock import NEVER
 from anafi_mav.drone import events
 from anafi_mav.drone.element import StateWatch
 from anafi_mav.drone.events import FormattingType, FsState, PhyState, StorageFeature
@@ -153,10 +154,13 @@ class StorageService(Service):
             usage,
         )
 
-    def tick(self, now: float) -> None:
+    def tick(self, now: float) -> float:
         """Send what has changed, and the reason why nothing can be stored."""
-        if not self._reported.has_changed():
-            return
+        if self._reported.has_changed():
+            self._send_changed()
+        return NEVER
+
+    def _send_changed(self) -> None:
         count = len(self._ids)
         self._note_storages()
         if len(self._ids) != count:

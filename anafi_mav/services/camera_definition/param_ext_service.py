@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from anafi_mav import texts
+from anafi_mav.clock import NEVER
 from anafi_mav.drone import Camera, Thermal
 from anafi_mav.drone.events import Message
 from anafi_mav.errors import AnafiMavError, NotSupported
@@ -135,7 +136,7 @@ class ParamExtService(Service):
         self._learn_at = min(self._learn_at, now + SETTLE)
         self._report_changes()
 
-    def tick(self, now: float) -> None:
+    def tick(self, now: float) -> float:
         if now >= self._learn_at:
             self._learn()
             self._report_changes()
@@ -143,10 +144,16 @@ class ParamExtService(Service):
             del self._repeats[name]
             if name in self._catalogue.index:
                 self.host.send(self._message(self._catalogue.index[name]))
+        unreported: list[float] = []
         for write in (*([self._current] if self._current else []), *self._waiting):
-            if not write.is_reported and now >= write.since + PROGRESS_AFTER:
+            if write.is_reported:
+                continue
+            if now >= write.since + PROGRESS_AFTER:
                 write.is_reported = True
                 self._acknowledge(write, dialect.PARAM_ACK_IN_PROGRESS)
+            else:
+                unreported.append(write.since + PROGRESS_AFTER)
+        return min(self._learn_at, *self._repeats.values(), *unreported, NEVER)
 
     # The definition.
 

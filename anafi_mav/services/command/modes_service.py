@@ -120,13 +120,15 @@ class ModesService(Service):
             self._sent, times = state, self.host.times()
             self.host.send_by_flavour(lambda flavour: current_mode(vehicle, times.for_flavour(flavour)))
 
-    def tick(self, now: float) -> None:
+    def tick(self, now: float) -> float:
         self._announce()
-        offered = self.host.vehicle.enterable_modes
+        vehicle = self.host.vehicle
+        offered = vehicle.enterable_modes
         if offered != self._offered:
             self._offered = offered
             self._sequence = (self._sequence + 1) % 256
-            self.host.send(self._monitor(self.host.vehicle, self.host.times()))
+            self.host.send(self._monitor(vehicle, self.host.times()))
+        return min(vehicle.position_expires_at(now), vehicle.mode_expires_at(now))
 
     def _monitor(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
         return dialect.MAVLink_available_modes_monitor_message(self._sequence)

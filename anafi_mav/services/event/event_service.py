@@ -105,13 +105,19 @@ class EventService(Service):
         if self._armed and self.host.vehicle.landed is Landed.ON_GROUND:
             self._report_landed()
 
-    def tick(self, now: float) -> None:
+    def tick(self, now: float) -> float:
         self._tell_changes()
-        if now >= self._next_report + (0.0 if self._stale else LOOK_EVERY - PAUSE):
+        if now >= self._report_at:
             self._stale, self._next_report = False, now + PAUSE
             found = report(self.host.vehicle)
             if found != self._report:
                 self._tell(found)
+        return self._report_at
+
+    @property
+    def _report_at(self) -> float:
+        """When the report is due (s)."""
+        return self._next_report + (0.0 if self._stale else LOOK_EVERY - PAUSE)
 
     def _tell(self, found: HealthReport) -> None:
         self._report = found

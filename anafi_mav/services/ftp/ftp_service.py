@@ -10,6 +10,7 @@ import logging
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from functools import partial
 
+from anafi_mav.clock import NEVER
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
@@ -26,9 +27,6 @@ from anafi_mav.services.service import Host, MessageHandler, Request, Service, c
 from anafi_mav.vehicle.base.severity import Severity
 
 logger = logging.getLogger(__name__)
-
-EXPIRE_EVERY = 1.0
-"""s between looks for unused sessions."""
 
 WAIT_TIMEOUT = 60.0
 """s that a request waits for a file. The drone's web server ends a silent read after 10 s, not one that drips."""
@@ -47,7 +45,6 @@ class FtpService(Service):
         super().__init__(host)
         self._server = FtpServer(channel_of)
         self._sender = PacedSender(host)
-        self._next_look = 0.0
         self._files: Mapping[str, ServedFile] = {}
         self._folders: Mapping[str, Folder] = {}
         self._trees: dict[str, FileTree] = {}
@@ -103,10 +100,9 @@ class FtpService(Service):
         self._sender.clear()
         self._server.forget(lambda who: True)  # after a reboot the drone's files may be others
 
-    def tick(self, now: float) -> None:
-        if now >= self._next_look:
-            self._next_look = now + EXPIRE_EVERY
-            self._server.expire(now)
+    def tick(self, now: float) -> float:
+        self._server.expire(now)
+        return NEVER
 
     def channel_closed(self, channel: Channel) -> None:
         self._sender.closed(channel)

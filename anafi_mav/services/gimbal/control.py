@@ -15,6 +15,8 @@ import math
 from collections.abc import Collection, Sequence
 from typing import TypeAlias
 
+from anafi_mav.clock import NEVER
+
 ClientId: TypeAlias = tuple[int, int]
 """MAVLink system and component."""
 
@@ -166,13 +168,23 @@ class GimbalControl:
             return silent
         return None
 
+    @property
+    def expires_at(self) -> float:
+        """When the control of a client ends without further heartbeats (s), or `NEVER`."""
+        if self.state is not State.CLIENT:
+            return NEVER
+        return min(self._silent_at(client) for client in (self.primary, self.secondary) if client != NO_CLIENT)
+
     def add_stall(self, seconds: float) -> None:
         """Leave out a time in which the host could not receive heartbeats."""
         self._since = {client: at + seconds for client, at in self._since.items()}
 
     def _is_silent(self, client: ClientId, now: float) -> bool:
+        return now >= self._silent_at(client)
+
+    def _silent_at(self, client: ClientId) -> float:
         last = self._heartbeats.last(client)
-        return now - max(self._since[client], -math.inf if last is None else last) >= OWNER_SILENCE
+        return max(self._since[client], -math.inf if last is None else last) + OWNER_SILENCE
 
     def _enter(self, event: Event, primary: ClientId, secondary: ClientId) -> None:
         self.state = TRANSITIONS[self.state][event]

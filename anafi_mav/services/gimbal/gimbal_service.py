@@ -18,7 +18,6 @@ from anafi_mav.drone.events import Axis, GimbalAttitudeChanged
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.mavlink.stall import STALL
 from anafi_mav.services.command_targets import height, place
 from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.dropped_inputs import InputStream
@@ -28,7 +27,7 @@ from anafi_mav.services.gimbal.control import NO_CLIENT, Answer, ClientId, Gimba
 from anafi_mav.services.gimbal.motion import GimbalMotion
 from anafi_mav.services.gimbal.roi import RegionOfInterest
 from anafi_mav.services.gimbal.targets import Frames, GimbalTarget
-from anafi_mav.services.service import Host, MessageHandler, Service, client_of
+from anafi_mav.services.service import LOOK_EVERY, Host, MessageHandler, Service, client_of
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.geo_point import GeoPoint
@@ -64,7 +63,6 @@ class GimbalService(Service):
         self._mount_place: tuple[Inbound, GeoPoint, float] | None = None
         """The newest MOUNT_CONTROL that is still to be looked at, its place and height (m above take-off)."""
         self._mount_look: asyncio.Task[None] | None = None
-        self._ticked = math.inf
         self._status: tuple[object, ...] = ()
         """Content of the last GIMBAL_MANAGER_STATUS."""
 
@@ -154,7 +152,6 @@ class GimbalService(Service):
     # The link, clients and time.
 
     def link_up(self) -> None:
-        self._ticked = math.inf
         self._motion.link_up()
         self._roi.link_up()
 
@@ -170,20 +167,24 @@ class GimbalService(Service):
         self._heartbeats.receive((inbound.sysid, inbound.compid), inbound.now, kept)
 
     def subscriptions(self) -> Subscriptions:
-        return {GimbalAttitudeChanged: lambda message, now: self._motion.watch_attitude()}
+        return {GimbalAttitudeChanged: self._on_attitude}
 
-    def tick(self, now: float) -> None:
-        if (
-            gap := now - self._ticked
-        ) >= STALL:  # heartbeats that arrived meanwhile were not read: no silence of theirs
-            self._heartbeats.add_stall(gap)
-            self._control.add_stall(gap)
-            self._motion.add_stall(gap)
-        self._ticked = now
+    def _on_attitude(self, message: GimbalAttitudeChanged, now: float) -> None:
+        if self._motion.watch_attitude():
+            self.host.look_soon()
+
+    def host_stalled(self, seconds: float) -> None:
+        self._heartbeats.add_stall(seconds)
+        self._control.add_stall(seconds)
+        self._motion.add_stall(seconds)
+
+    def tick(self, now: float) -> float:
         self._watch_control(now)
         self._motion.tick(now)
         self._roi.tick(now)
         self._announce()
+        moves = self._motion.is_active or self._roi.follows
+        return now + LOOK_EVERY if moves else self._control.expires_at
 
     def _watch_control(self, now: float) -> None:
         self._watch_mission()

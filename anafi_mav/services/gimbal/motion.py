@@ -107,6 +107,11 @@ class GimbalMotion:
         return self._gimbal.calibration == GimbalCalibrationState.IN_PROGRESS
 
     @property
+    def is_active(self) -> bool:
+        """True while `tick` may have something to send or to end."""
+        return self._rates.turns or self._zeros > 0 or bool(self._still) or self._repeat is not None
+
+    @property
     def _gimbal(self) -> GimbalState:
         return self._host.drone.gimbal.main
 
@@ -367,21 +372,24 @@ class GimbalMotion:
         with contextlib.suppress(AnafiMavError):
             self._send_again(now)
 
-    def watch_attitude(self) -> None:
+    def watch_attitude(self) -> bool:
         """Notice a gimbal that leaves the reference orientation, and an axis that turns on.
 
-        To an axis that is to stand further zero rates are sent: earlier ones may be lost.
+        To an axis that is to stand further zero rates are sent: earlier ones may be lost. Returns True when flags of
+        the gimbal may have changed.
         """
-        if self.is_neutral and self._has_left_reference():
+        has_left = self.is_neutral and self._has_left_reference()
+        if has_left:
             self.is_neutral, self._reference = False, None
         last, attitude = self._seen, self._gimbal.attitude
         self._seen = attitude
         if last is None or attitude is None:
-            return
+            return True
         for axis in self._still:
             frame = attitude.frames[axis]
             if abs(targets.wrap_180(attitude.angle(axis, frame) - last.angle(axis, frame))) > STANDS:
                 self._still_zeros = STOPS
+        return has_left or attitude.frames != last.frames
 
     def _has_left_reference(self) -> bool:
         """True when another controller, or the drone, has moved the gimbal since it was reset."""

@@ -281,6 +281,11 @@ class RegionOfInterest(PlainTask):
         if len(self._systems) > MAX_SYSTEMS:
             del self._systems[next(iter(self._systems))]
 
+    @property
+    def follows(self) -> bool:
+        """True while the region is the place of another system."""
+        return self._region is not None and self._system is not None
+
     def tick(self, now: float) -> None:
         """Look at the new place of the system that is followed."""
         region = self._region

@@ -10,6 +10,7 @@ import logging
 from collections.abc import Hashable, Mapping
 
 from anafi_mav import __version__, texts
+from anafi_mav.clock import NEVER
 from anafi_mav.drone import Drone
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
@@ -102,13 +103,14 @@ class BannerService(Service):
         if last is None or inbound.now - last[0] > GONE:
             self._due.setdefault(inbound.channel, inbound.now + GREET_AFTER)
 
-    def tick(self, now: float) -> None:
+    def tick(self, now: float) -> float:
         if not self._due:
-            return
+            return NEVER
         listening = self.host.channels  # one that pays for each byte is greeted when it takes telemetry again
         for channel in [channel for channel, at in self._due.items() if now >= at and channel in listening]:
             del self._due[channel]
             self._greet(channel)
+        return min((at for channel, at in self._due.items() if channel in listening), default=NEVER)
 
     def _greet(self, channel: Channel) -> None:
         if self.host.drone.controller.present:

@@ -36,14 +36,15 @@ class NodeStatusService(Service):
     def requests(self) -> Mapping[int, Request]:
         return {dialect.MAVLINK_MSG_ID_LINK_NODE_STATUS: self._status}
 
-    def tick(self, now: float) -> None:
+    def tick(self, now: float) -> float:
         if now < self._next_look:
-            return
+            return self._next_look
         self._next_look = now + LOOK_EVERY
         for channel in self.host.channels:
             look = _Look(now, channel.sent_bytes, channel.received_bytes)
             _, before = self._looks.get(channel, (look, look))
             self._looks[channel] = (before, look)
+        return self._next_look
 
     def link_down(self) -> None:
         self._looks.clear()

@@ -11,13 +11,13 @@ import math
 from collections.abc import Mapping, Sequence
 
 from anafi_mav import texts
+from anafi_mav.clock import NEVER
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.access import Access
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.mavlink.stall import STALL
 from anafi_mav.services.commands import Command
-from anafi_mav.services.service import Host, MessageHandler, Query, Service
+from anafi_mav.services.service import LOOK_EVERY, Host, MessageHandler, Query, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
@@ -60,8 +60,6 @@ class OperatorControlService(Service):
         """(channel, system) -> component and time of its newest message; the newest is at the end."""
         self._shown: tuple[object, ...] = ()
         """Content of the last CONTROL_STATUS that announced a change."""
-        self._ticked = math.inf
-        """Time of the last check; infinite before the first one of a connection."""
 
     def queries(self) -> Mapping[int, Query]:
         return {dialect.MAV_CMD_REQUEST_OPERATOR_CONTROL: self._receive}
@@ -77,7 +75,6 @@ class OperatorControlService(Service):
         }
 
     def link_up(self) -> None:
-        self._ticked = math.inf
         self._control.restart(self.host.clock.monotonic())
 
     def channel_closed(self, channel: Channel) -> None:
@@ -193,12 +190,13 @@ class OperatorControlService(Service):
 
     # Time.
 
-    def tick(self, now: float) -> None:
-        if (gap := now - self._ticked) >= STALL:
-            self._control.skip(gap)  # what arrived meanwhile was not read: no silence of theirs
-        self._ticked = now
+    def host_stalled(self, seconds: float) -> None:
+        self._control.skip(seconds)
+
+    def tick(self, now: float) -> float:
         self._tick_control(now)
         self._show()
+        return NEVER if self._control.is_free else now + LOOK_EVERY
 
     def _tick_control(self, now: float) -> None:
         operator = self._control.operator

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from anafi_mav import texts
+from anafi_mav.clock import NEVER
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.mavlink.stall import STALL
 from anafi_mav.services.service import Host, Service
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import reason_of
@@ -38,19 +37,16 @@ class LinkLossService(Service):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._watch = GcsWatch()
-        self._ticked = math.inf
-        """Time of the last check; infinite before the first one of a connection."""
         self._later: LaterAction | None = None
 
     def link_up(self) -> None:
         self._watch.restart(self.host.clock.monotonic())
-        self._ticked = math.inf
         self._later = None
 
-    def tick(self, now: float) -> None:
-        if (gap := now - self._ticked) >= STALL:
-            self._watch.stalled(gap)  # what arrived meanwhile was not read: no silence of theirs
-        self._ticked = now
+    def host_stalled(self, seconds: float) -> None:
+        self._watch.stalled(seconds)
+
+    def tick(self, now: float) -> float:
         policy = self.host.vehicle.gcs_loss
         if policy.action is not LossAction.NOTHING and self._watch.expire(now, policy.after):
             self._lost(policy.after)
@@ -62,6 +58,8 @@ class LinkLossService(Service):
                     self._later = later._replace(at=now + RETRY)
                 else:
                     self._lost(policy.after)
+        later_at = NEVER if self._later is None else self._later.at
+        return later_at if policy.action is LossAction.NOTHING else min(later_at, self._watch.expires_at(policy.after))
 
     def heartbeat(self, inbound: Inbound) -> None:
         if inbound.message.type == dialect.MAV_TYPE_GCS and self._watch.heard(inbound.now, inbound.channel):

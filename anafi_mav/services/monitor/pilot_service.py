@@ -6,6 +6,7 @@ A pilot who acquires control ends the actions of clients.
 from __future__ import annotations
 
 from anafi_mav import texts
+from anafi_mav.clock import NEVER
 from anafi_mav.services.service import Host, Service
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.flight_policy import State
@@ -26,7 +27,7 @@ class PilotService(Service):
         self._takeovers = host.drone.controller.takeovers
         self._switched = host.vehicle.pilot_switch.state
 
-    def tick(self, now: float) -> None:
+    def tick(self, now: float) -> float:
         controller, switched = self.host.drone.controller, self.host.vehicle.pilot_switch.state
         if controller.takeovers != self._takeovers:
             self._takeovers = controller.takeovers
@@ -34,3 +35,4 @@ class PilotService(Service):
         if switched is not self._switched:
             self._switched = switched
             self.host.text(Severity.NOTICE, SWITCHED[switched])
+        return NEVER

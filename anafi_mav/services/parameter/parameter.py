@@ -47,7 +47,7 @@ class Parameter:
     updates: tuple[type[Message], ...] = ()
     """The drone's events that may change it."""
     polled: bool = False
-    """A setting of the gateway's that others may change, too: looked at ten times a second."""
+    """A setting of the gateway's that others may change, too: looked at with each tick."""
     present: Callable[[Drone], bool] = lambda drone: True
     """Does this drone have it? Asked once, when it first connects."""
     unit: str = ""

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from anafi_mav import texts
+from anafi_mav.clock import NEVER
 from anafi_mav.drone.events import Message
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
@@ -272,9 +273,10 @@ class ParameterService(Service):
         for name, listed in self._lists.items():
             self._tell(name, listed.changed(listed.table.updated_by.get(type(message), ())))
 
-    def tick(self, now: float) -> None:
+    def tick(self, now: float) -> float:
         if not self._storing.locked() and self._own_values() != self._seen:
             self.host.spawn(self._settle())
+        return NEVER
 
     # What outlives the gateway.
 

@@ -102,12 +102,13 @@ class FenceService(Service):
         if now - self._looked >= LOOK_SOONEST:
             self._look(self.host.clock.monotonic())
 
-    def tick(self, now: float) -> None:
-        if now - self._looked >= LOOK_EVERY:
+    def tick(self, now: float) -> float:
+        if now >= self._looked + LOOK_EVERY:
             self._look(now)
-        if now - self._mirrored >= MIRROR_EVERY:
+        if now >= self._mirrored + MIRROR_EVERY:
             self._mirrored = now
             self._mirror.update(now)
+        return min(self._looked + LOOK_EVERY, self._mirrored + MIRROR_EVERY)
 
     # Watching.
 

@@ -12,6 +12,7 @@ from collections.abc import Coroutine, Hashable, Mapping
 from typing import Any
 
 from anafi_mav import texts
+from anafi_mav.clock import NEVER
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
@@ -97,10 +98,11 @@ class MissionService(Service):
         self._flight.on_vehicle()
         self.mission_changed()
 
-    def tick(self, now: float) -> None:
-        if self._unsaved and now - self._saved >= SAVE_EVERY:
+    def tick(self, now: float) -> float:
+        if self._unsaved and now >= self._saved + SAVE_EVERY:
             self._unsaved, self._saved = False, now
             self.host.spawn(self._save())
+        return self._saved + SAVE_EVERY if self._unsaved else NEVER
 
     # Orders.
 

@@ -60,10 +60,13 @@ class RallyService(Service):
         self._rejected.clear()
         self._looked = -math.inf
 
-    def tick(self, now: float) -> None:
-        if now - self._looked < LOOK_EVERY:
-            return
-        self._looked = now
+    def tick(self, now: float) -> float:
+        if now >= self._looked + LOOK_EVERY:
+            self._looked = now
+            self._look(now)
+        return self._looked + LOOK_EVERY
+
+    def _look(self, now: float) -> None:
         if self._task is not None and not self._task.done():
             return
         vehicle = self.host.vehicle

@@ -11,6 +11,7 @@ import math
 from collections.abc import Mapping
 
 from anafi_mav import units
+from anafi_mav.clock import NEVER
 from anafi_mav.drone import events
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
@@ -136,15 +137,15 @@ class HighLatencyService(Service):
         if self._next and math.isfinite(message.speedZ):
             self._climb = max(self._climb, abs(message.speedZ))
 
-    def tick(self, now: float) -> None:
+    def tick(self, now: float) -> float:
         due = [channel for channel, at in self._next.items() if now >= at]
-        if not due:
-            return
         for channel in due:
             self._next[channel] = now + EVERY
-        times, vehicle = self.host.times(), self.host.vehicle
-        self.host.send_by_flavour(lambda flavour: self._build(vehicle, times.for_flavour(flavour)), due)
-        self._climb = 0.0
+        if due:
+            times, vehicle = self.host.times(), self.host.vehicle
+            self.host.send_by_flavour(lambda flavour: self._build(vehicle, times.for_flavour(flavour)), due)
+            self._climb = 0.0
+        return min(self._next.values(), default=NEVER)
 
     def channel_closed(self, channel: Channel) -> None:
         self._next.pop(channel, None)

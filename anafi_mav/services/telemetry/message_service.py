@@ -205,10 +205,12 @@ class MessageService(Service):
             self._without.discard(id)
             self._held[id] = self._stamped.get(id, -math.inf)
 
-    def tick(self, now: float) -> None:
+    def tick(self, now: float) -> float:
         self._tracker.pass_time(now)
-        for id, due in self._intervals.due_on(self.host.channels, self._repeated, now):
+        channels = self.host.channels
+        for id, due in self._intervals.due_on(channels, self._repeated, now):
             self._leave(id, due, self._times(id))
+        return max(now + REPEATED, self._intervals.next_on(channels, self._repeated))
 
     def state_changed(self) -> None:
         """They leave at once."""

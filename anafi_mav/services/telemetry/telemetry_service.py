@@ -46,7 +46,7 @@ class TelemetryService(Service):
     def link_down(self) -> None:
         self._position_is_old = False
 
-    def tick(self, now: float) -> None:
+    def tick(self, now: float) -> float:
         """Send a text when positions stop, and when they continue.
 
         Without positions a station keeps showing the last one.
@@ -58,6 +58,7 @@ class TelemetryService(Service):
                 self.host.text(Severity.WARNING, texts.POSITION_LOST.fill(seconds=POSITION_OLD))
             else:
                 self.host.text(Severity.NOTICE, texts.POSITION_FOUND)
+        return self.host.vehicle.position_expires_at(now)
 
     def streams(self) -> Mapping[int, MessageStream]:
         return {

@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 from anafi_mav import texts, units
+from anafi_mav.clock import NEVER
 from anafi_mav.drone import events
 from anafi_mav.drone.payload.camera import Camera
 from anafi_mav.drone.status.link import Link, LinkState
@@ -173,7 +174,7 @@ class VideoTelemetryService(Service):
         self._altitudes.clear()
         self._heights.clear()
 
-    def tick(self, now: float) -> None:
+    def tick(self, now: float) -> float:
         wanted = self.host.needs_video or self.host.needs_pictures
         if self._watch is not None and (self._watch.done() or not wanted):
             self._watch.cancel()
@@ -183,6 +184,7 @@ class VideoTelemetryService(Service):
         if wanted and self._watch is None and now >= self._retry_at:
             self._retry_at = now + RETRY
             self._watch = self.host.spawn(self._stay())
+        return self._retry_at if wanted and self._watch is None else NEVER
 
     async def _stay(self) -> None:
         try:

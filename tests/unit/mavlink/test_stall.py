@@ -20,6 +20,7 @@ async def test_stall_marks_data_old_until_sockets_are_drained() -> None:
         time.sleep(1.2 * STALL)  # noqa: ASYNC251
         assert watch.old  # before any timer has run
         assert watch.waited >= 1.2 * STALL
+        assert watch.stalled >= 1.2 * STALL
         assert stalls == []
         await asyncio.sleep(0.1)  # a beat
         assert watch.waited >= 1.2 * STALL  # what arrived during the stall may still be in a socket
@@ -27,6 +28,7 @@ async def test_stall_marks_data_old_until_sockets_are_drained() -> None:
             await asyncio.sleep(0.05)
         assert watch.waited == 0.0
         assert stalls[0] >= STALL
+        assert watch.stalled == stalls[0]
     watch.stop()
 
 
