@@ -29,7 +29,7 @@ from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.services.system_position import PositionOf
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
 from anafi_mav.vehicle.failsafe_settings import FailsafeLimits
 from anafi_mav.vehicle.vehicle import Vehicle
 
@@ -272,6 +272,13 @@ class Service:
         """Return the handlers of the drone's events, by kind.
 
         Read once per connection, after `link_up`.
+        """
+        return {}
+
+    def value_subscriptions(self) -> ValueSubscriptions:
+        """Return the handlers of events of values (`wire.value`), with their kinds.
+
+        Read with `subscriptions`.
         """
         return {}
 

@@ -20,6 +20,7 @@ from anafi_mav.clock import NEVER, Alarm, Clock, Schedule
 from anafi_mav.drone import Drone, events
 from anafi_mav.drone.events import Message
 from anafi_mav.drone.payload.camera import Camera
+from anafi_mav.drone.values import VALUES
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.access import COMMANDS
 from anafi_mav.mavlink.channel import Channel
@@ -87,7 +88,13 @@ from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.height import TakeoffRecord
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import EventHandler, Subscriptions, in_order
+from anafi_mav.vehicle.base.subscriptions import (
+    EventHandler,
+    Subscriptions,
+    ValueHandlers,
+    ValueSubscriptions,
+    in_order,
+)
 from anafi_mav.vehicle.failsafe_settings import FailsafeLimits
 from anafi_mav.vehicle.vehicle import Health, Landed, Vehicle
 
@@ -225,7 +232,8 @@ class System:
         self._node = node
         self._started = started
         self._texts = TextNumbers()
-        self._undo: Callable[[], None] | None = None
+        self._undo: Sequence[Callable[[], None]] = ()
+        """Functions that end the subscriptions to the drone's events."""
         self._ticker = Alarm(self._tick)
         self._stalled = 0.0
         """How long the host had stalled at the last tick, s."""
@@ -299,7 +307,6 @@ class System:
         `memory_problem`: see `load_memory`.
         """
         self.active = True
-        self._undo = self.drone.subscribe(self._on_event)
         for component in self.components:
             self._node.add_host(self.sysid, component.compid, component.receive)
         for compid in ABSENT:
@@ -310,7 +317,7 @@ class System:
         self.vehicle.link_up(TakeoffRecord.read(self.memory.settings.get(takeoff_point_service.KEY)))
         for service in self.services:
             service.link_up()
-        self._subscribed = in_order(self.subscriptions())
+        self._subscribe()
         self._changed()
         now, self._stalled = self.clock.monotonic(), self._node.stalled
         self._next_heartbeat = now + HEARTBEAT_EVERY
@@ -325,9 +332,9 @@ class System:
         """Notify waiting clients that the link is lost, then make the system silent."""
         if not self.active:
             return
-        if self._undo is not None:
-            self._undo()
-            self._undo = None
+        for undo in self._undo:
+            undo()
+        self._undo = ()
         self._ticker.cancel()
         self._mission_over.cancel()
         for service in self.services:
@@ -560,6 +567,14 @@ class System:
 
     # What the drone reports.
 
+    def _subscribe(self) -> None:
+        """Begin to receive the drone's events."""
+        self._subscribed = in_order(self.subscriptions())
+        self._undo = (
+            self.drone.subscribe(self._on_event, without=VALUES - self._subscribed.keys()),
+            self.drone.subscribe_values(ValueHandlers(self.value_subscriptions()).call),
+        )
+
     def _on_event(self, message: Message, now: float) -> None:
         kind = type(message)
         for handler in self._subscribed.get(kind, ()):
@@ -577,6 +592,11 @@ class System:
         for service in self.services:
             yield service.subscriptions()
         yield dict.fromkeys(CHANGES, lambda message, now: self._changed(force=True))
+
+    def value_subscriptions(self) -> Iterator[ValueSubscriptions]:
+        """Yield all tables of handlers of values, in the sequence in which the handlers are called."""
+        for service in self.services:
+            yield service.value_subscriptions()
 
     def _changed(self, *, force: bool = False) -> None:
         """Mode, armed state or health may have changed: clients wait for it, so tell them at once.

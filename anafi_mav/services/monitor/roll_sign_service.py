@@ -11,10 +11,11 @@ from typing import Any
 from anafi_mav import texts
 from anafi_mav.drone import events
 from anafi_mav.drone.piloting.state import Attitude, Velocity
-from anafi_mav.services.service import Service
+from anafi_mav.drone.values import Values
+from anafi_mav.services.service import Host, Service
 from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
 
 KEY = "roll_sign"
 """Name of the record in the drone's file."""
@@ -41,18 +42,22 @@ def read(kept: Any, firmware: str | None) -> RollSign:
 class RollSignService(Service):
     """Watches how the drone moves until the sign of its roll is known."""
 
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._flies = False
+
     def link_up(self) -> None:
+        self._flies = self.host.vehicle.in_air
         check = self.host.vehicle.roll
         check.recall(read(self.host.memory.settings.get(KEY), self.host.drone.identity.firmware))
         if check.sign is RollSign.INVERTED:
             self.host.text(Severity.WARNING, texts.ROLL_SIGN_INVERTED)
 
     def subscriptions(self) -> Subscriptions:
-        return {
-            events.AttitudeChanged: self._on_attitude,
-            events.SpeedChanged: self._on_speed,
-            events.FlyingStateChanged: self._on_flying_state,
-        }
+        return {events.FlyingStateChanged: self._on_flying_state}
+
+    def value_subscriptions(self) -> ValueSubscriptions:
+        return {self._on_motion: (events.AttitudeChanged, events.SpeedChanged)}
 
     def _motion(self) -> tuple[Attitude, Velocity] | None:
         """Return attitude and velocity of the drone; None if one is unknown or it does not fly.
@@ -60,24 +65,23 @@ class RollSignService(Service):
         Earlier motion is discarded then.
         """
         vehicle, state = self.host.vehicle, self.host.drone.piloting.state
-        if not vehicle.in_air or state.attitude is None or state.velocity is None:
+        if not self._flies or state.attitude is None or state.velocity is None:
             vehicle.roll.forget_motion()
             return None
         return state.attitude, state.velocity
 
     def _on_flying_state(self, message: events.FlyingStateChanged, now: float) -> None:
+        self._flies = self.host.vehicle.in_air
         self._motion()
 
-    def _on_attitude(self, message: events.AttitudeChanged, now: float) -> None:
-        if (motion := self._motion()) is not None:
-            attitude, _ = motion
-            self.host.vehicle.roll.on_attitude(attitude.roll, attitude.yaw)
-
-    def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
-        if (motion := self._motion()) is not None:
-            _, velocity = motion
-            if self.host.vehicle.roll.on_velocity(velocity.north, velocity.east, now):
-                self._report()
+    def _on_motion(self, values: Values, now: float) -> None:
+        if not self._flies or (motion := self._motion()) is None:
+            return
+        check, (attitude, velocity) = self.host.vehicle.roll, motion
+        if events.AttitudeChanged in values:
+            check.on_attitude(attitude.roll, attitude.yaw)
+        if events.SpeedChanged in values and check.on_velocity(velocity.north, velocity.east, now):
+            self._report()
 
     def _report(self) -> None:
         sign, firmware = self.host.vehicle.roll.sign, self.host.drone.identity.firmware

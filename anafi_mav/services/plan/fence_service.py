@@ -14,6 +14,7 @@ from typing import Any
 from anafi_mav import texts
 from anafi_mav.drone import events
 from anafi_mav.drone.events import PlayingState
+from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
@@ -25,7 +26,7 @@ from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, reason_of
 from anafi_mav.vehicle.base.requester import Source
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
 from anafi_mav.vehicle.fence.fence_watch import (
     CEILING,
     EVERYTHING,
@@ -90,15 +91,17 @@ class FenceService(Service):
     def subscriptions(self) -> Subscriptions:
         return {
             events.GpsLocationChanged: self._on_location,
-            events.SpeedChanged: self._on_speed,
             events.FlyingStateChanged: lambda message, now: self._look(self.host.clock.monotonic()),
         }
+
+    def value_subscriptions(self) -> ValueSubscriptions:
+        return {self._on_speed: (events.SpeedChanged,)}
 
     def _on_location(self, message: events.GpsLocationChanged, now: float) -> None:
         self._located = self.host.clock.monotonic()
         self._look(self._located)
 
-    def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
+    def _on_speed(self, values: Values, now: float) -> None:
         if now - self._looked >= LOOK_SOONEST:
             self._look(self.host.clock.monotonic())
 

@@ -13,6 +13,7 @@ from dataclasses import replace
 from functools import lru_cache
 
 from anafi_mav.drone.events import Message
+from anafi_mav.drone.values import VALUES, Values
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
@@ -25,7 +26,7 @@ from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.services.telemetry import data_streams
 from anafi_mav.services.telemetry.pose_sources import PoseSources
 from anafi_mav.services.telemetry.update_tracker import UpdateTracker
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
 
 logger = logging.getLogger(__name__)
 
@@ -78,7 +79,9 @@ class MessageService(Service):
         self._requests: Mapping[int, Request] = {}
         self._tracker = UpdateTracker({})
         self._events: Sequence[type[Message]] = ()
-        """Those that are news for some message."""
+        """Events that update some message, without those of values."""
+        self._values: Sequence[type[Message]] = ()
+        """Events of values that update some message."""
         self._repeated: tuple[int, ...] = ()
         self._on_change: list[int] = []
         self._linked_at = 0.0
@@ -110,7 +113,9 @@ class MessageService(Service):
         self._table, self._requests = streams, requests
         defaults = {id: stream.every for id, stream in streams.items() if stream.every is not None}
         self._intervals = Streams(defaults, has=self._is_streamed, pace=lambda channel: channel.pace)
-        self._events, affected = _affected(tuple((id, stream.updates) for id, stream in streams.items()))
+        updates, affected = _affected(tuple((id, stream.updates) for id, stream in streams.items()))
+        self._events = [kind for kind in updates if kind not in VALUES]
+        self._values = [kind for kind in updates if kind in VALUES]
         self._tracker = UpdateTracker(affected)
         self._on_change = [id for id, stream in streams.items() if stream.on_change]
         self._repeated = tuple(id for id, stream in streams.items() if stream.is_repeated)
@@ -156,6 +161,13 @@ class MessageService(Service):
 
     def subscriptions(self) -> Subscriptions:
         return dict.fromkeys(self._events, self._on_update)
+
+    def value_subscriptions(self) -> ValueSubscriptions:
+        return {self._on_values: self._values}
+
+    def _on_values(self, values: Values, now: float) -> None:
+        if self._tracker.mark_all(values, now):
+            self.host.drone.after_read(self._send_updated)
 
     def _on_update(self, message: Message, now: float) -> None:
         if self._tracker.mark(type(message), now):
