@@ -174,7 +174,7 @@ class Rest:
                 yield response
 
     @asynccontextmanager
-    async def websocket(self, path: str, limit: int) -> AsyncIterator[aiohttp.ClientWebSocketResponse]:
+    async def websocket(self, path: str, limit: int) -> AsyncIterator[aiohttp.ClientWebSocketResponse[Any]]:
         """Frames of at most `limit` bytes."""
         with _Translated(f"websocket {path}", self.base):
             connecting = self._session().ws_connect(self.base + path, max_msg_size=limit, heartbeat=ANSWER_TIMEOUT)

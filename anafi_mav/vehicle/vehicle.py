@@ -739,6 +739,8 @@ class Vehicle(Aircraft):
         `kept` is of the last flight that was seen.
         """
         self.height.recall(kept)
+        if self.on_ground:  # maybe another aircraft, or carried elsewhere
+            self.flight_facts = FlightFacts()
         self.on_flying_state()
         self.on_location()  # the one that it has reported counts for as long as a new one
         if self.flying_state is not None and not self.on_ground:

@@ -14,6 +14,7 @@ from support.world import HOME, World, world
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3, battery, common, wifi
 from anafi_mav.mavlink import dialect as newer
+from anafi_mav.sim import SimulatedDrone
 
 ACCEPTED, UNSUPPORTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_UNSUPPORTED
 ON_GROUND, IN_AIR = dialect.MAV_LANDED_STATE_ON_GROUND, dialect.MAV_LANDED_STATE_IN_AIR
@@ -105,6 +106,30 @@ async def test_conf_037_battery(flavour: str) -> None:
         assert status.voltages[1:] == [65535] * 9
         assert (status.current_battery, status.current_consumed, status.energy_consumed) == (-1, -1, -1)
         assert status.charge_state == dialect.MAV_BATTERY_CHARGE_STATE_OK
+
+
+@pytest.mark.parametrize("untold", [[], [battery.Alert.NAME], [ardrone3.AlertStateChanged.NAME]])
+async def test_conf_037_low_charge_is_reported_by_either_alert(untold: list[str]) -> None:
+    """Parrot's files name battery.alert for the 4K and the Ai, AlertStateChanged for 4K and Thermal."""
+
+    def reports(drone: SimulatedDrone) -> None:
+        drone.faults.untold = frozenset(untold)
+
+    async with world(model="thermal", before=reports) as w:
+        levels = (
+            (19, dialect.MAV_BATTERY_CHARGE_STATE_LOW, "Battery low (19 %)", dialect.MAV_STATE_STANDBY),
+            (9, dialect.MAV_BATTERY_CHARGE_STATE_CRITICAL, "Battery critical (9 %)", dialect.MAV_STATE_CRITICAL),
+        )
+        for percent, charge, text, health in levels:
+            mark = w.client.mark()
+            w.drone.faults.battery = percent
+            await w.client.wait("STATUSTEXT", lambda m, text=text: m.text == text, since=mark)
+            await w.client.wait("BATTERY_STATUS", lambda m, charge=charge: m.charge_state == charge, since=mark)
+            await w.client.heartbeat(lambda beat, health=health: beat.system_status == health, since=mark)
+        status = await w.client.wait("SYS_STATUS", since=w.client.mark())
+        assert not status.onboard_control_sensors_health & dialect.MAV_SYS_STATUS_SENSOR_BATTERY
+        texts = [m.text for _, m in w.client.since(0, "STATUSTEXT") if "attery" in m.text]
+        assert texts == ["Battery low (19 %)", "Battery critical (9 %)"]
 
 
 async def test_conf_037_the_cells_of_an_ai() -> None:

@@ -175,7 +175,8 @@ class MediaReader:
 
     def delivered(self, resource: Resource, index: int, piece: bytes) -> None:
         """Keep a piece and wake its readers."""
-        self._pieces[(*self._key_of(resource), index)] = piece
+        key = (*self._key_of(resource), index)
+        self._pieces[key] = piece
         while len(self._pieces) > KEPT:
             self._pieces.popitem(last=False)
         self.notify()

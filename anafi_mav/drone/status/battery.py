@@ -9,9 +9,16 @@ import msgspec
 from msgspec.structs import replace
 
 from anafi_mav.arsdk.codec.wire import Message
-from anafi_mav.arsdk.messages import battery, common
+from anafi_mav.arsdk.messages import ardrone3, battery, common
+from anafi_mav.arsdk.messages.ardrone3 import AlertState
 from anafi_mav.arsdk.messages.battery import AlertLevel, BatteryAlert
 from anafi_mav.drone.element import Element, Reducer, with_item
+
+_CHARGE_LEVELS: Mapping[AlertState, AlertLevel] = {
+    AlertState.LOW_BATTERY: AlertLevel.WARNING,
+    AlertState.CRITICAL_BATTERY: AlertLevel.CRITICAL,
+    AlertState.ALMOST_EMPTY_BATTERY: AlertLevel.CRITICAL,
+}
 
 
 class BatteryState(msgspec.Struct, frozen=True):
@@ -35,10 +42,21 @@ class BatteryState(msgspec.Struct, frozen=True):
     cell_voltages_mv: Mapping[int, int] = {}
     """By cell index; empty on models that do not report single cells."""
     alerts: Mapping[BatteryAlert, AlertLevel] = {}
+    """Those of the battery alone; `levels` has the charge of every model."""
+    charge_level: AlertLevel = AlertLevel.NONE
+    """Level of a low charge by the drone's one alert (AlertStateChanged)."""
+
+    def levels(self) -> Mapping[BatteryAlert, AlertLevel]:
+        """Return the level of each alert.
+
+        Parrot names the 4K and the Ai as models that report a battery's alerts, and that only when a level changes
+        (battery.xml 149-0-1). Without a report the charge has the level of the drone's one alert, as in GroundSDK.
+        """
+        return {BatteryAlert.POWER_LEVEL: self.charge_level, **self.alerts}
 
     def worst_alert(self) -> AlertLevel:
-        """The most serious level among the alerts; NONE when there are none."""
-        return max(self.alerts.values(), default=AlertLevel.NONE)
+        """Return the most serious level of the alerts."""
+        return max(self.levels().values())
 
 
 def _alert(state: BatteryState, message: battery.Alert) -> BatteryState:
@@ -71,4 +89,7 @@ class Battery(Element[BatteryState]):
             state, cell_voltages_mv=with_item(state.cell_voltages_mv, message.index, message.cell_voltage, 0)
         ),
         battery.Alert: _alert,
+        ardrone3.AlertStateChanged: lambda state, message: replace(
+            state, charge_level=_CHARGE_LEVELS.get(message.state, AlertLevel.NONE)
+        ),
     }

@@ -74,6 +74,8 @@ _SETS = frozenset(
 )
 """Commands that are the same wherever they are done."""
 
+_GLOBAL_FRAMES = frozenset({GLOBAL, GLOBAL_INT, RELATIVE, RELATIVE_INT, TERRAIN, TERRAIN_INT})
+
 _TARGETING = float(mav_enums.MAV_MOUNT_MODE_MAVLINK_TARGETING)
 
 
@@ -254,8 +256,7 @@ class FlightPlanWriter:
             return value
         if item.frame in (TERRAIN, TERRAIN_INT):
             self.refuse("heights above terrain are unsupported", kind=FaultKind.FRAME)
-        if item.frame not in (GLOBAL, GLOBAL_INT):
-            self.refuse(f"frame {item.frame} is not global", kind=FaultKind.FRAME)
+        self._require_global(item)
         if self._amsl is None:
             problem = "height above mean sea level, but that of the take-off point is unknown"
             raise UnknownHeight("mission", problem, self.item)
@@ -265,16 +266,22 @@ class FlightPlanWriter:
         """Return True when the item has a position.
 
         Absent coordinates and 0, 0 mean "here" (MAVLink mission.md, ArduPilot). Other invalid coordinates are
-        refused.
+        refused, and metres of a local frame.
         """
         latitude, longitude = item.params[4:6]
         if (latitude or 0.0, longitude or 0.0) == (0.0, 0.0):
             return False
+        self._require_global(item)
         if latitude is None or not abs(latitude) <= 90.0:
             self.refuse("no latitude" if latitude is None else f"invalid latitude {latitude:g}", 5)
         if longitude is None or not abs(longitude) <= 180.0:
             self.refuse("no longitude" if longitude is None else f"invalid longitude {longitude:g}", 6)
         return True
+
+    def _require_global(self, item: Item) -> None:
+        """Refuse an item whose coordinates are no latitude and longitude."""
+        if item.frame not in _GLOBAL_FRAMES:
+            self.refuse(f"frame {item.frame} is not global", kind=FaultKind.FRAME)
 
     def destination(self, item: Item) -> Point:
         """Return the destination of an item.

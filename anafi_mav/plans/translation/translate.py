@@ -136,8 +136,8 @@ def translate(
     wrong = _judged(items, version)[0] or _wrong_ways(items, version)
     if wrong:
         raise PlanError("mission", wrong[0].reason, wrong[0].item)
-    cursor = first if isinstance(first, Cursor) else _cursor(items, version, start, first, jumps or {})
     try:
+        cursor = first if isinstance(first, Cursor) else _cursor(items, version, start, first, jumps or {})
         return _fly(items, version, start, cursor)
     except TranslationRefused as error:
         raise PlanError("mission", error.fault.reason, error.fault.item) from None

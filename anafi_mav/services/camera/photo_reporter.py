@@ -213,14 +213,17 @@ class PhotoReporter:
         if not media:
             return None
         try:
-            async with asyncio.timeout(timeout):
-                while True:
-                    with contextlib.suppress(CommandRejected):  # not indexed yet
-                        return await self.host.drone.media.get(media)
-                    await asyncio.sleep(RETRY)
-        except (AnafiMavError, TimeoutError) as error:
+            return await asyncio.wait_for(self._find(media), timeout)
+        except (AnafiMavError, asyncio.TimeoutError) as error:
             logger.debug("%s: files of %s not known: %r", self.host.drone.name, media, error)
             return None
+
+    async def _find(self, media: str) -> MediaItem:
+        """Return a media as soon as the drone lists it."""
+        while True:
+            with contextlib.suppress(CommandRejected):  # not indexed yet
+                return await self.host.drone.media.get(media)
+            await asyncio.sleep(RETRY)
 
     def _name(self, item: MediaItem, capture: int, *, is_last: bool) -> list[CapturedImage]:
         """Fill in file and place of the pictures of a media; return pictures that were not reported."""

@@ -60,7 +60,7 @@ Sticks are ignored during an orbit, so the nose stays free.
 
 @dataclass
 class _Orbit:
-    """One orbit, from the way to the circle on."""
+    """One orbit, from the way to the circle on; the newest one is kept after its end."""
 
     lap: Lap
     cruise: float | None
@@ -68,6 +68,7 @@ class _Orbit:
     approach: asyncio.Task[None] | None = None
     controller: VelocityController | None = None
     """None on the way to the circle."""
+    is_over: bool = False
 
 
 class OrbitService(Service, PlainTask):
@@ -78,9 +79,12 @@ class OrbitService(Service, PlainTask):
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._orbit: _Orbit | None = None
-        self._is_flown = False
-        """The newest orbit was flown to its end."""
+        self._newest: _Orbit | None = None
+
+    @property
+    def _orbit(self) -> _Orbit | None:
+        """The orbit that is flown, or flown to; None without one."""
+        return None if self._newest is None or self._newest.is_over else self._newest
 
     @property
     def circle(self) -> Circle | None:
@@ -94,7 +98,7 @@ class OrbitService(Service, PlainTask):
                 location=True,
                 altitude=Altitude.AMSL,
                 effect=Effect.CHANGE,
-                still_holds=lambda: self._orbit is not None or self._is_flown,
+                still_holds=lambda: self._newest is not None and (not self._newest.is_over or self._newest.lap.done),
             )
         }
 
@@ -105,9 +109,10 @@ class OrbitService(Service, PlainTask):
 
     def end(self) -> list[asyncio.Task[None]]:
         """End this flight task: something else flies the drone now."""
-        orbit, self._orbit = self._orbit, None
+        orbit = self._orbit
         if orbit is None:
             return []
+        orbit.is_over = True
         with contextlib.suppress(LinkLost):
             self.host.drone.piloting.pilot(None)
         if orbit.approach is None or orbit.approach is asyncio.current_task():
@@ -116,7 +121,7 @@ class OrbitService(Service, PlainTask):
         return [orbit.approach]
 
     def link_down(self) -> None:
-        orbit, self._orbit = self._orbit, None
+        orbit, self._newest = self._newest, None
         if orbit is not None and orbit.approach is not None:
             orbit.approach.cancel()
 
@@ -153,7 +158,7 @@ class OrbitService(Service, PlainTask):
                 )
             else:
                 vehicle.drone.piloting.hover()  # ends a move of ours, which would ignore sticks
-            self._orbit, self._is_flown = orbit, False
+            self._newest = orbit
             grant.begin()
             if is_away and (move := vehicle.drone.piloting.move) is not None:
                 orbit.approach = self.host.spawn(self._approach(move, orbit))
@@ -247,7 +252,6 @@ class OrbitService(Service, PlainTask):
         if sticks is None:
             self._stop(texts.POSITION_UNKNOWN, Severity.WARNING)
         elif lap.done:
-            self._is_flown = True
             self._stop(texts.ORBIT_DONE, Severity.INFO)
         else:
             vehicle.drone.piloting.pilot(sticks)

@@ -37,7 +37,7 @@ _LEVELS: Mapping[int, Severity] = {1: Severity.WARNING, 2: Severity.CRITICAL}
 """WarningLevel and AlertLevel have the same numbers."""
 
 _COVERED = (AlertState.NONE, AlertState.CRITICAL_BATTERY, AlertState.LOW_BATTERY, AlertState.ALMOST_EMPTY_BATTERY)
-"""Alerts that say nothing, or what the battery's own alerts say."""
+"""Alerts that say nothing, or what `BatteryState.levels` says."""
 
 
 def _when(seconds: int | None) -> OperatorText:
@@ -72,7 +72,7 @@ def standing(drone: Drone) -> Iterator[tuple[Hashable, Severity, OperatorText]]:
             Severity.CRITICAL,
             texts.HOME_REACH.fill(reachability=spoken(home.reachability)),
         )
-    for alert, level in battery.alerts.items():
+    for alert, level in battery.levels().items():
         if level > AlertLevel.NONE:
             severity = _LEVELS.get(level, Severity.CRITICAL)
             yield ("battery", alert, level), severity, _battery(alert, level, battery.percent)

@@ -1,8 +1,8 @@
 """MAVLink service for the parameter protocol: lists, reads, writes and changes.
 
 A changed value is sent to all clients. The parameters are in `parameter_table*`; a channel sees the native ones and
-the aliases of its flavour. The list of a flavour is made when the drone first connects and stays the same for as long
-as the vehicle exists. Rules: MAVLink parameter.md, conformance A5, C4, R12, R13.
+the aliases of its flavour. The list of a flavour is made when the drone first connects and stays the same until another
+aircraft has its address. Rules: MAVLink parameter.md, conformance A5, C4, R12, R13.
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ from anafi_mav.services.parameter.parameter_table_follow import FOLLOW_NATIVE
 from anafi_mav.services.parameter.parameter_table_px4 import PX4_NAMES
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.texts import OperatorText
+from anafi_mav.vehicle.base.aircraft import FlightSettings
 from anafi_mav.vehicle.base.refusal import reason_of
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
@@ -83,6 +84,9 @@ def parameters_of(flavour: Flavour) -> tuple[Parameter, ...]:
 
 
 _RAW = struct.Struct("<d")
+
+_UNREPORTED = _RAW.pack(math.nan)
+"""In place of a value that no client has received: no parameter has it."""
 
 
 class ParameterTable(NamedTuple):
@@ -171,6 +175,14 @@ class ParameterList:
                 found.append(index)
         return found
 
+    def follow(self, before: ParameterList) -> None:
+        """Count as reported what the list of another aircraft has reported: the rest has changed."""
+        self.version = before.version + 1
+        for place, parameter in enumerate(self.parameters):
+            known = before.index.get(parameter.name)
+            raw = _UNREPORTED if known is None else before._told[known * _RAW.size : (known + 1) * _RAW.size]
+            self._told[place * _RAW.size : (place + 1) * _RAW.size] = raw
+
     def _raw(self, parameter: Parameter) -> bytes:
         """Bytes, so that NaN is equal to NaN."""
         return _RAW.pack(parameter.value(self._host))
@@ -183,6 +195,8 @@ class ParameterService(Service):
         super().__init__(host)
         self._lists: dict[str, ParameterList] = {}
         """By name of the flavour; empty until the drone has connected for the first time."""
+        self._serial: str | None = None
+        """Serial number of the drone whose parameters these are."""
         self._own: list[Callable[[Host], float]] = []
         """Functions that read the gateway's own settings, each once."""
         self._own_packer = struct.Struct("")
@@ -220,14 +234,28 @@ class ParameterService(Service):
         return self._lists[flavour.name]
 
     def link_up(self) -> None:
+        is_other = self.host.drone.identity.serial != self._serial
+        if is_other:
+            self._serial = self.host.drone.identity.serial
+            self.host.vehicle.settings = FlightSettings()  # speeds and hand launch were set for another aircraft
         self._restore()
-        if not self._lists:
-            self._lists = {flavour.name: ParameterList(self.host, flavour) for flavour in FLAVOURS.values()}
-            polled = (listed.parameters[place] for listed in self._lists.values() for place in listed.table.polled)
-            self._own = list({one.name: one.read for one in polled if not one.derived}.values())
-            self._own_packer = struct.Struct(f"<{len(self._own)}d")
+        if is_other:
+            self._make_lists()
         for name, listed in self._lists.items():
             self._tell(name, listed.changed(range(len(listed))))
+
+    def _make_lists(self) -> None:
+        """List the parameters that this aircraft has.
+
+        Models differ, and each aircraft has the same address in its Wi-Fi.
+        """
+        before = self._lists
+        self._lists = {flavour.name: ParameterList(self.host, flavour) for flavour in FLAVOURS.values()}
+        for name, listed in before.items():
+            self._lists[name].follow(listed)
+        polled = (listed.parameters[place] for listed in self._lists.values() for place in listed.table.polled)
+        self._own = list({one.name: one.read for one in polled if not one.derived}.values())
+        self._own_packer = struct.Struct(f"<{len(self._own)}d")
 
     def link_down(self) -> None:
         self._sender.clear()

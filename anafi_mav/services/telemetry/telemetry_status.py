@@ -74,7 +74,6 @@ def battery_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | 
     used = -1
     if state.full_charge_mah is not None and state.remaining_mah is not None:
         used = max(state.full_charge_mah - state.remaining_mah, 0)
-    power = state.alerts.get(BatteryAlert.POWER_LEVEL, AlertLevel.NONE)
     return dialect.MAVLink_battery_status_message(
         0,
         dialect.MAV_BATTERY_FUNCTION_ALL,
@@ -85,7 +84,7 @@ def battery_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | 
         used,
         -1,
         percent(state.percent),
-        charge_state=_CHARGE_STATES.get(max(power, state.worst_alert()), dialect.MAV_BATTERY_CHARGE_STATE_UNDEFINED),
+        charge_state=_CHARGE_STATES.get(state.worst_alert(), dialect.MAV_BATTERY_CHARGE_STATE_UNDEFINED),
         voltages_ext=more,
         fault_bitmask=sum(bit for alert, bit in _FAULTS.items() if state.alerts.get(alert, 0) > AlertLevel.NONE),
     )

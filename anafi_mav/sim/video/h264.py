@@ -145,7 +145,8 @@ class PictureEncoder:
         """Return a picture as the macroblocks that `key` and `between` take."""
         rows, columns = self._rows, self._columns
         fours = np.ascontiguousarray(cells).view(np.uint32).reshape(rows, 4, columns)
-        return fours.transpose(0, 2, 1).copy().view(np.uint8).reshape(rows * columns, 16)
+        blocks: Blocks = fours.transpose(0, 2, 1).copy().view(np.uint8).reshape(rows * columns, 16)
+        return blocks
 
     def key(self, blocks: Blocks, id: int) -> bytes:
         """Return a key picture; `id` differs from that of the key picture before it."""

@@ -90,8 +90,6 @@ class MissionFlight(PlainTask):
         self._outlet: MissionOutlet | None = None
         self._background: asyncio.Task[None] | None = None
         """Runs the machine's work when no command of a client does."""
-        self._flown: SentCommand | str | None = None
-        """The flight of a plan that the drone reported last: reports are repeated."""
 
     def attach(self, outlet: MissionOutlet) -> None:
         """Report to clients and memory from now on."""
@@ -346,16 +344,11 @@ class MissionFlight(PlainTask):
     async def _acquire(self, work: Acquire, by: Right | None) -> list[Effect]:
         """Acquire control, and hover; return the effects of the grant.
 
-        Without a client the mission has control since its mode was chosen. A mission that was replaced meanwhile
-        does not become active.
+        Without a client the mission has control since its mode was chosen, and its end cancels this work. A mission
+        that was replaced meanwhile does not become active.
         """
-        control = self._vehicle.control
-        if by is None and control.active is not self:
-            raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
-        async with contextlib.nullcontext() if by is None else control.acquire(self, by=by):
+        async with contextlib.nullcontext() if by is None else self._vehicle.control.acquire(self, by=by):
             await self._stop(work.prepared)
-            if by is None and control.active is not self:
-                raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
             if not (effects := self.machine.granted(work.attempt)):
                 self._require_same(work.attempt)
                 raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
@@ -414,10 +407,10 @@ class MissionFlight(PlainTask):
         }
 
     def _on_playing(self, message: events.MavlinkFilePlayingStateChanged, now: float) -> None:
-        plan, before = self._vehicle.drone.flight_plan, self._flown
-        flown = self._flown = plan.flown
+        plan = self._vehicle.drone.flight_plan
+        flown = plan.flown
         match message.state:
-            case PlayingState.PLAYING if flown != before and not plan.plays_withdrawn:
+            case PlayingState.PLAYING if not plan.plays_withdrawn:
                 attempt = flown.cause if isinstance(flown, SentCommand) else None
                 self._handle(self.machine.playing(message.filepath, attempt))
             case PlayingState.PAUSED | PlayingState.STOPPED if flown is None:
@@ -470,7 +463,7 @@ class MissionFlight(PlainTask):
 
     def link_up(self, record: MissionRecord | None) -> None:
         """The drone is connected again, or to a new gateway: look if it flies our mission."""
-        plan, self._flown = self._vehicle.drone.flight_plan.state, self._vehicle.drone.flight_plan.flown
+        plan = self._vehicle.drone.flight_plan.state
         plays, in_air = plan.playing == PlayingState.PLAYING, self._vehicle.in_air
         self._handle(self.machine.link_up(record, plan.uid, plays=plays, in_air=in_air))
 

@@ -179,6 +179,15 @@ def test_amsl_heights_count_from_the_takeoff_point() -> None:
     assert [(fault.item, fault.kind) for fault in terrain] == [(0, FaultKind.FRAME)]
 
 
+@pytest.mark.parametrize("first", [0, 1])
+def test_takeoff_to_below_the_ground_is_refused_from_any_item_on(first: int) -> None:
+    """Upload does not know the ground; the item is read again for what it sets when a later one begins."""
+    items = [Item(mav_enums.MAV_CMD_NAV_TAKEOFF, GLOBAL, (0.0, 0.0, 0.0, None, None, None, 20.0)), waypoint(1, 0)]
+    assert examine(items, 1).faults == ()
+    with pytest.raises(PlanError, match="item 0: NAV_TAKEOFF: invalid take-off height of -15 m above take-off"):
+        translate(items, 1, GROUND, first)
+
+
 def test_omitted_values_of_an_item_stay() -> None:
     here = Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (5.0, 0.0, 0.0, None, None, None, None))
     there = Item(mav_enums.MAV_CMD_NAV_WAYPOINT, RELATIVE, (0.0, 0.0, 0.0, None, LAT + 1e-4, LON, None))
@@ -319,6 +328,18 @@ WRONG = {
     "frame": (
         [waypoint(0, 1, frame=1)],
         TranslationFault(0, "NAV_WAYPOINT: frame 1 is not global", FaultKind.FRAME),
+    ),
+    "frame of a place without a height": (
+        [waypoint(0, 1), Item(mav_enums.MAV_CMD_NAV_WAYPOINT, 1, (0.0, 0.0, 0.0, None, 8.0, 5.0, None))],
+        TranslationFault(1, "NAV_WAYPOINT: frame 1 is not global", FaultKind.FRAME),
+    ),
+    "frame of a landing": (
+        [waypoint(0, 1), Item(mav_enums.MAV_CMD_NAV_LAND, 1, (0.0, 0.0, 0.0, None, 8.0, 5.0, 0.0))],
+        TranslationFault(1, "NAV_LAND: frame 1 is not global", FaultKind.FRAME),
+    ),
+    "frame of a region": (
+        [waypoint(0, 1), Item(mav_enums.MAV_CMD_DO_SET_ROI_LOCATION, 1, (0.0, 0.0, 0.0, 0.0, 8.0, 5.0, None))],
+        TranslationFault(1, "DO_SET_ROI_LOCATION: frame 1 is not global", FaultKind.FRAME),
     ),
     "waits": (
         [replace(waypoint(0, 1), autocontinue=False)],
