@@ -419,7 +419,10 @@ class System:
             self._node.send(message, sysid=self.sysid, compid=compid, to=channels, give_way=give_way)
 
     def send_batch(self, batch: Batch, to: Sequence[Channel]) -> None:
-        """Send messages of streams to channels that have them. Nothing is sent while the link is down."""
+        """Send messages of streams to channels that have them.
+
+        Nothing is sent while the link is down.
+        """
         if self.active:
             self._node.send_batch(batch, to)
 
