@@ -11,7 +11,7 @@ import inspect
 import re
 import struct
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from enum import Enum
 from operator import attrgetter
 from typing import Any
@@ -100,6 +100,36 @@ class Packed:
         if header != self._header:
             self._header, self._framed = header, frame(self, seq, sysid, compid)
         return self._framed
+
+
+class Batch:
+    """Messages of one sender that leave together, packed once for all channels."""
+
+    __slots__ = ("_frames", "_sequence", "compid", "messages", "sender", "size", "sysid")
+
+    def __init__(self, messages: Sequence[Packed], sysid: int, compid: int) -> None:
+        self.messages = messages
+        self.sysid = sysid
+        self.compid = compid
+        self.sender = (sysid, compid)
+        self.size = sum(len(packed.payload) + FRAME_BYTES for packed in messages)
+        """Bytes of the unsigned frames."""
+        self._sequence = -1
+        self._frames: Sequence[bytes] = ()
+        """The last unsigned frames, of which the first has this sequence number."""
+
+    def framed(self, sequence: int) -> Sequence[bytes]:
+        """Return the unsigned frames.
+
+        Channels with the same streams are at the same sequence numbers: one frame is made for all of them.
+        """
+        if sequence != self._sequence:
+            self._sequence = sequence
+            self._frames = [
+                frame(packed, sequence + place & 0xFF, self.sysid, self.compid)
+                for place, packed in enumerate(self.messages)
+            ]
+        return self._frames
 
 
 def pack(message: dialect.MAVLink_message) -> Packed:

@@ -24,7 +24,7 @@ from anafi_mav.mavlink.access import STOPPING, Access, concerns_link, needed_acc
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, reason
 from anafi_mav.mavlink.channel import Channel, total
 from anafi_mav.mavlink.endpoint import EndpointFactory, make_endpoint, parse_endpoint
-from anafi_mav.mavlink.frames import Packed, ReceivedFrame, pack
+from anafi_mav.mavlink.frames import Batch, Packed, ReceivedFrame, pack
 from anafi_mav.mavlink.key_ring import KeyRing
 from anafi_mav.mavlink.router import Route, Router, has_target, targets
 from anafi_mav.mavlink.signing import Signing
@@ -231,6 +231,12 @@ class Node:
             return
         for channel in self.channels if to is None else to:
             channel.send_packed(packed, sysid, compid, give_way=give_way)
+
+    def send_batch(self, batch: Batch, to: Iterable[Channel]) -> None:
+        """Send messages of streams of one of our components to some channels."""
+        self._router.own_sources.add(batch.sender)
+        for channel in to:
+            channel.send_batch(batch)
 
     def sources(self, channel: Channel) -> list[tuple[int, int]]:
         """Return the systems and components heard on a channel, sorted."""
