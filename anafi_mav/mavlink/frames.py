@@ -238,12 +238,19 @@ def _reader(id: int) -> _Reader:
     kind: Any = dialect.mavlink_map[id]
     size, unpacker, names = kind.unpacker.size, kind.unpacker.unpack_from, tuple(kind.ordered_fieldnames)
     codes = [code for _, code in re.findall(r"(\d*)([a-zA-Z])", kind.unpacker.format)]
-    plain = all(length == 1 for length in kind.lengths) and not {"c", "s"}.intersection(codes)
-    attributes = vars(kind(*([0] * len(names)))) if plain else {}
+    has_texts = bool({"c", "s"}.intersection(codes))
+    attributes = {} if has_texts else vars(kind(*([0] * len(names))))
 
     def read_numbers(payload: bytes) -> dict[str, Any]:
         result = attributes.copy()
         result.update(zip(names, unpacker(payload.ljust(size, b"\0")), strict=True))
+        return result
+
+    def read_arrays(payload: bytes) -> dict[str, Any]:
+        result = attributes.copy()
+        flat = unpacker(payload.ljust(size, b"\0"))
+        for name, first, length in zip(names, starts, kind.lengths, strict=True):
+            result[name] = flat[first] if length == 1 else list(flat[first : first + length])
         return result
 
     def read_any(payload: bytes) -> dict[str, Any]:
@@ -260,7 +267,10 @@ def _reader(id: int) -> _Reader:
         return vars(message)
 
     starts = [sum(kind.lengths[:order]) for order in range(len(kind.lengths))]
-    _readers[id] = read_numbers if plain else read_any
+    if has_texts:
+        _readers[id] = read_any
+    else:
+        _readers[id] = read_numbers if all(length == 1 for length in kind.lengths) else read_arrays
     return _readers[id]
 
 
