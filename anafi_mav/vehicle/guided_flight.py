@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from anafi_mav import texts, units
 from anafi_mav.drone import MoveEnd, Position
@@ -67,20 +68,35 @@ class Goto(PlainTask):
         return replace(self, yaw=yaw)
 
 
+class _Ended(NamedTuple):
+    """A move that has ended, and what was true then."""
+
+    goto: Goto
+    is_short: bool
+    """The drone, or another controller, has ended it short of its target."""
+    location: Position | None
+    """The drone's newest GPS location."""
+    epoch: int
+    """The control's: a change of it is a newer command."""
+
+
 class GuidedFlight:
-    """The moves of one vehicle, one at a time: the present target and the last arrival."""
+    """The moves of one vehicle, one at a time: the present target and the last end."""
 
     def __init__(self, vehicle: Aircraft) -> None:
         self._vehicle = vehicle
-        self._arrived: tuple[GeoPoint, Position | None, int] | None = None
-        """Target of the last completed move, and the drone's newest GPS location and the control's epoch then."""
-        self._failed_at: int | None = None
-        """The control's epoch when the drone, or another controller, last ended a move short of its target."""
+        self._newest: _Ended | None = None
+
+    @property
+    def _ended(self) -> _Ended | None:
+        """The newest move that has ended, while nothing was commanded since."""
+        ended = self._newest
+        return ended if ended is not None and ended.epoch == self._vehicle.control.epoch else None
 
     @property
     def has_failed(self) -> bool:
         """True when the newest goto has ended short of its target, and nothing was commanded since."""
-        return self._failed_at == self._vehicle.control.epoch
+        return self._ended is not None and self._ended.is_short
 
     @property
     def goto(self) -> Goto | None:
@@ -209,11 +225,10 @@ class GuidedFlight:
 
         A location is reported once a second only, and to use it would fly the drone back by some metres.
         """
-        if self._arrived is None:
+        ended = self._ended
+        if ended is None or ended.is_short or self._vehicle.drone.gps.state.location is not ended.location:
             return None
-        place, location, epoch = self._arrived
-        is_newest = self._vehicle.drone.gps.state.location is location and self._vehicle.control.epoch == epoch
-        return place if is_newest else None
+        return ended.goto.place
 
     def _on_end(self, goto: Goto, ended: asyncio.Future[MoveEnd]) -> None:
         """A move has ended: the drone hovers, at its target or short of it, and the task is over.
@@ -221,13 +236,12 @@ class GuidedFlight:
         Every client gets a text when it is short of it, and none has commanded that: the mode does not change.
         """
         vehicle, control = self._vehicle, self._vehicle.control
-        how = None if ended.cancelled() else ended.result()
-        if how is MoveEnd.DONE:
+        how = ended.result()
+        is_short = how in _SHORT and control.active is goto
+        if how is MoveEnd.DONE or is_short:
             control.release(goto)
-            self._arrived = goto.place, vehicle.drone.gps.state.location, control.epoch
-        elif how in _SHORT and control.active is goto:
-            control.release(goto)
-            self._failed_at = control.epoch
+            self._newest = _Ended(goto, is_short, vehicle.drone.gps.state.location, control.epoch)
+        if is_short:
             reason = texts.PILOT if vehicle.drone.controller.pilot_acquired_control else _SHORT[how]
             vehicle.text(Severity.WARNING, texts.TASK_ENDED.fill(what=texts.GOTO, reason=reason))
 

@@ -50,8 +50,7 @@ class Event(enum.Enum):
     SILENCE = "no stick input of the holding client for too long"
     END = "another flight task is active"
     OVERRIDE = "a client's joystick begins to take the drone over"
-    OVERRIDDEN = "it has taken the drone over, or another action has replaced it"
-    LINK_DOWN = "the link is lost"
+    OVERRIDDEN = "it has taken the drone over, another action has replaced it, or the link was lost"
 
 
 TRANSITIONS: dict[State, dict[Event, State]] = {
@@ -60,7 +59,6 @@ TRANSITIONS: dict[State, dict[Event, State]] = {
         Event.DEFLECTED: State.HELD,
         Event.END: State.IDLE,
         Event.OVERRIDE: State.OVERRIDING,
-        Event.LINK_DOWN: State.IDLE,
     },
     State.HELD: {
         Event.CENTRED: State.IDLE,
@@ -68,12 +66,10 @@ TRANSITIONS: dict[State, dict[Event, State]] = {
         Event.SILENCE: State.IDLE,
         Event.END: State.IDLE,
         Event.OVERRIDE: State.OVERRIDING,
-        Event.LINK_DOWN: State.IDLE,
     },
     State.OVERRIDING: {
         Event.END: State.OVERRIDING,
         Event.OVERRIDDEN: State.IDLE,
-        Event.LINK_DOWN: State.IDLE,
     },
 }
 """The pairs that are missing cannot happen: the silence of centred sticks is not noticed."""
@@ -101,8 +97,6 @@ class StickInput:
     state: State = State.IDLE
     client: Hashable = None
     """Client that holds them."""
-    action: asyncio.Task[None] | None = None
-    """The action by which a joystick takes the drone over."""
 
 
 class ManualFlight(PlainTask):
@@ -155,9 +149,9 @@ class ManualFlight(PlainTask):
         """
         vehicle = self._vehicle
         if overrides and self._takes_over(sender, sticks):
+            self._let_go(Event.OVERRIDE)
             action = vehicle.control.run(sender, self._override(sender, sticks))
-            self._let_go(Event.OVERRIDE, action)
-            action.add_done_callback(self._overridden)
+            action.add_done_callback(lambda action: self._let_go(Event.OVERRIDDEN))
         if self.state is State.OVERRIDING:
             return None
         sticks = replace(sticks, climb=self.override.climb(sender, sticks.climb))
@@ -199,11 +193,6 @@ class ManualFlight(PlainTask):
         self.override.take_over(sender, sticks.climb)
         self._vehicle.text(Severity.WARNING, texts.JOYSTICK_OVERRIDE.fill(system=system_of(sender) or 0))
 
-    def _overridden(self, task: asyncio.Task[None]) -> None:
-        """Sticks count again: the drone was taken over, or another action came in between."""
-        if task is self._input.action:
-            self._let_go(Event.OVERRIDDEN)
-
     def silent(self, sender: Hashable) -> None:
         """Centre the sticks when this client holds them: it has released all its channels."""
         if sender == self._input.client:
@@ -223,18 +212,17 @@ class ManualFlight(PlainTask):
 
     def end(self) -> list[asyncio.Task[None]]:
         """End this flight task: something else flies the drone now."""
-        self._let_go(Event.END, self._input.action)
+        self._let_go(Event.END)
         return []
 
     def link_down(self) -> None:
-        """Release the sticks when the drone is disconnected."""
+        """Forget where the joysticks were; control has ended the flight by them."""
         self.override.forget()
-        self._let_go(Event.LINK_DOWN)
 
-    def _let_go(self, event: Event, action: asyncio.Task[None] | None = None) -> None:
+    def _let_go(self, event: Event) -> None:
         """Centre the sticks if a client held them."""
         held = self.state is State.HELD
-        self._input = StickInput(TRANSITIONS[self.state][event], action=action)
+        self._input = StickInput(TRANSITIONS[self.state][event])
         if held:
             self._silence.cancel()
             with contextlib.suppress(LinkLost):

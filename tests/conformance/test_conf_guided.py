@@ -250,12 +250,11 @@ async def test_conf_143_reposition_by_relative_yaw_sent_twice_turns_twice() -> N
     """A COMMAND_INT has no confirmation: two equal turns by an angle are two, as in PX4 and ArduCopter."""
     async with world() as w:
         await w.take_off(5.0)
-        for degrees in (30.0, 60.0):
-            turn = (-1, CHANGE_MODE | RELATIVE_YAW, 0, 30.0 * units.RAD_PER_DEG)
-            began = w.drone.log[-1].t
+        for wanted, margin in ((30.0, 0.03), (60.0, 0.05)):
+            mark, turn = w.client.mark(), (-1, CHANGE_MODE | RELATIVE_YAW, 0, 30.0 * units.RAD_PER_DEG)
             assert (await w.client.command(REPOSITION, *turn, frame=RELATIVE)).result == ACCEPTED
-            await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 20.0, since=began)
-            assert w.drone.pose.yaw * units.DEG_PER_RAD == pytest.approx(degrees, abs=3.0)
+            yaw = wanted * units.RAD_PER_DEG
+            await w.client.wait("ATTITUDE", lambda m, yaw=yaw, margin=margin: abs(m.yaw - yaw) < margin, since=mark)
 
 
 async def test_conf_143_relative_yaw_can_be_cancelled() -> None:

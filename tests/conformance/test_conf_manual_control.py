@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.flavours import both
-from support.setpoints import COPTER_GUIDED, earth, heard, motion, said, streaming, texts
+from support.setpoints import COPTER_GUIDED, attitude, earth, engage, heard, motion, said, streaming, texts
 from support.world import HOLD, HOME, POSITION, World, world
 
 from anafi_mav import geo, mav_enums
@@ -241,6 +241,18 @@ async def test_another_mode_ends_the_sticks() -> None:
             await asyncio.sleep(0.5)
         assert motion(w, began) == []
         assert w.client.since(0, "HEARTBEAT")[-1][1].custom_mode in (HOLD, POSITION)
+
+
+async def test_centred_sticks_of_a_station_leave_the_setpoints_of_a_program() -> None:
+    async with world(speed=1.0, clients=2) as w:
+        await w.take_off()
+        station, program = w.clients
+        async with streaming(station, manual(), 0.04), streaming(program, attitude(pitch=-0.2)):
+            await engage(program, "px4")
+            await w.drone.wait_log(lambda e: e.name.endswith(".PCMD") and e.args["pitch"] > 20, 5.0)
+            began = now()
+            await asyncio.sleep(1.0)
+            assert {stick(e)[1] > 20 for e in heard(w, "PCMD", since=began)} == {True}
 
 
 async def test_setpoints_and_sticks_do_not_mix() -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.missions import put, said, way
+from support.params import write
 from support.plans import Item
 from support.setpoints import POSITION_ONLY, engage, local, streaming
 from support.world import HOME, WEB_PORT, World, loopback, world
@@ -22,6 +23,7 @@ from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 from anafi_mav.sim.world.faults import CLEAR, Impairment
 from anafi_mav.sim.world.quirks import Quirk
+from anafi_mav.vehicle.follow import AltitudeMode
 
 ACCEPTED, REJECTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_TEMPORARILY_REJECTED
 GLOBAL, RELATIVE = dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
@@ -105,6 +107,21 @@ async def test_restart_without_flight_id_estimates_the_height_safely(tmp_path: P
         await at(w.drone, 10.0, 18.0)
         assert await goto(w, 0.0, 5.0, RELATIVE) == ACCEPTED  # above take-off: no bridge is needed
         await at(w.drone, 0.0, 5.0)
+
+
+async def test_restart_without_flight_id_follows_no_target_near_the_estimated_ground(tmp_path: Path) -> None:
+    async with flying(tmp_path, 20.0, Quirk.NO_FLIGHT_ID) as w:
+        await write(w.client, "ANF_FOLLOW_ALT", AltitudeMode.TARGET, dialect.MAV_PARAM_TYPE_INT32)
+        await write(w.client, "ANF_FOLLOW_HT", 2.0)
+        place = round((HOME[0] + 12.0 * METRE) * 1e7), round(HOME[1] * 1e7)
+        unset = [math.nan] * 3
+        target = dialect.MAVLink_follow_target_message(
+            0, 1, *place, HOME[2] + 5.0, unset, unset, [1.0, *unset], unset, unset, 0
+        )
+        assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 8)).result == ACCEPTED
+        async with streaming(w.client, target):
+            await said(w, "Target ignored: estimated AMSL: 7 m < 15 m")
+            assert w.drone.pose.up > 15.0
 
 
 async def test_restart_without_flight_id_refuses_low_amsl_items(tmp_path: Path) -> None:

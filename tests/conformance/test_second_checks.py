@@ -261,6 +261,22 @@ async def test_offboard_chosen_on_the_ground_is_refused_when_the_drone_rises_in_
         assert motion(w, began) == []
 
 
+async def test_offboard_while_a_mission_is_about_to_take_off_is_refused_and_the_mission_flies() -> None:
+    """The drone has the start, and has not reported it: its take-off would be none of the session's."""
+    async with world(speed=1.0, web=True) as w:
+        await put(w, [takeoff(UP), way(30.0, 0.0, UP)])
+        pilot = await w.connect(sysid=254)
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        w.drone.faults.down = Impairment(delay=1.0)
+        async with streaming(pilot, local(VELOCITY_ONLY, v=(0.0, 2.0, 0.0))):
+            w.client.send_command(START)
+            await w.drone.wait_log(lambda e: e.kind == "command" and e.name.endswith(".Start"), 10.0)
+            mark = pilot.mark()
+            assert (await pilot.command(SET_MODE, *OFFBOARD)).result == REJECTED
+            await said(pilot, "Offboard refused: drone is about to take off", mark)
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 5.0, 40.0)
+
+
 async def test_offboard_during_a_takeoff_is_refused_while_sticks_follow_the_camera() -> None:
     async with world(speed=1.0) as w:
         somebody_else(w, piloting_style.SetStyle(CAMERA))

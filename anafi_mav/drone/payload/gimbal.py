@@ -17,7 +17,7 @@ from typing import ClassVar
 import msgspec
 from msgspec.structs import replace
 
-from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.codec.wire import HEADER, Message
 from anafi_mav.arsdk.messages import gimbal
 from anafi_mav.arsdk.messages.gimbal import (
     Axis,
@@ -31,6 +31,7 @@ from anafi_mav.arsdk.messages.gimbal import (
 from anafi_mav.drone.element import Range, Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.settings import Commanding
+from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
 from anafi_mav.units import clip
 
@@ -160,6 +161,18 @@ def _attitude(message: gimbal.Attitude) -> GimbalAttitude | None:
     }
     return GimbalAttitude(frames, relative, absolute)
 
+
+def main_frames(values: Values) -> bytes | None:
+    """Return the frames of reference that the main gimbal's axes hold, as on the wire.
+
+    None when the values are of another gimbal. Frames are compared thirty times a second, and hardly ever change.
+    """
+    data = values[gimbal.Attitude].data
+    return data[_FRAMES] if data[_FRAMES.start - 1] == MAIN else None
+
+
+_FRAMES = slice(HEADER.size + 1, HEADER.size + 1 + 3 * 4)
+"""Behind the header and the number of the gimbal: three enums."""
 
 Gimbals = Mapping[int, GimbalState]
 
@@ -309,7 +322,7 @@ class Gimbal(Commanding[Gimbals]):
     async def stop(self, id: int = MAIN, timeout: float = ANSWER_TIMEOUT) -> GimbalAttitude:
         """Stop all axes; return the attitude once the gimbal stands."""
         command = self._stop_command(id)
-        answer = self._commander.expect((gimbal.Attitude,), _Standing(id))
+        answer = self._commander.expect((gimbal.Attitude,), _Standing(id, self._axes(id)))
         return await self._insist(id, command, answer, timeout)
 
     def _stop_command(self, id: int) -> gimbal.SetTarget:
@@ -321,9 +334,9 @@ class Gimbal(Commanding[Gimbals]):
 
     async def reset_orientation(self, id: int = MAIN, timeout: float = 2 * ANSWER_TIMEOUT) -> GimbalAttitude:
         """Turn to the drone's reference orientation; return the attitude once the gimbal rests."""
-        self._axes(id)
+        standing = _Standing(id, self._axes(id))
         self._orders[id] += 1
-        return await self._commander.confirm(gimbal.ResetOrientation(id), (gimbal.Attitude,), _Standing(id), timeout)
+        return await self._commander.confirm(gimbal.ResetOrientation(id), (gimbal.Attitude,), standing, timeout)
 
     # -- settings
 
@@ -499,11 +512,12 @@ class _Turning:
 class _Standing:
     """A judge: the attitude at which the gimbal has come to rest.
 
-    It is in the frame that each axis holds.
+    It is in the frame that each axis holds. An axis that the gimbal does not have turns with the drone.
     """
 
-    def __init__(self, id: int) -> None:
+    def __init__(self, id: int, axes: frozenset[Axis]) -> None:
         self._id = id
+        self._axes = axes
         self._last: GimbalAttitude | None = None
         self._seen = 0
 
@@ -515,11 +529,12 @@ class _Standing:
         self._seen += 1
         if last is None or self._seen < SETTLING:
             return None
-        moved = max(
+        is_still = all(
             abs(_turn(last.angle(axis, attitude.frames[axis]), attitude.angle(axis, attitude.frames[axis])))
-            for axis in Axis
+            <= STILL_DEG
+            for axis in self._axes
         )
-        return attitude if moved <= STILL_DEG else None
+        return attitude if is_still else None
 
 
 def _turn(start: float, end: float) -> float:

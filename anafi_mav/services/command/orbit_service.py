@@ -16,6 +16,7 @@ from itertools import pairwise
 from anafi_mav import geo, texts, units
 from anafi_mav.drone import events
 from anafi_mav.drone.piloting.moves import Move, MoveEnd
+from anafi_mav.drone.values import Values
 from anafi_mav.errors import LinkLost
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.command_targets import height, place
@@ -29,7 +30,7 @@ from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import ValueSubscriptions
 from anafi_mav.vehicle.base.velocity_loop import VelocityController, tilt_limit
 from anafi_mav.vehicle.circle import (
     DEFAULT_RADIUS,
@@ -60,7 +61,7 @@ Sticks are ignored during an orbit, so the nose stays free.
 
 @dataclass
 class _Orbit:
-    """One orbit, from the way to the circle on."""
+    """One orbit, from the way to the circle on; the newest one is kept after its end."""
 
     lap: Lap
     cruise: float | None
@@ -68,6 +69,7 @@ class _Orbit:
     approach: asyncio.Task[None] | None = None
     controller: VelocityController | None = None
     """None on the way to the circle."""
+    is_over: bool = False
 
 
 class OrbitService(Service, PlainTask):
@@ -78,9 +80,12 @@ class OrbitService(Service, PlainTask):
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._orbit: _Orbit | None = None
-        self._is_flown = False
-        """The newest orbit was flown to its end."""
+        self._newest: _Orbit | None = None
+
+    @property
+    def _orbit(self) -> _Orbit | None:
+        """The orbit that is flown, or flown to; None without one."""
+        return None if self._newest is None or self._newest.is_over else self._newest
 
     @property
     def circle(self) -> Circle | None:
@@ -94,7 +99,7 @@ class OrbitService(Service, PlainTask):
                 location=True,
                 altitude=Altitude.AMSL,
                 effect=Effect.CHANGE,
-                still_holds=lambda: self._orbit is not None or self._is_flown,
+                still_holds=lambda: self._newest is not None and (not self._newest.is_over or self._newest.lap.done),
             )
         }
 
@@ -105,9 +110,10 @@ class OrbitService(Service, PlainTask):
 
     def end(self) -> list[asyncio.Task[None]]:
         """End this flight task: something else flies the drone now."""
-        orbit, self._orbit = self._orbit, None
+        orbit = self._orbit
         if orbit is None:
             return []
+        orbit.is_over = True
         with contextlib.suppress(LinkLost):
             self.host.drone.piloting.pilot(None)
         if orbit.approach is None or orbit.approach is asyncio.current_task():
@@ -116,7 +122,7 @@ class OrbitService(Service, PlainTask):
         return [orbit.approach]
 
     def link_down(self) -> None:
-        orbit, self._orbit = self._orbit, None
+        orbit, self._newest = self._newest, None
         if orbit is not None and orbit.approach is not None:
             orbit.approach.cancel()
 
@@ -153,7 +159,7 @@ class OrbitService(Service, PlainTask):
                 )
             else:
                 vehicle.drone.piloting.hover()  # ends a move of ours, which would ignore sticks
-            self._orbit, self._is_flown = orbit, False
+            self._newest = orbit
             grant.begin()
             if is_away and (move := vehicle.drone.piloting.move) is not None:
                 orbit.approach = self.host.spawn(self._approach(move, orbit))
@@ -230,8 +236,11 @@ class OrbitService(Service, PlainTask):
 
     # Flying.
 
-    def subscriptions(self) -> Subscriptions:
-        return dict.fromkeys((events.SpeedChanged, events.AttitudeChanged), lambda message, now: self._fly(now))
+    def value_subscriptions(self) -> ValueSubscriptions:
+        return {self._on_motion: (events.SpeedChanged, events.AttitudeChanged)}
+
+    def _on_motion(self, values: Values, now: float) -> None:
+        self._fly(now)
 
     def _fly(self, now: float) -> None:
         vehicle, orbit = self.host.vehicle, self._orbit
@@ -247,7 +256,6 @@ class OrbitService(Service, PlainTask):
         if sticks is None:
             self._stop(texts.POSITION_UNKNOWN, Severity.WARNING)
         elif lap.done:
-            self._is_flown = True
             self._stop(texts.ORBIT_DONE, Severity.INFO)
         else:
             vehicle.drone.piloting.pilot(sticks)

@@ -15,8 +15,9 @@ from typing import Any, Protocol
 from anafi_mav import texts
 from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import events
-from anafi_mav.drone.events import AlertState, FlyingState, ForcedLandingReason, Message, PlayError, PlayingState
+from anafi_mav.drone.events import AlertState, FlyingState, ForcedLandingReason, PlayError, PlayingState
 from anafi_mav.drone.sent_commands import SentCommand
+from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import FlightPlanFile
@@ -26,7 +27,7 @@ from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import DroneRefused, Refused, not_ready, reason_of, text_of
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
 from anafi_mav.vehicle.mission.course import Course
 from anafi_mav.vehicle.mission.effects import (
     Acquire,
@@ -90,8 +91,6 @@ class MissionFlight(PlainTask):
         self._outlet: MissionOutlet | None = None
         self._background: asyncio.Task[None] | None = None
         """Runs the machine's work when no command of a client does."""
-        self._flown: SentCommand | str | None = None
-        """The flight of a plan that the drone reported last: reports are repeated."""
 
     def attach(self, outlet: MissionOutlet) -> None:
         """Report to clients and memory from now on."""
@@ -346,16 +345,11 @@ class MissionFlight(PlainTask):
     async def _acquire(self, work: Acquire, by: Right | None) -> list[Effect]:
         """Acquire control, and hover; return the effects of the grant.
 
-        Without a client the mission has control since its mode was chosen. A mission that was replaced meanwhile
-        does not become active.
+        Without a client the mission has control since its mode was chosen, and its end cancels this work. A mission
+        that was replaced meanwhile does not become active.
         """
-        control = self._vehicle.control
-        if by is None and control.active is not self:
-            raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
-        async with contextlib.nullcontext() if by is None else control.acquire(self, by=by):
+        async with contextlib.nullcontext() if by is None else self._vehicle.control.acquire(self, by=by):
             await self._stop(work.prepared)
-            if by is None and control.active is not self:
-                raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
             if not (effects := self.machine.granted(work.attempt)):
                 self._require_same(work.attempt)
                 raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
@@ -410,23 +404,29 @@ class MissionFlight(PlainTask):
             events.MavlinkFilePlayingStateChanged: self._on_playing,
             events.MissionItemExecuted: lambda message, now: self._handle(machine.executed(message.idx)),
             events.WaypointSkipped: lambda message, now: self._handle(machine.skipped(message.item)),
-            **dict.fromkeys(PROOF, self._on_position),
         }
 
+    def value_subscriptions(self) -> ValueSubscriptions:
+        """Return the handler of the values that prove that the drone is at its last way point."""
+        return {self._on_position: PROOF}
+
     def _on_playing(self, message: events.MavlinkFilePlayingStateChanged, now: float) -> None:
-        plan, before = self._vehicle.drone.flight_plan, self._flown
-        flown = self._flown = plan.flown
+        plan = self._vehicle.drone.flight_plan
+        flown = plan.flown
         match message.state:
-            case PlayingState.PLAYING if flown != before and not plan.plays_withdrawn:
+            case PlayingState.PLAYING if not plan.plays_withdrawn:
                 attempt = flown.cause if isinstance(flown, SentCommand) else None
                 self._handle(self.machine.playing(message.filepath, attempt))
             case PlayingState.PAUSED | PlayingState.STOPPED if flown is None:
                 stopped = message.state == PlayingState.STOPPED
                 self._handle(self.machine.halted(stopped=stopped, report=self._report(), now=self._now))
 
-    def _on_position(self, message: Message, now: float) -> None:
-        if self.machine.state is State.ENDING:
-            self._handle(self.machine.reported(self._report(), type(message)))
+    def _on_position(self, values: Values, now: float) -> None:
+        if self.machine.state is not State.ENDING:
+            return
+        for kind in values:
+            if kind in PROOF and self.machine.state is State.ENDING:
+                self._handle(self.machine.reported(self._report(), kind))
 
     def on_vehicle(self) -> None:
         """Landing, return or flying state have changed."""
@@ -470,7 +470,7 @@ class MissionFlight(PlainTask):
 
     def link_up(self, record: MissionRecord | None) -> None:
         """The drone is connected again, or to a new gateway: look if it flies our mission."""
-        plan, self._flown = self._vehicle.drone.flight_plan.state, self._vehicle.drone.flight_plan.flown
+        plan = self._vehicle.drone.flight_plan.state
         plays, in_air = plan.playing == PlayingState.PLAYING, self._vehicle.in_air
         self._handle(self.machine.link_up(record, plan.uid, plays=plays, in_air=in_air))
 

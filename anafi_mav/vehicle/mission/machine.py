@@ -281,6 +281,8 @@ class MissionPhase:
     """ENDING: parts of the position that have not been received since the drone stopped."""
     waits_for_position: bool = False
     """ENDING: only a position is missing for the decision."""
+    plays: str | None = None
+    """The plan that another controller lets the drone fly."""
     may_end_late: bool = False
     """PAUSED: the drone stopped its plan. Its report of the last line still completes the mission."""
 
@@ -577,14 +579,16 @@ class MissionMachine:
     # Reports of the drone.
 
     def playing(self, uid: str, attempt: MissionAttempt | None) -> list[Effect]:
-        """The drone has begun to fly the plan of this name.
+        """The drone flies the plan of this name; it may report that twice.
 
         `attempt` has started it; None: another controller.
         """
-        if attempt is not None and attempt is self.phase.attempt:
-            return self._playing(attempt)
+        if attempt is not None:
+            return self._playing(attempt) if attempt is self.phase.attempt else []
+        if uid == self.phase.plays:
+            return []
         known = self._paused_file()
-        return self._other_playing() if known is None or uid != known.uid else self._resumed(known)
+        return self._other_playing(uid) if known is None or uid != known.uid else self._resumed(known)
 
     @_on(E.PLAYING)
     def _playing(self, attempt: MissionAttempt) -> _Steps:
@@ -602,21 +606,25 @@ class MissionMachine:
     def _resumed(self, known: MissionProgress) -> _Steps:
         """Show the mission as flown: a client that looks at it has to see that."""
         self.progress = replace(known, left=None, kept=self.progress.kept)
-        self._be(S.FLYING_FILE)
+        self.phase = MissionPhase(S.FLYING_FILE, S.FLYING_FILE, plays=known.uid)
         yield Select()
         yield SendText(Severity.NOTICE, texts.MISSION_RESUMED_ELSEWHERE)
 
     @_on(E.OTHER_PLAYING)
-    def _other_playing(self) -> _Steps:
+    def _other_playing(self, uid: str) -> _Steps:
         if self.flying:
             yield from self._stop(texts.MISSION_OTHER_PLAN)
         else:
-            self.phase = replace(self.phase, may_end_late=False)
             yield SendText(Severity.NOTICE, texts.OTHER_PLAN)
+        self.phase = replace(self.phase, may_end_late=False, plays=uid)
+
+    def halted(self, *, stopped: bool, report: DroneReport, now: float) -> list[Effect]:
+        """The drone reports its plan as paused, or as `stopped`."""
+        self.phase = replace(self.phase, plays=None)
+        return self._halted(stopped=stopped, report=report, now=now)
 
     @_on(E.HALTED)
-    def halted(self, *, stopped: bool, report: DroneReport, now: float) -> _Steps:
-        """The drone reports its plan as paused, or as `stopped`."""
+    def _halted(self, *, stopped: bool, report: DroneReport, now: float) -> _Steps:
         progress = self.progress
         if progress.leg_done:
             yield from self._part_over()
@@ -721,7 +729,7 @@ class MissionMachine:
             progress = self.progress = replace(progress, current=later)
         current = progress.current + FIRST_LABEL
         if plays and uid == progress.uid:
-            self._be(S.FLYING_FILE)
+            self.phase = MissionPhase(S.FLYING_FILE, S.FLYING_FILE, plays=uid)
             yield Select()
             yield SendText(Severity.NOTICE, texts.MISSION_FOUND_FLYING.fill(item=current))
         elif progress.leg_done and later is None:

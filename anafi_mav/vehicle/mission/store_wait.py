@@ -21,16 +21,16 @@ class StoreWait:
     """
 
     def __init__(self) -> None:
-        self._stored: asyncio.Event | None = None
+        self._stored: asyncio.Future[None] | None = None
 
     @contextmanager
     def going_on(self) -> Iterator[None]:
         """For as long as a mission is being stored, and until it is the one of the vehicle."""
-        stored = self._stored = asyncio.Event()
+        stored = self._stored = asyncio.get_running_loop().create_future()
         try:
             yield
         finally:
-            stored.set()
+            stored.set_result(None)
             if self._stored is stored:
                 self._stored = None
 
@@ -45,7 +45,6 @@ class StoreWait:
         Raises `Refused` when it takes too long.
         """
         while self._stored is not None:
-            try:
-                await asyncio.wait_for(self._stored.wait(), STORE_WAIT)
-            except asyncio.TimeoutError:
-                raise Refused(texts.MISSION, texts.MISSION_STORING) from None
+            done, _ = await asyncio.wait({self._stored}, timeout=STORE_WAIT)
+            if not done:
+                raise Refused(texts.MISSION, texts.MISSION_STORING)

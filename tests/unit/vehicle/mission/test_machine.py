@@ -263,6 +263,21 @@ def test_paused_mission_that_another_controller_resumes_is_shown_as_flown() -> N
     assert machine.state is S.FLYING_FILE
 
 
+def test_playing_that_the_drone_repeats_counts_once() -> None:
+    """Of its own start, of a mission that another controller has resumed, and of another plan; a stop ends each."""
+    machine, attempt = starting()
+    assert names(machine.playing("a", attempt)) == "Persist"
+    assert machine.playing("a", attempt) == []
+    machine.control_lost()
+    assert machine.playing("a", attempt) == []
+    assert names(machine.playing("a", None)) == "Select SendText"
+    assert machine.playing("a", None) == []
+    assert names(machine.playing("b", None)) == "SendText Release Persist"
+    assert machine.playing("b", None) == []
+    machine.halted(stopped=True, report=GONE, now=NOW)
+    assert names(machine.playing("b", None)) == "SendText"
+
+
 def test_mission_uploaded_while_armed_start_waits_for_it_is_flown() -> None:
     machine = loaded()
     machine.await_arm("client", NOW)
