@@ -1,7 +1,7 @@
 """Looks at what a zenoh router knows, for sessions over a link that loses datagrams.
 
-It uses a session of its own. zenoh sends each declaration once, and its sessions remember what they have declared and heard: within a session what
-was lost on the way stays lost. Imports zenoh: `zenoh_session` starts it.
+It uses a session of its own. zenoh sends each declaration once, and its sessions remember what they have declared and
+heard: within a session what was lost on the way stays lost. Imports zenoh: `zenoh_session` starts it.
 """
 
 from __future__ import annotations
