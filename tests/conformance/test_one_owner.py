@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 
 import pytest
 from support.fault_scenarios import ACCEPTED, ARM, PX4_OFFBOARD, SET_MODE, TAKEOFF_CMD, goto
-from support.setpoints import COPTER_GUIDED, POSITION_ONLY, VELOCITY_ONLY, earth, local, streaming
-from support.world import world
+from support.setpoints import COPTER_GUIDED, POSITION_ONLY, VELOCITY_ONLY, earth, heard, local, streaming
+from support.world import HOME, world
+
+from anafi_mav.errors import CommandRejected
 
 UP = 8.0
 NORTH = earth(POSITION_ONLY, 6, 20.0, 0.0, UP)
@@ -44,3 +47,29 @@ async def test_offboard_during_the_motor_ramp_follows_the_takeoff() -> None:
             assert (await w.client.command(ARM, 1)).result == ACCEPTED
             assert (await w.client.command(SET_MODE, *PX4_OFFBOARD)).result == ACCEPTED
             await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 6.0, 30.0)
+
+
+@pytest.mark.parametrize("late", [0.0, 1.0], ids=["in time", "late"])
+async def test_action_that_ignores_its_end_sends_nothing_that_collides_with_a_hold(late: float) -> None:
+    """In the wait of a Hold it may stop what it has begun; after that wait it sends nothing at all."""
+    async with world(speed=1.0) as w:
+        await w.take_off(UP)
+        vehicle, refused = w.gateway.systems[0].vehicle, []
+
+        async def stubborn() -> None:
+            with contextlib.suppress(asyncio.CancelledError):
+                await asyncio.sleep(60.0)
+            await asyncio.sleep(late)
+            move, stop = vehicle.drone.piloting.move_to, vehicle.drone.calibration.abort_magnetometer
+            for verb in (move(HOME[0] + 0.001, HOME[1], UP), *([stop()] if late else [])):
+                with pytest.raises(CommandRejected):
+                    await verb
+                refused.append(verb)
+
+        action = vehicle.control.run(None, stubborn())
+        await asyncio.sleep(0.1)
+        began = asyncio.get_running_loop().time()
+        assert (await w.client.command(SET_MODE, 1, 4, 3)).result == ACCEPTED
+        await asyncio.wait({action})
+        assert len(refused) == (2 if late else 1)
+        assert heard(w, "moveTo", since=began) == heard(w, "MagnetoCalibration", since=began) == []
