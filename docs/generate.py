@@ -131,7 +131,8 @@ loopback is therefore served in full only after its third datagram within 10 s:
 A station with a heartbeat a second is served after 2 s. A forger needs three datagrams for each address. TCP, `udpout`
 and loopback are not limited. A command has its effect with the first datagram: this limits what is sent, not who may
 fly. Addresses without proof have `max_clients` places of their own, in which a new one replaces the one that has been
-silent for longest, at once.
+silent for longest, at once. Replaced and refused clients are warnings in the log: one of each kind in 10 s, with the
+number of the others.
 
 ### Byte budget
 

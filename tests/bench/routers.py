@@ -1,11 +1,12 @@
-"""Delay that a MAVLink router adds between a gateway and a station, beside none, in one run.
+"""Delay that a MAVLink router, or a zenoh network, adds between a gateway and a station, beside none, in one run.
 
     .venv/bin/python tests/bench/routers.py [COMMANDS] [DRONES]
 
-One gateway has an endpoint for each path: a station over TCP, one over UDP, and a router that is connected over TCP and
-has a station at its UDP port. MAVProxy is in the test extra; MAVLINK_ROUTERD and MAVP2P name the programs of
-mavlink-router and mavp2p. The paths take turns: each sends a command that the gateway refuses at once, and waits for
-its answer. All paths stream the telemetry of all drones meanwhile. The figures are of the way there and back.
+One gateway has an endpoint for each path: a station over TCP, one over UDP, a router that is connected over TCP and
+has a station at its UDP port, and a zenoh router (the Python package) with `anafi-mav ground` and a station at its UDP
+port. MAVProxy is in the test extra; MAVLINK_ROUTERD and MAVP2P name the programs of mavlink-router and mavp2p. The
+paths take turns: each sends a command that the gateway refuses at once, and waits for its answer. All paths stream the
+telemetry of all drones meanwhile. The figures are of the way there and back.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from pathlib import Path
 
 import yaml
 from common import loopback, machine, product, quantile
+from fabric import router
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -31,6 +33,9 @@ ANSWER_LIMIT = 5.0
 START_LIMIT = 60.0
 SETTLE = 5.0
 """s of telemetry before the first command."""
+
+FABRIC = "zenoh"
+"""Path over a zenoh router and the ground process."""
 
 ACK = mavlink.MAVLINK_MSG_ID_COMMAND_ACK.to_bytes(3, "little")
 
@@ -82,38 +87,46 @@ def main() -> None:
         {"name": f"d{n}", "sysid": n, "address": f"{head}.{int(last) + n - 1}", "http_port": 8080}
         for n in range(1, drones + 1)
     ]
-    present = [(router, found) for router in ROUTERS if (found := program_of(router)) is not None]
-    for router in ROUTERS:
-        if router not in dict(present):
-            print(f"{router}: skipped, {ROUTERS[router]} names no program")
-    ports = {router: 5770 + index for index, (router, _) in enumerate(present)}
+    present = [(name, found) for name in ROUTERS if (found := program_of(name)) is not None]
+    for name in ROUTERS:
+        if name not in dict(present):
+            print(f"{name}: skipped, {ROUTERS[name]} names no program")
+    ports = {name: 5770 + index for index, (name, _) in enumerate(present)}
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        fabric = probe.getsockname()[1]
     endpoints = [
         f"tcpin://{host}:5760",
         f"udpin://{host}:14550",
         *(f"tcpin://{host}:{port}" for port in ports.values()),
+        f"zenoh://127.0.0.1:{fabric}",
     ]
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
         config = Path(folder) / "fleet.yaml"
         config.write_text(
             yaml.safe_dump({"endpoints": endpoints, "drones": fleet, "state": folder, "video": False, "http": False})
         )
+        stack.enter_context(router(fabric))
         stack.enter_context(product("sim", "--address", first, "--count", str(drones), "--http-port", "8080"))
         stack.enter_context(product("run", "-c", str(config)))
         paths = {
             "none, TCP": Station(0, host, 5760, socket.SOCK_STREAM),
             "none, UDP": Station(1, host, 14550, socket.SOCK_DGRAM),
         }
-        for index, (router, found) in enumerate(present):
+        for index, (name, found) in enumerate(present):
             stations = f"{host}:{14560 + index}"
             process = subprocess.Popen(
-                words(router, found, [f"{host}:{ports[router]}"], stations),
+                words(name, found, [f"{host}:{ports[name]}"], stations),
                 stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=folder,
             )  # fmt: skip
             stack.callback(process.terminate)
-            paths[router] = Station(2 + index, host, 14560 + index, socket.SOCK_DGRAM)
+            paths[name] = Station(2 + index, host, 14560 + index, socket.SOCK_DGRAM)
+        ground = ("--zenoh", f"zenoh://127.0.0.1:{fabric}", "--endpoint", f"udpin://{host}:14570")
+        stack.enter_context(product("ground", *ground))
+        paths[FABRIC] = Station(2 + len(present), host, 14570, socket.SOCK_DGRAM)
         delays = measure(paths, commands, drones)
     print(machine(), f"{drones} drones, {commands} commands on each path")
-    print("| router | p50 | 99 % | largest | added to UDP, p50 | without answer |\n|---|---|---|---|---|---|")
+    print("| path | p50 | 99 % | largest | added to UDP, p50 | without answer |\n|---|---|---|---|---|---|")
     base = quantile(delays["none, UDP"], 0.5)
     for path, found in delays.items():
         p50, p99 = quantile(found, 0.5), quantile(found, 0.99)

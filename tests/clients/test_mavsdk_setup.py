@@ -30,8 +30,12 @@ async def test_conf_116_mavsdk_param_ftp_metadata_events(flavour: str, tmp_path:
         folder = tmp_path / "downloads"
         folder.mkdir()
         words = (sys.executable, "-u", str(SCRIPT), f"tcpout://{w.address}:5760", str(folder), flavour)
-        # Its cache of metadata lies in the home directory: an empty one, so that it has to load.
-        env = {"HOME": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache"), "MAVSDK_PARAMETER_DEBUGGING": "1"}
+        # Its cache of metadata lies in the home directory: an empty one, so that it has to load. It loads each file
+        # once: where COMPONENT_METADATA is not received after five requests, or a transfer is silent for ten times half
+        # a second, it reports nothing to its user and does not try again (component_metadata_impl.cpp,
+        # retrieve_metadata). A computer that stalls for so long fails this test: its log shows at which file.
+        env = {"HOME": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache"), "MAVSDK_PARAMETER_DEBUGGING": "1",
+               "MAVSDK_COMPONENT_METADATA_DEBUGGING": "1"}  # fmt: skip
         async with program(*words, env=env) as script:
             await script.line(lambda line: line == "done", timeout=90.0)
 

@@ -12,13 +12,26 @@ from collections.abc import Callable
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.flavours import both
-from support.missions import ACTIVE, MISSION_MODE, NOT_STARTED, flown, put, reached, state, takeoff, way
+from support.missions import (
+    ACTIVE,
+    COMPLETE,
+    MISSION_MODE,
+    NOT_STARTED,
+    flown,
+    put,
+    reached,
+    start,
+    state,
+    takeoff,
+    way,
+)
 from support.setpoints import said, texts
 from support.world import World, world
 
 from anafi_mav.arsdk.messages import alarms, ardrone3, common
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
 from anafi_mav.arsdk.messages.common import FlightPlanComponent as Part
+from anafi_mav.sim import SimulatedDrone
 from anafi_mav.sim.world.faults import Faults
 
 COMPONENT = common.ComponentStateListChanged.NAME
@@ -119,3 +132,18 @@ async def test_conf_049_mission_refused_by_the_drone_names_its_reason(part: Part
             await told(w, part, True, since)
         assert (await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, ACTIVE, since=0)
+
+
+@pytest.mark.parametrize("model", ["4k", "ai"])
+async def test_drone_that_reports_no_playing_state_before_a_plan_flies_one(model: str) -> None:
+    """Parrot's common.xml has the state reported by start, pause and stop alone."""
+
+    def silent(drone: SimulatedDrone) -> None:
+        drone.faults.untold = frozenset({common.MavlinkFilePlayingStateChanged.NAME})
+
+    async with world(model=model, web=True, before=silent) as w:
+        w.drone.faults.untold = frozenset()
+        await put(w, [takeoff(6.0), way(12.0, 0.0, 6.0)])
+        await start(w)
+        await state(w, COMPLETE, since=0)
+        assert reached(w) == [0, 1]

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from typing_extensions import Self
 
 from anafi_mav.clock import SystemClock
 from anafi_mav.fabric.ground import FabricGround
@@ -109,13 +110,14 @@ async def ground(url: str, scheme: str = "udpin") -> AsyncIterator[int]:
 class FabricStation(Client):
     """A ground station at the port of a ground process: it sends a heartbeat a second."""
 
-    async def join(self, port: int, *, tcp: bool = False, timeout: float = 20.0) -> FabricStation:
+    async def join(self, port: int, *, tcp: bool = False, host: str = "", timeout: float = 20.0) -> Self:
         """Connect, and wait until it has received a vehicle's heartbeat.
 
         `tcp`: for a burst that a UDP socket would lose, because gateway, ground and client share one event loop.
+        `host`: a gateway's own address, by TCP.
         """
-        if tcp:
-            await self.connect(port)
+        if tcp or host:
+            await self.connect(port, host or "127.0.0.1")
         else:
             self.connect_udp("127.0.0.1", port)
         self._beating = asyncio.get_running_loop().create_task(self._beat())
@@ -131,3 +133,25 @@ class FabricStation(Client):
         while True:
             self.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
             await asyncio.sleep(1.0)
+
+
+class StationOfSystem(FabricStation):
+    """A station of one system among several: what the helpers send to system 1 goes to that one."""
+
+    def __init__(self, system: int) -> None:
+        super().__init__()
+        self.system = system
+        self._sent = dialect.MAVLink(None)
+        self._again = dialect.MAVLink(None, self.sysid, self.compid)
+
+    def send_raw(self, data: bytes) -> None:
+        for message in self._sent.parse_buffer(data):
+            if hasattr(message, "target_system"):
+                message.target_system = self.system
+            super().send_raw(message.pack(self._again))
+            self._again.seq = (self._again.seq + 1) % 256
+
+    def feed(self, data: bytes) -> None:
+        before = len(self.received)
+        super().feed(data)
+        self.received[before:] = [one for one in self.received[before:] if one[1].get_srcSystem() == self.system]

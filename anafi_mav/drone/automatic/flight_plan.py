@@ -79,6 +79,14 @@ class FlightPlanState(msgspec.Struct, frozen=True):
     recovery: Recovery | None = None
 
     @property
+    def is_reported(self) -> bool:
+        """True for a drone that flies plans.
+
+        It may report a playing state only after the first start (common.xml 0-12-0).
+        """
+        return self.playing is not None or self.available is not None or bool(self.components)
+
+    @property
     def unavailable(self) -> tuple[str, ...]:
         """Requirements that prevent the flight of a plan, in words."""
         words = [spoken(part) for part, ok in self.components.items() if not ok]
@@ -295,7 +303,7 @@ class FlightPlan(Commanding[FlightPlanState]):
         self._available()
         self._commander.abort_pending("stopped", Slot.PLAN)
         await self._commander.stops_delivered(common.Stop.NAME, timeout)
-        if self.state.playing == PlayingState.STOPPED:
+        if self.state.playing in (None, PlayingState.STOPPED):
             return
         await self._end(common.Stop(), PlayingState.STOPPED, timeout)
 
@@ -316,7 +324,7 @@ class FlightPlan(Commanding[FlightPlanState]):
         )
 
     def _available(self) -> None:
-        self._require(self.state.playing, "flight plans")
+        self._require(self.state.is_reported or None, "flight plans")
 
 
 def _checked(uid: str) -> str:

@@ -309,7 +309,7 @@ class Gimbal(Commanding[Gimbals]):
     async def stop(self, id: int = MAIN, timeout: float = ANSWER_TIMEOUT) -> GimbalAttitude:
         """Stop all axes; return the attitude once the gimbal stands."""
         command = self._stop_command(id)
-        answer = self._commander.expect((gimbal.Attitude,), _Standing(id))
+        answer = self._commander.expect((gimbal.Attitude,), _Standing(id, self._axes(id)))
         return await self._insist(id, command, answer, timeout)
 
     def _stop_command(self, id: int) -> gimbal.SetTarget:
@@ -321,9 +321,9 @@ class Gimbal(Commanding[Gimbals]):
 
     async def reset_orientation(self, id: int = MAIN, timeout: float = 2 * ANSWER_TIMEOUT) -> GimbalAttitude:
         """Turn to the drone's reference orientation; return the attitude once the gimbal rests."""
-        self._axes(id)
+        standing = _Standing(id, self._axes(id))
         self._orders[id] += 1
-        return await self._commander.confirm(gimbal.ResetOrientation(id), (gimbal.Attitude,), _Standing(id), timeout)
+        return await self._commander.confirm(gimbal.ResetOrientation(id), (gimbal.Attitude,), standing, timeout)
 
     # -- settings
 
@@ -499,11 +499,12 @@ class _Turning:
 class _Standing:
     """A judge: the attitude at which the gimbal has come to rest.
 
-    It is in the frame that each axis holds.
+    It is in the frame that each axis holds. An axis that the gimbal does not have turns with the drone.
     """
 
-    def __init__(self, id: int) -> None:
+    def __init__(self, id: int, axes: frozenset[Axis]) -> None:
         self._id = id
+        self._axes = axes
         self._last: GimbalAttitude | None = None
         self._seen = 0
 
@@ -515,11 +516,12 @@ class _Standing:
         self._seen += 1
         if last is None or self._seen < SETTLING:
             return None
-        moved = max(
+        is_still = all(
             abs(_turn(last.angle(axis, attitude.frames[axis]), attitude.angle(axis, attitude.frames[axis])))
-            for axis in Axis
+            <= STILL_DEG
+            for axis in self._axes
         )
-        return attitude if moved <= STILL_DEG else None
+        return attitude if is_still else None
 
 
 def _turn(start: float, end: float) -> float:

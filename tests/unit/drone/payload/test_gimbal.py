@@ -131,6 +131,18 @@ async def test_point_gives_up_when_it_does_not_come_or_another_target_does(drone
         await waiting
 
 
+async def test_stop_is_confirmed_while_the_drone_turns(device: ScriptedDevice, drone: Drone) -> None:
+    """This gimbal has no yaw axis: whatever frame is reported for it, its absolute angle is the drone's heading."""
+
+    def turning(_: gimbal.SetTarget) -> list[Message]:
+        return [
+            gimbal.Attitude(0, NONE, ABSOLUTE, ABSOLUTE, 0.0, -30.0, 0.0, 20.0 * step, -20.0, 0.0) for step in range(4)
+        ]
+
+    device.script[gimbal.SetTarget] = turning
+    assert (await drone.gimbal.stop(timeout=0.5)).absolute.pitch == -20.0
+
+
 async def test_settings_and_offsets(device: ScriptedDevice, drone: Drone) -> None:
     device.script[gimbal.SetMaxSpeed] = lambda m: [
         gimbal.MaxSpeed(1, 0, 0, 0, 1.0, 2.0, 2.0, 0, 0, 0),  # another gimbal's
