@@ -73,3 +73,13 @@ async def test_action_that_ignores_its_end_sends_nothing_that_collides_with_a_ho
         await asyncio.wait({action})
         assert len(refused) == (2 if late else 1)
         assert heard(w, "moveTo", since=began) == heard(w, "MagnetoCalibration", since=began) == []
+
+
+async def test_action_of_the_flight_core_ends_with_the_link() -> None:
+    """It waits for no answer of the drone, whose loss would end it."""
+    async with world(speed=1.0) as w:
+        await w.take_off(UP)
+        action = w.gateway.systems[0].vehicle.control.run(None, asyncio.sleep(60.0))
+        w.drone.faults.mute = True
+        await asyncio.wait({action}, timeout=10.0)
+        assert action.cancelled()
