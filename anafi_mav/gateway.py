@@ -29,6 +29,7 @@ from anafi_mav.disk_writer import HANGS
 from anafi_mav.drone import Drone, events
 from anafi_mav.drone.contention import Contention
 from anafi_mav.drone.rest import HTTP_PORT
+from anafi_mav.drone.values import VALUES
 from anafi_mav.errors import AnafiMavError, ConfigError, HandshakeRefused, WrongAircraft
 from anafi_mav.fabric.endpoint import FabricEndpoint
 from anafi_mav.fabric.sample_age import StopKind
@@ -150,7 +151,7 @@ class _Supervised:
         self._contention = Contention()
         self._judged = drone.handshake_at
         """The handshake whose loss was judged last."""
-        drone.subscribe(self._on_event)
+        drone.subscribe(self._on_event, without=VALUES)
 
     async def run(self) -> None:
         """Keep the drone connected until cancelled."""

@@ -10,14 +10,14 @@ import contextlib
 import logging
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from datetime import datetime
 from functools import partial
 from typing import Any, TypeAlias, TypeVar
 
 from anafi_mav import models
 from anafi_mav.arsdk.codec.secret_fields import without_secrets
-from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
+from anafi_mav.arsdk.codec.wire import Message, PackedMessage, Received, UnknownMessage
 from anafi_mav.arsdk.link.controller import ControllerSession
 from anafi_mav.arsdk.link.handshake import DISCOVERY_PORT, DeviceInfo
 from anafi_mav.arsdk.messages import ardrone3, common, drone_manager, rth, skyctrl
@@ -58,6 +58,7 @@ from anafi_mav.drone.status.home import Home, modern
 from anafi_mav.drone.status.link import Link
 from anafi_mav.drone.status.product import MODELS, Identity, Product
 from anafi_mav.drone.status.sound import Sound
+from anafi_mav.drone.values import VALUES, OnValues, Values
 from anafi_mav.drone.video.route import Direct, Mux, VideoRoute
 from anafi_mav.drone.video.stream_choice import StreamChoice
 from anafi_mav.drone.video.video import Video
@@ -188,7 +189,11 @@ class Drone:
             drone_manager.ConnectionState: self._controller_says,
             device_manager.State: self._controller_says,
         }
-        self._subscribers: tuple[Callback, ...] = ()
+        self._subscriptions: tuple[tuple[Callback, frozenset[type[Message]]], ...] = ()
+        """Each callback with the kinds of messages that it is not called with."""
+        self._wanted: frozenset[type[Message]] = frozenset()
+        """Events of values that a callback is called with."""
+        self._on_values: tuple[OnValues, ...] = ()
 
         self._session: ControllerSession | None = None
         self._fading: ControllerSession | None = None
@@ -293,7 +298,7 @@ class Drone:
             raise
         self._drop_fading("replaced by a new session")
         self.handshake_at, self._dismissed, self.may_be_displaced = loop_time(), None, False
-        session.on_message = self._receive
+        session.on_messages = partial(self._receive, session)
         return session
 
     def _check_device(self, device: DeviceInfo) -> None:
@@ -702,16 +707,35 @@ class Drone:
         """Return `blockers` in words."""
         return [str(blocker) for blocker in self.blockers()]
 
-    def subscribe(self, callback: Callback) -> Callable[[], None]:
+    def subscribe(self, callback: Callback, *, without: Collection[type[Message]] = frozenset()) -> Callable[[], None]:
         """Call `callback(message, time)` with every message, after the states are updated.
 
         Returns the function that ends it. `time` is the event loop's. Messages during `connect` are included. What the
-        callback raises is logged.
+        callback raises is logged. It is not called with messages of the kinds `without`: events of values are decoded
+        for it, which `subscribe_values` avoids.
         """
-        self._subscribers = (*self._subscribers, callback)
+        subscription = callback, frozenset(without)
+        self._set_subscriptions((*self._subscriptions, subscription))
 
         def undo() -> None:
-            self._subscribers = tuple(other for other in self._subscribers if other is not callback)
+            self._set_subscriptions(tuple(other for other in self._subscriptions if other is not subscription))
+
+        return undo
+
+    def _set_subscriptions(self, subscriptions: tuple[tuple[Callback, frozenset[type[Message]]], ...]) -> None:
+        self._subscriptions = subscriptions
+        self._wanted = frozenset[type[Message]]().union(*(VALUES - without for _, without in subscriptions))
+
+    def subscribe_values(self, callback: OnValues) -> Callable[[], None]:
+        """Call `callback(values, time)` with the events of values, which arrive often.
+
+        It is called once for those that arrive together: before the next message of another kind, before the next of
+        the same kind, and at the end of a frame. The states contain them. Otherwise as `subscribe`.
+        """
+        self._on_values = (*self._on_values, callback)
+
+        def undo() -> None:
+            self._on_values = tuple(other for other in self._on_values if other is not callback)
 
         return undo
 
@@ -794,8 +818,51 @@ class Drone:
             return modern(message)
         return message
 
-    def _receive(self, message: Message | UnknownMessage, now: float) -> None:
-        # Not by isinstance, which takes as long for these classes as a reducer.
+    def _receive(self, session: ControllerSession, messages: Sequence[Received], now: float) -> None:
+        """Handle the messages of a frame.
+
+        Events of values wait undecoded in their elements, unless their messages are wanted.
+        """
+        values: dict[type[Message], PackedMessage] = {}
+        waiting, routes, elements = self._commander.waiting, self._routes, self._elements
+        is_logged = message_log.isEnabledFor(logging.DEBUG)
+        for message in messages:
+            # Not by isinstance, which takes as long for these classes as a reducer.
+            if type(message) is PackedMessage:
+                kind = message.kind
+                is_wanted = kind in self._wanted or kind in waiting or is_logged
+                if values and (is_wanted or kind in values):
+                    self._report(values, now)
+                    values = {}
+                values[kind] = message
+                if not is_wanted:
+                    for place, _ in routes.get(kind, ()):
+                        elements[place].defer(message)
+                    continue
+                unpacked = message.unpack()
+            else:
+                if values:
+                    self._report(values, now)
+                    values = {}
+                unpacked = message
+            if session.lost.done():
+                return
+            try:
+                self._handle(unpacked, now)
+            except Exception as error:
+                session.report(error, unpacked)
+        if values:
+            self._report(values, now)
+
+    def _report(self, values: Values, now: float) -> None:
+        for callback in self._on_values:
+            try:
+                callback(values, now)
+            except Exception:
+                log.exception("%s: a subscriber failed on %s", self.name, ", ".join(kind.NAME for kind in values))
+
+    def _handle(self, message: Message | UnknownMessage, now: float) -> None:
+        """Update the states by a message, then call what waits for it."""
         if type(message) is UnknownMessage:
             self._counters["unknown message"] += 1
             return
@@ -811,7 +878,9 @@ class Drone:
         if waiting := self._commander.waiting.get(kind):
             for expectation in tuple(waiting):
                 expectation.offer(message)
-        for callback in self._subscribers:
+        for callback, without in self._subscriptions:
+            if kind in without:
+                continue
             try:
                 callback(message, now)
             except Exception:

@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 
 import msgspec
 
-from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.codec.wire import Message, PackedMessage
 from anafi_mav.arsdk.messages.generic import ListFlags
 
 StateT = TypeVar("StateT")
@@ -55,18 +55,51 @@ class Position(msgspec.Struct, frozen=True):
 
 
 class Element(Generic[StateT]):
-    """One part of the aircraft. Subclasses declare `NOTHING` and `REDUCERS`; some add verbs."""
+    """One part of the aircraft. Subclasses declare `NOTHING` and `REDUCERS`; some add verbs.
+
+    Events of values wait undecoded until the state is read, each only as long as none of the same value follows. The
+    result is that of reducing each at once: such an event replaces what an earlier one reported, and nothing else.
+    """
 
     NOTHING: ClassVar[Any]
     """The state in which nothing has been reported."""
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]]
 
     def __init__(self) -> None:
-        self.state: StateT = self.NOTHING
+        self._state: Any = self.NOTHING
+        self._deferred: dict[bytes, PackedMessage] = {}
+        """Events of values that are not part of the state yet, by their keys."""
 
     def reset(self) -> None:
         """Forget everything the drone reported."""
         self.state = self.NOTHING
+
+    def defer(self, message: PackedMessage) -> None:
+        """Reduce an event of values when the state is read."""
+        self._deferred[message.key] = message
+
+    @property
+    def state(self) -> StateT:
+        """The last state reported by the drone."""
+        if self._deferred:
+            reducers, state = self.REDUCERS, self._state
+            for message in self._deferred.values():
+                state = reducers[message.kind](state, message.unpack())
+            self.state = state
+        return self._state  # type: ignore[no-any-return]
+
+    @state.setter
+    def state(self, state: StateT) -> None:
+        self._deferred.clear()
+        self._state = state
+
+    @property
+    def settled(self) -> StateT:
+        """The state without the events that wait, for fields that no value changes.
+
+        Nothing is decoded.
+        """
+        return self._state  # type: ignore[no-any-return]
 
 
 class StateWatch:

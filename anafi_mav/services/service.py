@@ -15,6 +15,7 @@ from anafi_mav.clock import NEVER, Clock
 from anafi_mav.drone import Drone
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.frames import Packed
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Action, ActionGroup, Command
 from anafi_mav.services.definition_link import DefinitionLink
@@ -29,7 +30,7 @@ from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.services.system_position import PositionOf
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
 from anafi_mav.vehicle.failsafe_settings import FailsafeLimits
 from anafi_mav.vehicle.vehicle import Vehicle
 
@@ -83,6 +84,12 @@ class Host(Protocol):
 
     def send(self, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None = None) -> None:
         """Send as this component to one channel, to some, or to all.
+
+        Nothing is sent while the link is down.
+        """
+
+    def send_streams(self, messages: Sequence[Packed], to: Sequence[Channel]) -> None:
+        """Send messages of streams as this component, together, to channels that have these streams.
 
         Nothing is sent while the link is down.
         """
@@ -272,6 +279,13 @@ class Service:
         """Return the handlers of the drone's events, by kind.
 
         Read once per connection, after `link_up`.
+        """
+        return {}
+
+    def value_subscriptions(self) -> ValueSubscriptions:
+        """Return the handlers of events of values (`wire.value`), with their kinds.
+
+        Read with `subscriptions`.
         """
         return {}
 

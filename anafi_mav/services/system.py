@@ -20,9 +20,11 @@ from anafi_mav.clock import NEVER, Alarm, Clock, Schedule
 from anafi_mav.drone import Drone, events
 from anafi_mav.drone.events import Message
 from anafi_mav.drone.payload.camera import Camera
+from anafi_mav.drone.values import VALUES
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.access import COMMANDS
 from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.frames import Batch
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.services.camera.camera_service import CameraService
 from anafi_mav.services.camera.capture_service import CaptureService
@@ -87,7 +89,13 @@ from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.height import TakeoffRecord
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import EventHandler, Subscriptions, in_order
+from anafi_mav.vehicle.base.subscriptions import (
+    EventHandler,
+    Subscriptions,
+    ValueHandlers,
+    ValueSubscriptions,
+    in_order,
+)
 from anafi_mav.vehicle.failsafe_settings import FailsafeLimits
 from anafi_mav.vehicle.vehicle import Health, Landed, Vehicle
 
@@ -165,11 +173,15 @@ SAMPLES: frozenset[type[Message]] = frozenset(
         events.AltitudeChanged,
         events.AttitudeChanged,
         events.GimbalAttitudeChanged,
+        events.GpsLocationChanged,
         events.SpeedChanged,
         *Camera.SAMPLES,
     }
 )
-"""Events that a drone sends many times a second. What follows from one is done by its handlers."""
+"""Events that a drone sends all the time. What follows from one is done by its handlers."""
+
+EARLY = 1e-6
+"""s by which a timer may call too early: asyncio compares times with its clock's resolution."""
 
 SHORTEST = 0.001
 """s between two ticks of a service, however often it wants to be called."""
@@ -225,7 +237,8 @@ class System:
         self._node = node
         self._started = started
         self._texts = TextNumbers()
-        self._undo: Callable[[], None] | None = None
+        self._undo: Sequence[Callable[[], None]] = ()
+        """Functions that end the subscriptions to the drone's events."""
         self._ticker = Alarm(self._tick)
         self._stalled = 0.0
         """How long the host had stalled at the last tick, s."""
@@ -299,7 +312,6 @@ class System:
         `memory_problem`: see `load_memory`.
         """
         self.active = True
-        self._undo = self.drone.subscribe(self._on_event)
         for component in self.components:
             self._node.add_host(self.sysid, component.compid, component.receive)
         for compid in ABSENT:
@@ -310,7 +322,7 @@ class System:
         self.vehicle.link_up(TakeoffRecord.read(self.memory.settings.get(takeoff_point_service.KEY)))
         for service in self.services:
             service.link_up()
-        self._subscribed = in_order(self.subscriptions())
+        self._subscribe()
         self._changed()
         now, self._stalled = self.clock.monotonic(), self._node.stalled
         self._next_heartbeat = now + HEARTBEAT_EVERY
@@ -325,9 +337,9 @@ class System:
         """Notify waiting clients that the link is lost, then make the system silent."""
         if not self.active:
             return
-        if self._undo is not None:
-            self._undo()
-            self._undo = None
+        for undo in self._undo:
+            undo()
+        self._undo = ()
         self._ticker.cancel()
         self._mission_over.cancel()
         for service in self.services:
@@ -412,6 +424,14 @@ class System:
             if give_way and self._has_filters and not isinstance(channels, Channel):
                 channels = [channel for channel in channels if channel.can_stream(message.get_msgId())]
             self._node.send(message, sysid=self.sysid, compid=compid, to=channels, give_way=give_way)
+
+    def send_batch(self, batch: Batch, to: Sequence[Channel]) -> None:
+        """Send messages of streams to channels that have them.
+
+        Nothing is sent while the link is down.
+        """
+        if self.active:
+            self._node.send_batch(batch, to)
 
     def text(self, severity: Severity, text: OperatorText, to: Channel | None = None) -> None:
         """A STATUSTEXT to everybody, and a line in the log; or to one channel alone."""
@@ -524,7 +544,7 @@ class System:
     def _tick(self) -> None:
         if not self.active:
             return
-        now = self.clock.monotonic()
+        now = self.clock.monotonic() + EARLY
         try:
             if now >= self._next_heartbeat:
                 self._next_heartbeat = max(self._next_heartbeat + HEARTBEAT_EVERY, now + HEARTBEAT_EVERY / 2)
@@ -560,6 +580,14 @@ class System:
 
     # What the drone reports.
 
+    def _subscribe(self) -> None:
+        """Begin to receive the drone's events."""
+        self._subscribed = in_order(self.subscriptions())
+        self._undo = (
+            self.drone.subscribe(self._on_event, without=VALUES - self._subscribed.keys()),
+            self.drone.subscribe_values(ValueHandlers(self.value_subscriptions()).call),
+        )
+
     def _on_event(self, message: Message, now: float) -> None:
         kind = type(message)
         for handler in self._subscribed.get(kind, ()):
@@ -577,6 +605,11 @@ class System:
         for service in self.services:
             yield service.subscriptions()
         yield dict.fromkeys(CHANGES, lambda message, now: self._changed(force=True))
+
+    def value_subscriptions(self) -> Iterator[ValueSubscriptions]:
+        """Yield all tables of handlers of values, in the sequence in which the handlers are called."""
+        for service in self.services:
+            yield service.value_subscriptions()
 
     def _changed(self, *, force: bool = False) -> None:
         """Mode, armed state or health may have changed: clients wait for it, so tell them at once.

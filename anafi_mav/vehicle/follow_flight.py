@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from anafi_mav import geo, texts
 from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import PilotingCommand, events
+from anafi_mav.drone.values import Values
 from anafi_mav.errors import LinkLost
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
@@ -24,7 +25,7 @@ from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import By
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import ValueSubscriptions
 from anafi_mav.vehicle.base.velocity_loop import MotionEstimate, VelocityController
 from anafi_mav.vehicle.follow import (
     PATIENCE,
@@ -141,11 +142,11 @@ class FollowFlight(PlainTask):
                 self._vehicle.drone.piloting.pilot(None)
         return []
 
-    def subscriptions(self) -> Subscriptions:
-        """Return the handlers of messages that report the drone's motion: the loop closes on it."""
-        return {events.SpeedChanged: self._on_speed}
+    def value_subscriptions(self) -> ValueSubscriptions:
+        """Return the handler of values that report the drone's motion: the loop closes on it."""
+        return {self._on_speed: (events.SpeedChanged,)}
 
-    def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
+    def _on_speed(self, values: Values, now: float) -> None:
         if self._following.state is State.FOLLOWING and (reason := self._fly(now)) is not None:
             self.drop(self._following.leader, reason)
 

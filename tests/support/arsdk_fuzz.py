@@ -18,7 +18,7 @@ from anafi_mav.arsdk.link.transport import (
     Delivered,
     Event,
     Garbage,
-    ReceivedMessage,
+    ReceivedMessages,
     Role,
     Transport,
     Undelivered,
@@ -66,8 +66,9 @@ def throw(role: Role, version: int, count: int, seed: str) -> Outcome:
         victim.outgoing(now)
         events += victim.expire(now)
         for event in events:
-            assert isinstance(event, ReceivedMessage | Delivered | Undelivered | Garbage), event
-            messages += isinstance(event, ReceivedMessage)
+            assert isinstance(event, ReceivedMessages | Delivered | Undelivered | Garbage), event
+            if isinstance(event, ReceivedMessages):
+                messages += len([wire.unpacked(message) for message in event.messages])
             garbage += isinstance(event, Garbage)
     end = _memory(victim)
     # It is as it was: it answers a ping.

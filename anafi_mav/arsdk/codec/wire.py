@@ -21,7 +21,7 @@ import struct
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, NamedTuple, Protocol, TypeVar, final, get_args, get_origin
+from typing import Annotated, Any, ClassVar, NamedTuple, Protocol, TypeAlias, TypeVar, final, get_args, get_origin
 
 import msgspec
 
@@ -137,6 +137,27 @@ class UnknownMessage(msgspec.Struct, frozen=True):
     """The packed arguments, without the four header bytes."""
 
 
+@final
+class PackedMessage(msgspec.Struct, frozen=True, gc=False):
+    """An event of values that is long enough, but not decoded yet.
+
+    A simulated drone sends attitude, speed and height thirty times a second, and most of them are replaced before they
+    are read.
+    """
+
+    kind: type[Message]
+    key: bytes
+    """Equal for events of which each replaces the one before: of one kind, and of one camera or gimbal."""
+    data: bytes
+    """The command bytes, as for `decode`."""
+
+    def unpack(self) -> Any:
+        """Return the message, of class `kind`."""
+        return _CODECS[self.data[:4]].decode(self.data)
+
+
+Received: TypeAlias = Message | UnknownMessage | PackedMessage
+
 MessageT = TypeVar("MessageT", bound=Message)
 
 
@@ -153,6 +174,9 @@ class Codec(Protocol):
 _CODECS: dict[bytes, Codec] = {}
 """By the four bytes of the header."""
 
+_VALUES: dict[bytes, tuple[type[Message], int, bool]] = {}
+"""Each event of values by the four bytes of its header: its kind and least length, and True if it has a number."""
+
 
 def command(
     name: str, project: int, cls: int, number: int, buffer: Buffer = Buffer.ACK
@@ -166,6 +190,29 @@ def event(
 ) -> Callable[[type[MessageT]], type[MessageT]]:
     """Declare a message that a device sends."""
     return _declare(Direction.EVENT, name, MessageId(project, cls, number), buffer)
+
+
+def value(
+    name: str, project: int, cls: int, number: int, *, of: str | None = None
+) -> Callable[[type[MessageT]], type[MessageT]]:
+    """Declare an event of values, which replaces the one before and has a fixed size.
+
+    A device sends it without acknowledgement. `of`: the first argument, a byte, when it is the number of a camera or
+    gimbal whose values these are.
+    """
+    declare = event(name, project, cls, number, Buffer.NON_ACK)
+
+    def register(declared: type[MessageT]) -> type[MessageT]:
+        fields = wire_fields(declared)
+        scalars = [wire for _, wire, _ in fields if isinstance(wire, Scalar)]
+        if len(scalars) < len(fields) or of not in (None, fields[0][0] if scalars[0] is U8 else None):
+            raise LocalProtocolError(f"{name}: its arguments are not those of an event of values")
+        size = struct.calcsize("<" + "".join(scalar.code for scalar in scalars))
+        declare(declared)
+        _VALUES[HEADER.pack(*declared.ID)] = declared, HEADER.size + size, of is not None
+        return declared
+
+    return register
 
 
 def _declare(
@@ -189,6 +236,11 @@ def carry(id: MessageId, codec: Codec) -> None:
     It is the codec of one message, or one that distinguishes the messages carried under this id.
     """
     _CODECS[HEADER.pack(*id)] = codec
+
+
+def value_events() -> Iterator[type[Message]]:
+    """Return the events of values declared so far, which `receive` leaves packed."""
+    return (kind for kind, _, _ in _VALUES.values())
 
 
 def declared_messages() -> Iterator[type[Message]]:
@@ -337,3 +389,20 @@ def decode(data: bytes) -> Message | UnknownMessage | None:
     if codec is None:
         return UnknownMessage(MessageId(*HEADER.unpack_from(data)), bytes(data[HEADER.size :]))
     return codec.decode(data)
+
+
+def receive(data: bytes) -> Received | None:
+    """As `decode`, but leave events of values packed."""
+    header = data[:4]
+    known = _VALUES.get(header)
+    if known is None:
+        return decode(data)
+    kind, size, has_number = known
+    if len(data) < size:
+        return None
+    return PackedMessage(kind, data[:5] if has_number else header, data)
+
+
+def unpacked(received: Received) -> Message | UnknownMessage:
+    """Return a received message, decoded."""
+    return received.unpack() if isinstance(received, PackedMessage) else received

@@ -1,8 +1,8 @@
 """The asyncio shell around one `Transport`: a UDP socket and one timer.
 
-Messages that are sent within one event-loop iteration leave together, which packs them into few frames. The timer is
-restarted only when the next deadline is earlier; when it fires too early it is set again. At a hundred drones with a
-hundred events a second each, that is what keeps the loop idle.
+Messages that are sent within one event-loop iteration leave together, which packs them into few frames, unless they are
+sent `at_once`. The timer is restarted only when the next deadline is earlier; when it fires too early it is set again.
+At a hundred drones with a hundred events a second each, that is what keeps the loop idle.
 """
 
 from __future__ import annotations
@@ -12,19 +12,19 @@ import logging
 import os
 import socket
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol, TypeAlias, cast
 
 from typing_extensions import assert_never
 
-from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
+from anafi_mav.arsdk.codec.wire import Message, Received, UnknownMessage, unpacked
 from anafi_mav.arsdk.link.transport import (
     Delivered,
     Event,
     Garbage,
     LinkDown,
     Rank,
-    ReceivedMessage,
+    ReceivedMessages,
     Silent,
     Speaks,
     Transport,
@@ -37,6 +37,9 @@ raw_log = logging.getLogger("anafi_mav.raw")
 
 OnMessage: TypeAlias = Callable[[Message | UnknownMessage, float], None]
 """Called with each message and the loop time of its arrival."""
+
+OnMessages: TypeAlias = Callable[[Sequence[Received], float], None]
+"""Called with the messages of a frame and the loop time of their arrival."""
 
 Air: TypeAlias = Callable[[bytes, bool, Callable[[bytes], None]], None]
 """Called with each datagram, whether it came in, and what hands it on, which may be called later, twice or never."""
@@ -70,14 +73,15 @@ class Session(asyncio.DatagramProtocol):
     """One ARSDK connection over UDP. `open` makes one from a transport and a bound socket.
 
     `peer` is for a socket that is not connected: where datagrams go, and the only source that is heard. Messages arrive
-    at `on_message`; an exception in it is reported to the loop's exception handler and does not cost the messages
-    behind it.
+    at `on_message`, one at a time; an exception in it is reported to the loop's exception handler and does not cost the
+    messages behind it. A receiver of many values sets `on_messages` in its place.
     """
 
     def __init__(self, transport: Transport, on_message: OnMessage, peer: tuple[str, int] | None = None) -> None:
         self._loop = asyncio.get_running_loop()
         self._transport = transport
         self.on_message = on_message
+        self.on_messages: OnMessages | None = None
         self.mute = False
         """True: everything is dropped, both ways, as if the air were gone (faults of the simulator)."""
         self.air: Air | None = None
@@ -140,13 +144,18 @@ class Session(asyncio.DatagramProtocol):
         """See `Transport.counters`."""
         return self._transport.counters
 
-    def send(self, message: Message | UnknownMessage, rank: Rank = Rank.NORMAL) -> int:
+    def send(self, message: Message | UnknownMessage, rank: Rank = Rank.NORMAL, *, at_once: bool = False) -> int:
         """Send a message at the end of this event-loop iteration; the token is for `cancel`.
+
+        `at_once`: it leaves now with all that waits, or when the messages that are read together are handled.
 
         Raises `LocalProtocolError` when it cannot be encoded. On a link that is lost it does nothing.
         """
         token = self._transport.send(message, self._loop.time(), rank)
-        self._flush_soon()
+        if at_once and not self._is_reading:
+            self._flush()
+        else:
+            self._flush_soon()
         return token
 
     def cancel(self, token: int) -> None:
@@ -254,16 +263,11 @@ class Session(asyncio.DatagramProtocol):
         for event in events:
             if self.lost.done():
                 return
-            if type(event) is ReceivedMessage:
-                try:
-                    self.on_message(event.message, now)
-                except Exception as error:
-                    self._loop.call_exception_handler(
-                        {"message": f"receiver of {event.message!r} failed", "exception": error, "protocol": self}
-                    )
+            if type(event) is ReceivedMessages:  # nearly all
+                (self.on_messages or self._hand_on)(event.messages, now)
                 continue
             match event:
-                case ReceivedMessage():
+                case ReceivedMessages():
                     pass
                 case Delivered(token):
                     self.on_delivered(token, True)
@@ -280,6 +284,22 @@ class Session(asyncio.DatagramProtocol):
                     self.end(reason)
                 case _:
                     assert_never(event)
+
+    def _hand_on(self, messages: Sequence[Received], now: float) -> None:
+        for received in messages:
+            if self.lost.done():
+                return
+            message = unpacked(received)
+            try:
+                self.on_message(message, now)
+            except Exception as error:
+                self.report(error, message)
+
+    def report(self, error: Exception, message: Message | UnknownMessage) -> None:
+        """Report to the loop's exception handler that a receiver failed on a message."""
+        self._loop.call_exception_handler(
+            {"message": f"receiver of {message!r} failed", "exception": error, "protocol": self}
+        )
 
     def _flush_soon(self) -> None:
         if not self._flush_due:

@@ -27,7 +27,7 @@ from typing import TypeAlias
 import msgspec
 
 from anafi_mav.arsdk.codec import wire
-from anafi_mav.arsdk.codec.wire import Buffer, Message, MessageId, UnknownMessage
+from anafi_mav.arsdk.codec.wire import Buffer, Message, MessageId, Received, UnknownMessage
 from anafi_mav.arsdk.link.frame import VERSIONS, FrameType, decode_frames, encode_frame
 from anafi_mav.arsdk.link.packing import PACK_LIMIT, Piece, Unpacker, Waiting, longest_command, pack, with_length
 from anafi_mav.errors import LocalProtocolError
@@ -80,10 +80,10 @@ class Rank(enum.Enum):
     URGENT = "it goes before the settings that wait directly before it, but before nothing else"
 
 
-class ReceivedMessage(msgspec.Struct, frozen=True):
-    """The peer sent a message; each acknowledged one arrives once and in order."""
+class ReceivedMessages(msgspec.Struct, frozen=True):
+    """The peer sent messages in one frame; each acknowledged one arrives once and in order."""
 
-    message: Message | UnknownMessage
+    messages: Sequence[Received]
 
 
 class Delivered(msgspec.Struct, frozen=True):
@@ -127,7 +127,7 @@ class LinkDown(msgspec.Struct, frozen=True):
     reason: str
 
 
-Event: TypeAlias = ReceivedMessage | Delivered | Undelivered | Garbage | Silent | Speaks | LinkDown
+Event: TypeAlias = ReceivedMessages | Delivered | Undelivered | Garbage | Silent | Speaks | LinkDown
 
 _ACK, _NOACK, _WITHACK = int(FrameType.ACK), int(FrameType.NOACK), int(FrameType.WITHACK)
 
@@ -273,16 +273,12 @@ class Transport:
         return -10 <= seq - last <= 0
 
     def _commands(self, commands: list[bytes], events: list[Event]) -> None:
-        decode, received = wire.decode, 0
-        for data in commands:
-            message = decode(data)
-            if message is None:
-                self._garbage("command", events)
-            else:
-                received += 1
-                events.append(ReceivedMessage(message))
-        if received:
-            self.counters["received"] += received
+        messages = [message for message in map(wire.receive, commands) if message is not None]
+        if messages:
+            self.counters["received"] += len(messages)
+            events.append(ReceivedMessages(messages))
+        for _ in range(len(commands) - len(messages)):
+            self._garbage("command", events)
 
     def _acknowledge(self, id: int, seq: int) -> None:
         self._ack_seq = (self._ack_seq + 1) & self._seq_mask

@@ -21,6 +21,7 @@ from anafi_mav.arsdk.codec.wire import (
     OpenEnum,
     command,
     event,
+    value,
 )
 
 
@@ -327,7 +328,7 @@ class NavigateHomeStateChanged(Message, frozen=True):
     reason: Annotated[NavigateHomeReason, ENUM]
 
 
-@event("ardrone3.PilotingState.PositionChanged", 1, 4, 4, Buffer.NON_ACK)
+@value("ardrone3.PilotingState.PositionChanged", 1, 4, 4)
 class PositionChanged(Message, frozen=True):
     """Deprecated twin of GpsLocationChanged. deg, deg (500 = unknown), m above mean sea level."""
 
@@ -336,7 +337,7 @@ class PositionChanged(Message, frozen=True):
     altitude: Annotated[float, F64]
 
 
-@event("ardrone3.PilotingState.SpeedChanged", 1, 4, 5, Buffer.NON_ACK)
+@value("ardrone3.PilotingState.SpeedChanged", 1, 4, 5)
 class SpeedChanged(Message, frozen=True):
     """Ground speed in m/s along north, east and down."""
 
@@ -345,7 +346,7 @@ class SpeedChanged(Message, frozen=True):
     speedZ: Annotated[float, F32]
 
 
-@event("ardrone3.PilotingState.AttitudeChanged", 1, 4, 6, Buffer.NON_ACK)
+@value("ardrone3.PilotingState.AttitudeChanged", 1, 4, 6)
 class AttitudeChanged(Message, frozen=True):
     """Attitude in rad: roll + right wing down, pitch + nose up, yaw clockwise from north."""
 
@@ -354,14 +355,14 @@ class AttitudeChanged(Message, frozen=True):
     yaw: Annotated[float, F32]
 
 
-@event("ardrone3.PilotingState.AltitudeChanged", 1, 4, 8, Buffer.NON_ACK)
+@value("ardrone3.PilotingState.AltitudeChanged", 1, 4, 8)
 class AltitudeChanged(Message, frozen=True):
     """Height above the take-off point, m."""
 
     altitude: Annotated[float, F64]
 
 
-@event("ardrone3.PilotingState.GpsLocationChanged", 1, 4, 9, Buffer.NON_ACK)
+@value("ardrone3.PilotingState.GpsLocationChanged", 1, 4, 9)
 class GpsLocationChanged(Message, frozen=True):
     """GNSS position with accuracies.
 
@@ -434,7 +435,7 @@ class VibrationLevelChanged(Message, frozen=True):
     state: Annotated[WarningLevel, ENUM]
 
 
-@event("ardrone3.PilotingState.AltitudeAboveGroundChanged", 1, 4, 21, Buffer.NON_ACK)
+@value("ardrone3.PilotingState.AltitudeAboveGroundChanged", 1, 4, 21)
 class AltitudeAboveGroundChanged(Message, frozen=True):
     """Distance to the ground below, m."""
 

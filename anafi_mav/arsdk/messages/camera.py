@@ -19,6 +19,7 @@ from anafi_mav.arsdk.codec.wire import (
     OpenEnum,
     command,
     event,
+    value,
 )
 from anafi_mav.arsdk.messages.generic import ListFlags
 
@@ -540,7 +541,7 @@ class ResetZoom(Message, frozen=True):
     cam_id: Annotated[int, U8]
 
 
-@event("camera.zoom_level", 143, 0, 22, Buffer.NON_ACK)
+@value("camera.zoom_level", 143, 0, 22, of="cam_id")
 class ZoomLevel(Message, frozen=True):
     cam_id: Annotated[int, U8]
     level: Annotated[float, F32]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from anafi_mav.arsdk.codec.wire import ENUM, F32, U8, Bits, Buffer, Message, OpenEnum, command, event
+from anafi_mav.arsdk.codec.wire import ENUM, F32, U8, Bits, Buffer, Message, OpenEnum, command, event, value
 
 
 class Model(OpenEnum):
@@ -117,7 +117,7 @@ class SetTarget(Message, frozen=True):
     roll: Annotated[float, F32]
 
 
-@event("gimbal.attitude", 148, 0, 6, Buffer.NON_ACK)
+@value("gimbal.attitude", 148, 0, 6, of="gimbal_id")
 class Attitude(Message, frozen=True):
     """Attitude of a gimbal, relative to the body and to the horizon, deg.
 

@@ -17,7 +17,7 @@ from typing import ClassVar
 import msgspec
 from msgspec.structs import replace
 
-from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.codec.wire import HEADER, Message
 from anafi_mav.arsdk.messages import gimbal
 from anafi_mav.arsdk.messages.gimbal import (
     Axis,
@@ -31,6 +31,7 @@ from anafi_mav.arsdk.messages.gimbal import (
 from anafi_mav.drone.element import Range, Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.settings import Commanding
+from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
 from anafi_mav.units import clip
 
@@ -160,6 +161,18 @@ def _attitude(message: gimbal.Attitude) -> GimbalAttitude | None:
     }
     return GimbalAttitude(frames, relative, absolute)
 
+
+def main_frames(values: Values) -> bytes | None:
+    """Return the frames of reference that the main gimbal's axes hold, as on the wire.
+
+    None when the values are of another gimbal. Frames are compared thirty times a second, and hardly ever change.
+    """
+    data = values[gimbal.Attitude].data
+    return data[_FRAMES] if data[_FRAMES.start - 1] == MAIN else None
+
+
+_FRAMES = slice(HEADER.size + 1, HEADER.size + 1 + 3 * 4)
+"""Behind the header and the number of the gimbal: three enums."""
 
 Gimbals = Mapping[int, GimbalState]
 

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
 
 from anafi_mav.drone import Drone, events
+from anafi_mav.drone.element import position
 from anafi_mav.drone.payload.gimbal import MAIN
+from anafi_mav.drone.values import Values
 from anafi_mav.drone.video.video import VideoFrame
-from anafi_mav.services.camera.pose_track import CameraPose, PoseTrack
+from anafi_mav.services.camera.pose_track import CameraPose, PoseSource, PoseTrack, SampleTrack
 from anafi_mav.units import RAD_PER_DEG
+
+Sample: TypeAlias = tuple[float, ...]
 
 
 def camera_angles(drone: Drone) -> tuple[float, float, float] | None:
@@ -33,47 +38,51 @@ def current_pose(drone: Drone) -> CameraPose:
     return CameraPose(place, drone.piloting.state.altitude, camera_angles(drone))
 
 
-def add_attitude(track: PoseTrack, drone: Drone, message: events.Message, now: float) -> None:
-    """Add the heading that an event has reported."""
-    if (attitude := drone.piloting.state.attitude) is not None:
-        track.events.headings.add(now, attitude.yaw)
+def _heading(message: events.AttitudeChanged) -> Sample:
+    return (message.yaw,)
 
 
-def add_gimbal(track: PoseTrack, drone: Drone, message: events.Message, now: float) -> None:
-    """Add the attitude of the gimbal that an event has reported."""
-    if (attitude := drone.gimbal[MAIN].attitude) is not None:
-        roll, pitch = attitude.absolute.roll * RAD_PER_DEG, attitude.absolute.pitch * RAD_PER_DEG
-        track.events.gimbals.add(now, roll, pitch, attitude.relative.yaw * RAD_PER_DEG)
+def _gimbal(message: events.GimbalAttitudeChanged) -> Sample | None:
+    if message.gimbal_id != MAIN:
+        return None
+    angles = message.roll_absolute, message.pitch_absolute, message.yaw_relative
+    return tuple(angle * RAD_PER_DEG for angle in angles)
 
 
-def add_velocity(track: PoseTrack, drone: Drone, message: events.Message, now: float) -> None:
-    """Add the velocity that an event has reported."""
-    if (velocity := drone.piloting.state.velocity) is not None:
-        track.events.velocities.add(now, velocity.north, velocity.east)
+def _velocity(message: events.SpeedChanged) -> Sample:
+    return message.speedX, message.speedY
 
 
-def add_height(track: PoseTrack, drone: Drone, message: events.Message, now: float) -> None:
-    """Add the height that an event has reported."""
-    if (height := drone.piloting.state.altitude) is not None:
-        track.events.heights.add(now, height)
+def _height(message: events.AltitudeChanged) -> Sample:
+    return (message.altitude,)
 
 
-def add_place(track: PoseTrack, drone: Drone, message: events.Message, now: float) -> None:
-    """Add the position that an event has reported."""
-    if (location := drone.gps.state.location) is not None:
-        track.events.places.add(now, location.latitude, location.longitude)
+def _place(message: events.GpsLocationChanged) -> Sample | None:
+    known = position(message.latitude, message.longitude, message.altitude)
+    return None if known is None else (known.latitude, known.longitude)
 
 
-Sampler = Callable[[PoseTrack, Drone, events.Message, float], None]
-
-SAMPLERS: Mapping[type[events.Message], Sampler] = {
-    events.AttitudeChanged: add_attitude,
-    events.GimbalAttitudeChanged: add_gimbal,
-    events.SpeedChanged: add_velocity,
-    events.AltitudeChanged: add_height,
-    events.GpsLocationChanged: add_place,
+_SAMPLES: Mapping[type[events.Message], tuple[Callable[[PoseSource], SampleTrack], Callable[[Any], Sample | None]]] = {
+    events.AttitudeChanged: (lambda source: source.headings, _heading),
+    events.GimbalAttitudeChanged: (lambda source: source.gimbals, _gimbal),
+    events.SpeedChanged: (lambda source: source.velocities, _velocity),
+    events.AltitudeChanged: (lambda source: source.heights, _height),
+    events.GpsLocationChanged: (lambda source: source.places, _place),
 }
-"""By event. Each adds what its event reports: other values are older than it."""
+"""Track of each kind of values, and its sample; None: it is none of the camera, or unknown."""
+
+SAMPLED = tuple(_SAMPLES)
+"""The kinds of values of which samples are kept."""
+
+
+def add_values(source: PoseSource, values: Values, now: float) -> None:
+    """Add what the drone's events report."""
+    for kind, packed in values.items():
+        if kind in _SAMPLES:
+            track_of, sample_of = _SAMPLES[kind]
+            track = track_of(source)
+            if track.is_due(now) and (sample := sample_of(packed.unpack())) is not None:
+                track.add(now, *sample)
 
 
 def add_frame(track: PoseTrack, frame: VideoFrame) -> None:

@@ -15,6 +15,7 @@ from anafi_mav.clock import NEVER
 from anafi_mav.drone.element import StateWatch
 from anafi_mav.drone.payload.camera import Camera
 from anafi_mav.drone.payload.camera_enums import CameraMode
+from anafi_mav.drone.values import VALUES, Values
 from anafi_mav.drone.video.stream_choice import StreamKind
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
@@ -26,7 +27,7 @@ from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, 
 from anafi_mav.services.service import Answer, Host, Request, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
 
 ZOOM_SHOWN = 0.5
@@ -47,8 +48,8 @@ class CameraService(Service):
         self._sent_settings: tuple[CameraMode | None, float] | None = None
         """Mode and zoom of the last CAMERA_SETTINGS to all."""
         self._sent_flags: int | None = None
-        self._level: float | None = None
-        """Zoom of the newest event about it."""
+        self._level: float | bytes | None = None
+        """Zoom of the newest event about it, or the bytes of that event."""
         self._camera = StateWatch(host.drone.camera)
         host.definition.subscribe(self._send_information)
 
@@ -96,11 +97,22 @@ class CameraService(Service):
             self.host.send(message)
 
     def subscriptions(self) -> Subscriptions:
-        return dict.fromkeys(Camera.ZOOM_EVENTS, self._on_zoom)
+        return {kind: self._on_zoom for kind in Camera.ZOOM_EVENTS if kind not in VALUES}
+
+    def value_subscriptions(self) -> ValueSubscriptions:
+        return {self._on_zoom_value: VALUES.intersection(Camera.ZOOM_EVENTS)}
 
     def _on_zoom(self, message: Any, now: float) -> None:
-        if message.level != self._level:
-            self._level = message.level
+        self._note_zoom(message.level)
+
+    def _on_zoom_value(self, values: Values, now: float) -> None:
+        for kind in Camera.ZOOM_EVENTS:
+            if kind in values:
+                self._note_zoom(values[kind].data)
+
+    def _note_zoom(self, level: float | bytes) -> None:
+        if level != self._level:
+            self._level = level
             self.host.look_soon()
 
     def tick(self, now: float) -> float:

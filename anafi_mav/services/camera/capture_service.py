@@ -35,7 +35,7 @@ from anafi_mav.services.service import LOOK_EVERY, Host, Request, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import EventHandler, Subscriptions
+from anafi_mav.vehicle.base.subscriptions import EventHandler, Subscriptions, ValueSubscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
 
 FASTEST_STATUS = 10.0
@@ -100,11 +100,13 @@ class CaptureService(Service):
     # Events of the drone.
 
     def subscriptions(self) -> Subscriptions:
-        handlers: dict[type[events.Message], EventHandler] = dict(self._reporter.subscriptions())
-        handlers |= dict.fromkeys(Camera.PHOTO_EVENTS, self._on_photo)
+        handlers: dict[type[events.Message], EventHandler] = dict.fromkeys(Camera.PHOTO_EVENTS, self._on_photo)
         handlers |= dict.fromkeys(Camera.RECORDING_EVENTS, self._on_recording)
         handlers |= dict.fromkeys(Storage.RESULT_EVENTS, self._on_formatted)
         return handlers
+
+    def value_subscriptions(self) -> ValueSubscriptions:
+        return self._reporter.value_subscriptions()
 
     def _on_photo(self, message: events.Message, now: float) -> None:
         update = Camera.photo_update(message)

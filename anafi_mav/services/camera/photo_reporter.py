@@ -20,17 +20,18 @@ from anafi_mav import texts, units
 from anafi_mav.drone.payload.camera_state import CaptureProgress, CaptureUpdate
 from anafi_mav.drone.payload.media import MediaItem
 from anafi_mav.drone.payload.media_file import Resource
+from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError, CommandRejected
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.camera.camera_pose import SAMPLERS, Sampler, add_frame
+from anafi_mav.services.camera.camera_pose import SAMPLED, add_frame, add_values
 from anafi_mav.services.camera.photo_log import KEY, CapturedImage, PhotoLog, renumbered
 from anafi_mav.services.camera.pose_track import CameraPose, PoseTrack
 from anafi_mav.services.camera.shot_tracker import CapturedShot, ShotTracker, named
 from anafi_mav.services.commands import Command
 from anafi_mav.services.service import Answer, Host
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import EventHandler, Subscriptions
+from anafi_mav.vehicle.base.subscriptions import ValueSubscriptions
 
 logger = logging.getLogger(__name__)
 
@@ -103,13 +104,12 @@ class PhotoReporter:
 
     # What the drone reports.
 
-    def subscriptions(self) -> Subscriptions:
-        """Return the handlers of the events that change the camera's pose."""
-        return {kind: self._sampling(sampler) for kind, sampler in SAMPLERS.items()}
+    def value_subscriptions(self) -> ValueSubscriptions:
+        """Return the handler of the values that change the camera's pose."""
+        return {self._on_pose: SAMPLED}
 
-    def _sampling(self, sampler: Sampler) -> EventHandler:
-        track, drone = self._track, self.host.drone
-        return lambda message, now: sampler(track, drone, message, now)
+    def _on_pose(self, values: Values, now: float) -> None:
+        add_values(self._track.events, values, now)
 
     def receive(self, update: CaptureUpdate, now: float) -> None:
         """Handle an event about a photo of the active camera."""

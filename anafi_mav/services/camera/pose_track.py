@@ -67,12 +67,16 @@ class SampleTrack:
         self.newest = -math.inf
         """Time of the newest sample."""
 
+    def is_due(self, at: float) -> bool:
+        """Return True if a sample of this moment is kept."""
+        return at - self.newest > self._spacing
+
     def add(self, at: float, *values: float) -> None:
         """Add a sample.
 
         One that is not newer than the last by the spacing, or not finite, is left out.
         """
-        if at - self.newest <= self._spacing or not math.isfinite(sum(values)):
+        if not (self.is_due(at) and math.isfinite(sum(values))):
             return
         if not self._ring:
             self._ring = bytearray(SAMPLES * self._row.size)

@@ -16,6 +16,7 @@ from itertools import pairwise
 from anafi_mav import geo, texts, units
 from anafi_mav.drone import events
 from anafi_mav.drone.piloting.moves import Move, MoveEnd
+from anafi_mav.drone.values import Values
 from anafi_mav.errors import LinkLost
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.command_targets import height, place
@@ -29,7 +30,7 @@ from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import ValueSubscriptions
 from anafi_mav.vehicle.base.velocity_loop import VelocityController, tilt_limit
 from anafi_mav.vehicle.circle import (
     DEFAULT_RADIUS,
@@ -235,8 +236,11 @@ class OrbitService(Service, PlainTask):
 
     # Flying.
 
-    def subscriptions(self) -> Subscriptions:
-        return dict.fromkeys((events.SpeedChanged, events.AttitudeChanged), lambda message, now: self._fly(now))
+    def value_subscriptions(self) -> ValueSubscriptions:
+        return {self._on_motion: (events.SpeedChanged, events.AttitudeChanged)}
+
+    def _on_motion(self, values: Values, now: float) -> None:
+        self._fly(now)
 
     def _fly(self, now: float) -> None:
         vehicle, orbit = self.host.vehicle, self._orbit

@@ -15,6 +15,7 @@ from dataclasses import replace
 from anafi_mav import texts, units
 from anafi_mav.drone import GimbalState
 from anafi_mav.drone.events import Axis, GimbalAttitudeChanged
+from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
@@ -35,7 +36,7 @@ from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported, reason_of
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import ValueSubscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
 
 HOVERING = (FlightMode.HOLD, FlightMode.GUIDED, FlightMode.POSITION)
@@ -166,11 +167,11 @@ class GimbalService(Service):
         kept = {self._control.primary, self._control.secondary, self._motion.turner}
         self._heartbeats.receive((inbound.sysid, inbound.compid), inbound.now, kept)
 
-    def subscriptions(self) -> Subscriptions:
-        return {GimbalAttitudeChanged: self._on_attitude}
+    def value_subscriptions(self) -> ValueSubscriptions:
+        return {self._on_attitude: (GimbalAttitudeChanged,)}
 
-    def _on_attitude(self, message: GimbalAttitudeChanged, now: float) -> None:
-        if self._motion.watch_attitude():
+    def _on_attitude(self, values: Values, now: float) -> None:
+        if self._motion.watch_attitude(values):
             self.host.look_soon()
 
     def host_stalled(self, seconds: float) -> None:

@@ -16,6 +16,8 @@ from typing import TypeAlias, TypedDict
 from anafi_mav import texts
 from anafi_mav.drone import Aim, GimbalAttitude, GimbalState
 from anafi_mav.drone.events import Axis, FrameOfReference, GimbalCalibrationState
+from anafi_mav.drone.payload.gimbal import main_frames
+from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError, LinkLost
 from anafi_mav.services.gimbal import targets
 from anafi_mav.services.gimbal.control import ClientId, Heartbeats
@@ -90,7 +92,9 @@ class GimbalMotion:
         self._still_zeros = 0
         """Zero rates of these that are still to be sent."""
         self._seen: GimbalAttitude | None = None
-        """The attitude reported last."""
+        """While some axes are to stand, the attitude reported last."""
+        self._frames = b""
+        """The frames of reference reported last, as on the wire."""
         self._repeat: tuple[Mapping[Axis, Aim], int, float] | None = None
         """Angles of a message, how often they are to be sent again, and when next."""
         self._was_turning = False
@@ -263,6 +267,7 @@ class GimbalMotion:
         if not still <= self._still:
             self._still_zeros = STOPS
         self._still = still
+        self._seen = self._gimbal.attitude if still else None
         if self._command is not None and self._command is not asyncio.current_task():
             self._command.cancel()
             self._command = self._waiting = None
@@ -359,6 +364,7 @@ class GimbalMotion:
             for _ in range(STOPS if rates else 0):  # the gateway ends, and the drone is still connected
                 self._turn({axis: Aim(0.0, aim.frame) for axis, aim in rates.items()})
         self._command = self._halt = self._repeat = self._waiting = self._seen = self._client = None
+        self._frames = b""
         self._zeros, self._still_zeros, self._still = 0, 0, frozenset()
         self.is_neutral = self._is_stopping = False
 
@@ -372,24 +378,32 @@ class GimbalMotion:
         with contextlib.suppress(AnafiMavError):
             self._send_again(now)
 
-    def watch_attitude(self) -> bool:
+    def watch_attitude(self, values: Values) -> bool:
         """Notice a gimbal that leaves the reference orientation, and an axis that turns on.
 
         To an axis that is to stand further zero rates are sent: earlier ones may be lost. Returns True when flags of
-        the gimbal may have changed.
+        the gimbal may have changed. The attitude is decoded only where its angles matter.
         """
+        frames = main_frames(values)
+        if frames is None:
+            return False
+        before, self._frames = self._frames, frames
         has_left = self.is_neutral and self._has_left_reference()
         if has_left:
             self.is_neutral, self._reference = False, None
+        if self._still:
+            self._watch_still()
+        return has_left or frames != before
+
+    def _watch_still(self) -> None:
         last, attitude = self._seen, self._gimbal.attitude
         self._seen = attitude
         if last is None or attitude is None:
-            return True
+            return
         for axis in self._still:
             frame = attitude.frames[axis]
             if abs(targets.wrap_180(attitude.angle(axis, frame) - last.angle(axis, frame))) > STANDS:
                 self._still_zeros = STOPS
-        return has_left or attitude.frames != last.frames
 
     def _has_left_reference(self) -> bool:
         """True when another controller, or the drone, has moved the gimbal since it was reset."""

@@ -11,10 +11,11 @@ from typing import Any
 from anafi_mav import texts
 from anafi_mav.drone import events
 from anafi_mav.drone.piloting.state import Attitude, Velocity
+from anafi_mav.drone.values import Values
 from anafi_mav.services.service import Service
 from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
 
 KEY = "roll_sign"
 """Name of the record in the drone's file."""
@@ -48,11 +49,10 @@ class RollSignService(Service):
             self.host.text(Severity.WARNING, texts.ROLL_SIGN_INVERTED)
 
     def subscriptions(self) -> Subscriptions:
-        return {
-            events.AttitudeChanged: self._on_attitude,
-            events.SpeedChanged: self._on_speed,
-            events.FlyingStateChanged: self._on_flying_state,
-        }
+        return {events.FlyingStateChanged: self._on_flying_state}
+
+    def value_subscriptions(self) -> ValueSubscriptions:
+        return {self._on_motion: (events.AttitudeChanged, events.SpeedChanged)}
 
     def _motion(self) -> tuple[Attitude, Velocity] | None:
         """Return attitude and velocity of the drone; None if one is unknown or it does not fly.
@@ -68,16 +68,14 @@ class RollSignService(Service):
     def _on_flying_state(self, message: events.FlyingStateChanged, now: float) -> None:
         self._motion()
 
-    def _on_attitude(self, message: events.AttitudeChanged, now: float) -> None:
-        if (motion := self._motion()) is not None:
-            attitude, _ = motion
-            self.host.vehicle.roll.on_attitude(attitude.roll, attitude.yaw)
-
-    def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
-        if (motion := self._motion()) is not None:
-            _, velocity = motion
-            if self.host.vehicle.roll.on_velocity(velocity.north, velocity.east, now):
-                self._report()
+    def _on_motion(self, values: Values, now: float) -> None:
+        if not self.host.vehicle.in_air or (motion := self._motion()) is None:
+            return
+        check, (attitude, velocity) = self.host.vehicle.roll, motion
+        if events.AttitudeChanged in values:
+            check.on_attitude(attitude.roll, attitude.yaw)
+        if events.SpeedChanged in values and check.on_velocity(velocity.north, velocity.east, now):
+            self._report()
 
     def _report(self) -> None:
         sign, firmware = self.host.vehicle.roll.sign, self.host.drone.identity.firmware

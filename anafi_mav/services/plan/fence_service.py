@@ -12,8 +12,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from anafi_mav import texts
+from anafi_mav.clock import NEVER
 from anafi_mav.drone import events
 from anafi_mav.drone.events import PlayingState
+from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
@@ -25,7 +27,7 @@ from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, reason_of
 from anafi_mav.vehicle.base.requester import Source
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
 from anafi_mav.vehicle.fence.fence_watch import (
     CEILING,
     EVERYTHING,
@@ -39,13 +41,13 @@ from anafi_mav.vehicle.fence.fence_watch import (
 from anafi_mav.vehicle.vehicle import Vehicle
 
 LOOK_EVERY = 0.5
-"""s between looks while the drone reports nothing new."""
+"""s between looks in flight while the drone reports nothing new."""
 
 LOOK_SOONEST = 0.1
 """s between looks for a new speed alone. An ANAFI reports its speed every 0.2 s."""
 
-MIRROR_EVERY = 1.0
-"""s between checks whether the drone's own geofence must change."""
+MIRROR_EVERY = 0.9
+"""s, at least, between checks whether the drone's own geofence must change. The services tick once a second."""
 
 DISABLE, ENABLE, DISABLE_FLOOR = 0.0, 1.0, 2.0
 """param1 of MAV_CMD_DO_FENCE_ENABLE."""
@@ -90,15 +92,17 @@ class FenceService(Service):
     def subscriptions(self) -> Subscriptions:
         return {
             events.GpsLocationChanged: self._on_location,
-            events.SpeedChanged: self._on_speed,
             events.FlyingStateChanged: lambda message, now: self._look(self.host.clock.monotonic()),
         }
+
+    def value_subscriptions(self) -> ValueSubscriptions:
+        return {self._on_speed: (events.SpeedChanged,)}
 
     def _on_location(self, message: events.GpsLocationChanged, now: float) -> None:
         self._located = self.host.clock.monotonic()
         self._look(self._located)
 
-    def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
+    def _on_speed(self, values: Values, now: float) -> None:
         if now - self._looked >= LOOK_SOONEST:
             self._look(self.host.clock.monotonic())
 
@@ -108,7 +112,7 @@ class FenceService(Service):
         if now >= self._mirrored + MIRROR_EVERY:
             self._mirrored = now
             self._mirror.update(now)
-        return min(self._looked + LOOK_EVERY, self._mirrored + MIRROR_EVERY)
+        return NEVER if self.host.vehicle.on_ground else self._looked + LOOK_EVERY
 
     # Watching.
 

@@ -25,7 +25,7 @@ from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
 from anafi_mav.vehicle.mission.machine import MAVLINK_STATES, State
 from anafi_mav.vehicle.mission.record import MissionRecord
 from anafi_mav.vehicle.vehicle import Vehicle
@@ -93,6 +93,9 @@ class MissionService(Service):
 
     def subscriptions(self) -> Subscriptions:
         return self._flight.subscriptions()
+
+    def value_subscriptions(self) -> ValueSubscriptions:
+        return self._flight.value_subscriptions()
 
     def state_changed(self) -> None:
         self._flight.on_vehicle()

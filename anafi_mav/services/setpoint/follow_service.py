@@ -13,7 +13,7 @@ from anafi_mav.services.dropped_inputs import InputStream
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.services.setpoint.target_messages import sighting
 from anafi_mav.texts import OperatorText
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import ValueSubscriptions
 
 
 class FollowService(Service):
@@ -28,8 +28,8 @@ class FollowService(Service):
     def messages(self) -> Mapping[int, MessageHandler]:
         return {dialect.MAVLINK_MSG_ID_FOLLOW_TARGET: self._target}
 
-    def subscriptions(self) -> Subscriptions:
-        return self._flight.subscriptions()
+    def value_subscriptions(self) -> ValueSubscriptions:
+        return self._flight.value_subscriptions()
 
     def _target(self, inbound: Inbound) -> None:
         if not self._flight.engaged:

@@ -17,7 +17,7 @@ from anafi_mav.services.setpoint.offboard_echo import STREAMS
 from anafi_mav.services.setpoint.setpoint_messages import attitude_setpoint, global_setpoint, local_setpoint
 from anafi_mav.services.stream import MessageStream
 from anafi_mav.texts import OperatorText
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
 from anafi_mav.vehicle.offboard.setpoints import Setpoint
 
 
@@ -52,6 +52,9 @@ class OffboardService(Service):
 
     def subscriptions(self) -> Subscriptions:
         return self._flight.subscriptions()
+
+    def value_subscriptions(self) -> ValueSubscriptions:
+        return self._flight.value_subscriptions()
 
     def _takes(self, read: Callable[[Any], Setpoint | OperatorText]) -> MessageHandler:
         def take(inbound: Inbound) -> None:

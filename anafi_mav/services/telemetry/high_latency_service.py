@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from anafi_mav import units
 from anafi_mav.clock import NEVER
 from anafi_mav.drone import events
+from anafi_mav.drone.values import Values
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
@@ -23,7 +24,7 @@ from anafi_mav.services.service import Host, Query, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.services.telemetry.telemetry_flight import target
 from anafi_mav.services.telemetry.telemetry_status import percent, sensor_bits
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import ValueSubscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
 
 EVERY = 5.0
@@ -130,12 +131,12 @@ class HighLatencyService(Service):
     def streams(self) -> Mapping[int, MessageStream]:
         return {dialect.MAVLINK_MSG_ID_HIGH_LATENCY2: MessageStream(self._build, flavoured=True)}
 
-    def subscriptions(self) -> Subscriptions:
-        return {events.SpeedChanged: self._on_speed}
+    def value_subscriptions(self) -> ValueSubscriptions:
+        return {self._on_speed: (events.SpeedChanged,)}
 
-    def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
-        if self._next and math.isfinite(message.speedZ):
-            self._climb = max(self._climb, abs(message.speedZ))
+    def _on_speed(self, values: Values, now: float) -> None:
+        if self._next and math.isfinite(climb := values[events.SpeedChanged].unpack().speedZ):
+            self._climb = max(self._climb, abs(climb))
 
     def tick(self, now: float) -> float:
         due = [channel for channel, at in self._next.items() if now >= at]

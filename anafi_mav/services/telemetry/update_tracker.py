@@ -8,7 +8,7 @@ that a message made of all three is sent once, with all three.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 
 WINDOW = 10.0
 """s. How often something is news is counted over the present window and the one before."""
@@ -65,6 +65,13 @@ class UpdateTracker:
         """
         first = not self._updated
         self._updated[source] = None
+        self._at = at
+        return first
+
+    def mark_all(self, sources: Iterable[Hashable], at: float) -> bool:
+        """Record updates from several sources, in their sequence; otherwise as `mark`."""
+        first = not self._updated
+        self._updated.update(dict.fromkeys(sources))
         self._at = at
         return first
 

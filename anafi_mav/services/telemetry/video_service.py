@@ -17,6 +17,7 @@ from anafi_mav.clock import NEVER
 from anafi_mav.drone import events
 from anafi_mav.drone.payload.camera import Camera
 from anafi_mav.drone.status.link import Link, LinkState
+from anafi_mav.drone.values import Values
 from anafi_mav.drone.video.video import VideoFrame
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
@@ -24,7 +25,7 @@ from anafi_mav.services.pose import picture_pose
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.services.telemetry.height_track import HeightTrack
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import ValueSubscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
 
 NAN = math.nan
@@ -146,14 +147,18 @@ class VideoTelemetryService(Service):
             dialect.MAVLINK_MSG_ID_ANAFI_LINK: MessageStream(link, tuple(Link.REDUCERS), repeated=True),
         }
 
-    def subscriptions(self) -> Subscriptions:
-        return {events.AltitudeChanged: self._on_altitude, events.AltitudeAboveGroundChanged: self._on_height}
+    def value_subscriptions(self) -> ValueSubscriptions:
+        return {self._on_heights: (events.AltitudeChanged, events.AltitudeAboveGroundChanged)}
 
-    def _on_altitude(self, message: events.AltitudeChanged, now: float) -> None:
-        self._note(self._altitudes, self.host.drone.piloting.state.altitude, now)
-
-    def _on_height(self, message: events.AltitudeAboveGroundChanged, now: float) -> None:
-        self._note(self._heights, self.host.drone.piloting.state.height, now)
+    def _on_heights(self, values: Values, now: float) -> None:
+        """Keep the heights for pictures: they are older than the newest events."""
+        drone = self.host.drone
+        if self._watch is None and drone.video.state.frame is None:
+            return
+        if events.AltitudeChanged in values:
+            self._note(self._altitudes, drone.piloting.state.altitude, now)
+        if events.AltitudeAboveGroundChanged in values:
+            self._note(self._heights, drone.piloting.state.height, now)
 
     @staticmethod
     def _note(track: HeightTrack, height: float | None, now: float) -> None:

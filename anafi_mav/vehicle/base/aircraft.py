@@ -97,7 +97,7 @@ class Aircraft(ABC):
     @property
     def flying_state(self) -> FlyingState | None:
         """Parrot's flying state; None until reported."""
-        return self.drone.piloting.state.flying
+        return self.drone.piloting.settled.flying
 
     @property
     def on_ground(self) -> bool:

@@ -15,8 +15,9 @@ from typing import Any, Protocol
 from anafi_mav import texts
 from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import events
-from anafi_mav.drone.events import AlertState, FlyingState, ForcedLandingReason, Message, PlayError, PlayingState
+from anafi_mav.drone.events import AlertState, FlyingState, ForcedLandingReason, PlayError, PlayingState
 from anafi_mav.drone.sent_commands import SentCommand
+from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import FlightPlanFile
@@ -26,7 +27,7 @@ from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import DroneRefused, Refused, not_ready, reason_of, text_of
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
 from anafi_mav.vehicle.mission.course import Course
 from anafi_mav.vehicle.mission.effects import (
     Acquire,
@@ -403,8 +404,11 @@ class MissionFlight(PlainTask):
             events.MavlinkFilePlayingStateChanged: self._on_playing,
             events.MissionItemExecuted: lambda message, now: self._handle(machine.executed(message.idx)),
             events.WaypointSkipped: lambda message, now: self._handle(machine.skipped(message.item)),
-            **dict.fromkeys(PROOF, self._on_position),
         }
+
+    def value_subscriptions(self) -> ValueSubscriptions:
+        """Return the handler of the values that prove that the drone is at its last way point."""
+        return {self._on_position: PROOF}
 
     def _on_playing(self, message: events.MavlinkFilePlayingStateChanged, now: float) -> None:
         plan = self._vehicle.drone.flight_plan
@@ -417,9 +421,12 @@ class MissionFlight(PlainTask):
                 stopped = message.state == PlayingState.STOPPED
                 self._handle(self.machine.halted(stopped=stopped, report=self._report(), now=self._now))
 
-    def _on_position(self, message: Message, now: float) -> None:
-        if self.machine.state is State.ENDING:
-            self._handle(self.machine.reported(self._report(), type(message)))
+    def _on_position(self, values: Values, now: float) -> None:
+        if self.machine.state is not State.ENDING:
+            return
+        for kind in values:
+            if kind in PROOF and self.machine.state is State.ENDING:
+                self._handle(self.machine.reported(self._report(), kind))
 
     def on_vehicle(self) -> None:
         """Landing, return or flying state have changed."""

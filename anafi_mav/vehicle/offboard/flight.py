@@ -19,7 +19,9 @@ from msgspec.structs import replace
 from anafi_mav import texts, units
 from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import Limits, PilotingCommand, events
-from anafi_mav.drone.events import FlyingState
+from anafi_mav.drone.events import FlyingState, Message
+from anafi_mav.drone.piloting.state import MOTORS_OFF
+from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError, LinkLost
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
@@ -33,7 +35,7 @@ from anafi_mav.vehicle.base.refusal import Refused, reason_of
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
 from anafi_mav.vehicle.base.velocity_loop import (
     CAUTIOUS_TILT,
     WIND,
@@ -87,6 +89,10 @@ _RULES = {
 """For a drone that stands on the ground or not, and a setpoint that a velocity loop flies or not."""
 
 
+MOTION: frozenset[type[Message]] = frozenset({events.AttitudeChanged, events.SpeedChanged, events.AltitudeChanged})
+"""Values of which the drone's motion is estimated."""
+
+
 class _Attempt(NamedTuple):
     """One attempt of a client to acquire control by setpoints, while what flew before is ending."""
 
@@ -98,8 +104,9 @@ class OffboardFlight(PlainTask):
     """The setpoints of programs on one vehicle, and the drone flown by those of its pilot."""
 
     def __init__(self, vehicle: Aircraft, clock: Clock, takeoff: Launcher) -> None:
-        self.motion = MotionEstimate(vehicle.roll)
-        """Motion of the drone; other flight tasks that fly by sticks use it too."""
+        self._motion = MotionEstimate(vehicle.roll)
+        self._unread: dict[type[Message], float] = {}
+        """Values of motion that were reported since the last look at them, and when (s)."""
         self.warn_throttled: Callable[[OperatorText], None] = lambda text: vehicle.text(Severity.WARNING, text)
         """Says what is wrong with something that arrives many times a second."""
         self.drop: Callable[[Hashable, OperatorText], None] = lambda client, reason: vehicle.text(
@@ -114,6 +121,12 @@ class OffboardFlight(PlainTask):
         self._attempt: _Attempt | None = None
         """The newest."""
         self._moves = OffboardMoves(vehicle, lambda reason: self.drop(self._stream.pilot, reason))
+
+    @property
+    def motion(self) -> MotionEstimate:
+        """Motion of the drone; other flight tasks that fly by sticks use it too."""
+        self._read_motion()
+        return self._motion
 
     @property
     def engaged(self) -> bool:
@@ -449,7 +462,7 @@ class OffboardFlight(PlainTask):
         self._moves.forget()
         self._stream = OffboardStream()
         self._watch()
-        self.motion = MotionEstimate(self._vehicle.roll)
+        self._motion, self._unread = MotionEstimate(self._vehicle.roll), {}
 
     # What the drone reports.
 
@@ -457,33 +470,47 @@ class OffboardFlight(PlainTask):
         """Return the handlers of the events on motion, and on the hover after a take-off."""
         return {
             events.FlyingStateChanged: lambda message, now: self.after_takeoff(),
-            events.AttitudeChanged: self._on_attitude,
-            events.SpeedChanged: self._on_speed,
-            events.AltitudeChanged: self._on_altitude,
             events.GpsLocationChanged: self._on_location,
         }
 
-    def _on_attitude(self, message: events.AttitudeChanged, now: float) -> None:
-        if (attitude := self._vehicle.drone.piloting.state.attitude) is None:
-            self.motion.forget_attitude()
-        else:
-            self.motion.on_attitude(attitude.roll, attitude.pitch, attitude.yaw, now)
-        if isinstance(self._stream.setpoint, AttitudeSetpoint):
+    def value_subscriptions(self) -> ValueSubscriptions:
+        """Return the handler of the values that report the drone's motion."""
+        return {self._on_motion: MOTION}
+
+    def _on_motion(self, values: Values, now: float) -> None:
+        for kind in values:
+            if kind in MOTION:
+                self._unread[kind] = now
+        if self._vehicle.flying_state in MOTORS_OFF and self._stream.engagement is None:
+            return  # the motion of a drone that stands is read when it is needed
+        self._read_motion()
+        setpoint = self._stream.setpoint
+        if (isinstance(setpoint, AttitudeSetpoint) and events.AttitudeChanged in values) or (
+            isinstance(setpoint, MotionSetpoint) and events.SpeedChanged in values
+        ):
             self._fly_on(now)
 
-    def _on_speed(self, message: events.SpeedChanged, now: float) -> None:
-        if (velocity := self._vehicle.drone.piloting.state.velocity) is None:
-            self.motion.forget_velocity()
-        else:
-            self.motion.on_velocity(velocity.north, velocity.east, velocity.down, now)
-        if isinstance(self._stream.setpoint, MotionSetpoint):
-            self._fly_on(now)
-
-    def _on_altitude(self, message: events.AltitudeChanged, now: float) -> None:
-        if (altitude := self._vehicle.drone.piloting.state.altitude) is None:
-            self.motion.forget_height()
-        else:
-            self.motion.on_height(altitude, now)
+    def _read_motion(self) -> None:
+        """Add the newest values to the estimate."""
+        if not self._unread:
+            return
+        unread, self._unread = self._unread, {}
+        motion, state = self._motion, self._vehicle.drone.piloting.state
+        if (at := unread.get(events.AttitudeChanged)) is not None:
+            if (attitude := state.attitude) is None:
+                motion.forget_attitude()
+            else:
+                motion.on_attitude(attitude.roll, attitude.pitch, attitude.yaw, at)
+        if (at := unread.get(events.SpeedChanged)) is not None:
+            if (velocity := state.velocity) is None:
+                motion.forget_velocity()
+            else:
+                motion.on_velocity(velocity.north, velocity.east, velocity.down, at)
+        if (at := unread.get(events.AltitudeChanged)) is not None:
+            if (altitude := state.altitude) is None:
+                motion.forget_height()
+            else:
+                motion.on_height(altitude, at)
 
     def _on_location(self, message: events.GpsLocationChanged, now: float) -> None:
         if (place := self._vehicle.place) is not None:

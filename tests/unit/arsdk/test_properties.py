@@ -21,7 +21,7 @@ from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.codec.wire import Bits, Blob, Message, MessageId, OpenEnum, Scalar, Text, UnknownMessage
 from anafi_mav.arsdk.link import handshake
 from anafi_mav.arsdk.link.frame import decode_frames, encode_frame
-from anafi_mav.arsdk.link.transport import ACK_TIMEOUT, Delivered, ReceivedMessage, Role, Transport, Undelivered
+from anafi_mav.arsdk.link.transport import ACK_TIMEOUT, Delivered, ReceivedMessages, Role, Transport, Undelivered
 from anafi_mav.arsdk.messages import ardrone3
 
 VERSIONS = [1, 2, 3]
@@ -111,8 +111,8 @@ class Weather:
 
     def _collect(self, end: int, events: list[Any]) -> None:
         for event in events:
-            if isinstance(event, ReceivedMessage):
-                self.heard[end].append(event.message)
+            if isinstance(event, ReceivedMessages):
+                self.heard[end] += map(wire.unpacked, event.messages)
             elif isinstance(event, Delivered):
                 self.delivered[end].append(event.token)
             elif isinstance(event, Undelivered):

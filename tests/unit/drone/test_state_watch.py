@@ -45,5 +45,5 @@ def test_camera_that_reports_no_known_value_is_known_afterwards() -> None:
 async def test_drones_share_the_table_of_reducers() -> None:
     one, other = Drone("127.0.42.1"), Drone("127.0.42.2")
     assert one._routes is other._routes
-    one._receive(common.BatteryStateChanged(percent=70), 0.0)
+    one._handle(common.BatteryStateChanged(percent=70), 0.0)
     assert (one.battery.state.percent, other.battery.state.percent) == (70, None)

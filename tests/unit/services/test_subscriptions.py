@@ -42,11 +42,6 @@ def test_handlers_of_several_tables_keep_table_order() -> None:
             "Vehicle MessageService EventService FenceService RollSignService OffboardFlight "
             "WarningService TakeoffPointService DownloadService",
         ),
-        (
-            events.SpeedChanged,
-            "MessageService OrbitService FenceService RollSignService OffboardFlight FollowFlight HighLatencyService "
-            "PhotoReporter",
-        ),
         (events.MavlinkFilePlayingStateChanged, "MessageService MissionFlight System"),
         (events.MissionItemExecuted, "MissionFlight"),
         (events.SensorsStatesListChanged, "EventService WarningService System"),

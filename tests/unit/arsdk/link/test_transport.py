@@ -19,7 +19,7 @@ from anafi_mav.arsdk.link.transport import (
     Garbage,
     LinkDown,
     Rank,
-    ReceivedMessage,
+    ReceivedMessages,
     Role,
     Silent,
     Speaks,
@@ -62,7 +62,8 @@ def ack(version: int, id: int, seq: int) -> bytes:
 
 
 def messages(events: list[Event]) -> list[object]:
-    return [event.message for event in events if isinstance(event, ReceivedMessage)]
+    frames = [event.messages for event in events if isinstance(event, ReceivedMessages)]
+    return [wire.unpacked(message) for frame in frames for message in frame]
 
 
 # -- queues
@@ -88,7 +89,7 @@ def test_message_travels_in_the_queue_of_its_buffer(
     (frame,) = frames(transport, transport.outgoing(0.0))
     assert frame == Frame(type, id, 0, with_length(version, wire.encode(message)))
     peer = Transport(Role.DEVICE if role is Role.CONTROLLER else Role.CONTROLLER, version, 0.0)
-    assert peer.receive(encode_frame(version, *frame), 0.0) == [ReceivedMessage(message)]
+    assert messages(peer.receive(encode_frame(version, *frame), 0.0)) == [message]
 
 
 def test_low_priority_events_have_their_own_queue(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -613,7 +614,7 @@ def test_no_bytes_of_a_peer_raise(role: Role, version: int, seed: int) -> None:
         if number % 10 == 0:
             victim.send(tilt(number), now)
         for event in victim.receive(datagram, now):
-            assert isinstance(event, ReceivedMessage | Delivered | Garbage), f"seed {seed}"
+            assert isinstance(event, ReceivedMessages | Delivered | Garbage), f"seed {seed}"
         victim.outgoing(now)
         victim.expire(now)
     assert sum(count for name, count in victim.counters.items() if name.startswith("garbage.")) > 100
@@ -640,7 +641,7 @@ def test_fading_link_drops_waiting_messages_and_recovers() -> None:
         assert transport.expire(now) == []
         assert {frame.id for frame in frames(transport, transport.outgoing(now))} <= {0}
     spoken = transport.receive(data_frame(3, 126, 0, HOVERING), 12.0)
-    assert spoken == [Speaks(), ReceivedMessage(HOVERING)]
+    assert spoken == [Speaks(), ReceivedMessages([HOVERING])]
     (answer,) = frames(transport, transport.outgoing(12.0))
     assert answer.type == FrameType.ACK
     transport.send(tilt(4.0), 12.0)

@@ -1,0 +1,22 @@
+"""Events of values: attitude, speed, heights, place, gimbal and zoom.
+
+A drone sends them again and again, and each replaces the one before. They are kept undecoded until a state is read, and
+those that arrive together are reported with one call: of thirty a second most are read by nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TypeAlias
+
+import anafi_mav.arsdk.messages  # noqa: F401  # declares them
+from anafi_mav.arsdk.codec.wire import Message, PackedMessage, value_events
+
+VALUES: frozenset[type[Message]] = frozenset(value_events())
+"""The kinds of all of them."""
+
+Values: TypeAlias = Mapping[type[Message], PackedMessage]
+"""Those that arrived together, one of each kind, in their sequence."""
+
+OnValues: TypeAlias = Callable[[Values, float], None]
+"""(values, loop time of their arrival)."""
