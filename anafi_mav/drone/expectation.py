@@ -48,7 +48,7 @@ class Wire(Protocol):
 
     on_delivered: Callable[[int, bool], None]
 
-    def send(self, message: Message | UnknownMessage, rank: Rank = Rank.NORMAL) -> int: ...
+    def send(self, message: Message | UnknownMessage, rank: Rank = Rank.NORMAL, *, at_once: bool = False) -> int: ...
 
     def cancel(self, token: int) -> None: ...
 
@@ -216,12 +216,13 @@ class Commander:
         if task is not None and (task in self._silenced or (task in self._retired and not stops)):
             raise CommandRejected("replaced by a newer command")
 
-    def send(self, message: Message, *, stops: bool = False, is_setting: bool = False) -> int:
+    def send(self, message: Message, *, stops: bool = False, is_setting: bool = False, at_once: bool = False) -> int:
         """Hand a command to the transport; stops and landings go before settings there.
 
         Raises `LinkLost` when there is no link, or what the gate raises.
 
-        `stops`: it stops something. Raises `CommandRejected` in a task that may not send it (see `retire`).
+        `stops`: it stops something. Raises `CommandRejected` in a task that may not send it (see `retire`). `at_once`:
+        it leaves in this event-loop iteration, because nothing follows that could share its frame.
         """
         if self._wire is None:
             raise LinkLost("not connected")
@@ -231,7 +232,8 @@ class Commander:
         if message_log.isEnabledFor(logging.DEBUG):
             message_log.debug("%s: sent %r", self.name, without_secrets(message))
         is_urgent = stops or isinstance(message, ardrone3.Landing)
-        token = self._wire.send(message, Rank.URGENT if is_urgent else Rank.SETTING if is_setting else Rank.NORMAL)
+        rank = Rank.URGENT if is_urgent else Rank.SETTING if is_setting else Rank.NORMAL
+        token = self._wire.send(message, rank, at_once=at_once)
         if self.on_command is not None:
             try:
                 self.on_command(message)
@@ -407,9 +409,9 @@ class Commander:
         stops: bool = False,
         is_setting: bool = False,
     ) -> None:
-        """Send the command whose answer is expected. `stops` and `is_setting`: see `send`."""
+        """Send the command whose answer is expected, at once. `stops` and `is_setting`: see `send`."""
         try:
-            expectation.token = self.send(command, stops=stops, is_setting=is_setting)
+            expectation.token = self.send(command, stops=stops, is_setting=is_setting, at_once=True)
         except BaseException:
             expectation.close()
             raise

@@ -15,7 +15,7 @@ import socket
 import zlib
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -201,14 +201,20 @@ class Outbox:
             self.flush()
 
     def add(self, raw: bytes) -> None:
-        """A frame, to leave when this turn is over."""
+        """Add a frame that is to leave."""
+        self.add_all((raw,))
+
+    def add_all(self, frames: Sequence[bytes]) -> None:
+        """Add frames that are to leave."""
         if not self._limit:
-            self._write(raw)
+            for raw in frames:
+                self._write(raw)
             return
-        if self._size + len(raw) > self._limit and self._frames:
-            self._give()
-        self._frames.append(raw)
-        self._size += len(raw)
+        for raw in frames:
+            if self._size + len(raw) > self._limit and self._frames:
+                self._give()
+            self._frames.append(raw)
+            self._size += len(raw)
         if self._due is None and not self._held:
             loop = asyncio.get_running_loop()
             is_paused = self._pause > 0.0 and loop.time() < self._next
@@ -264,6 +270,7 @@ def shaped_channel(
     write: Callable[[bytes], None],
     options: EndpointOptions,
     *,
+    write_all: Callable[[Sequence[bytes]], None] | None = None,
     datagrams: bool = False,
     line: float | None = None,
 ) -> Channel:
@@ -273,7 +280,7 @@ def shaped_channel(
     """
     rate = options.bytes_per_second if line is None else min(line, options.bytes_per_second or line)
     if rate is None:
-        return Channel(name, write, options=options, datagrams=datagrams)
+        return Channel(name, write, write_all=write_all, options=options, datagrams=datagrams)
     shaper = Shaper(write, rate)
     shaper.channel = Channel(
         name,
@@ -304,7 +311,7 @@ class StreamPeer(asyncio.Protocol):
         self._write_ahead = write_ahead
         self._transport: asyncio.Transport | None = None
         self._outbox = Outbox(self._write, min(LEAVE_TOGETHER, write_ahead))
-        self.channel = shaped_channel(name, self._outbox.add, url.options, line=line)
+        self.channel = shaped_channel(name, self._outbox.add, url.options, write_all=self._outbox.add_all, line=line)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         # Duck-typed by pyserial-asyncio-fast's transport, too.

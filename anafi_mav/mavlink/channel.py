@@ -9,7 +9,7 @@ a frame leaves, so that they are contiguous for each sender whatever was dropped
 from __future__ import annotations
 
 from collections import Counter, OrderedDict, deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 from anafi_mav.endpoint_options import DEFAULTS, EndpointOptions
 from anafi_mav.mavlink import dialect
@@ -21,6 +21,7 @@ from anafi_mav.mavlink.frames import (
     HEADER_2,
     SIGNATURE,
     SIGNED,
+    Batch,
     Packed,
     Parser,
     ReceivedFrame,
@@ -55,6 +56,7 @@ class Channel:
         name: str,
         write: Callable[[bytes], None],
         *,
+        write_all: Callable[[Sequence[bytes]], None] | None = None,
         options: EndpointOptions = DEFAULTS,
         datagrams: bool = False,
         queue_bytes: int = QUEUE_BYTES,
@@ -63,7 +65,8 @@ class Channel:
     ) -> None:
         """Create it with a queue of `queue_bytes`.
 
-        Frames that give way have `stream_bytes` of it, and at least one frame.
+        Frames that give way have `stream_bytes` of it, and at least one frame. `write` takes a frame; `write_all`,
+        where there is one, several at once.
         """
         self.name = name
         """For people: the endpoint's URL and, where it has several peers, which one."""
@@ -109,6 +112,7 @@ class Channel:
         self._newest: dict[Stream, int] = {}
         """Newest timestamps that were verified."""
         self._write = write
+        self._write_all = write_all
         self._datagrams = datagrams
         self._queue_bytes = queue_bytes
         self._stream_bytes = stream_bytes
@@ -228,6 +232,29 @@ class Channel:
             self._leave(packed, sysid, compid)
         else:
             self._wait((packed, sysid, compid), give_way)
+
+    def send_batch(self, batch: Batch) -> None:
+        """Send messages of streams, which give way.
+
+        Together, where nothing distinguishes one frame from the next: neither a budget nor a queue nor a signature.
+        """
+        if (
+            self._write_all is None
+            or self.pace is not None
+            or self.proof is not None
+            or self._held_by
+            or not self.is_open
+            or self.is_signed
+        ):
+            for packed in batch.messages:
+                self.send_packed(packed, batch.sysid, batch.compid, give_way=True)
+            return
+        sequence = self._sequence.get(batch.sender, 0)
+        frames = batch.framed(sequence)
+        self._sequence[batch.sender] = (sequence + len(frames)) & 0xFF
+        self.sent_frames += len(frames)
+        self.sent_bytes += batch.size
+        self._write_all(frames)
 
     def send_heartbeats(self) -> None:
         """Send the heartbeats that wait, as far as a peer without proof may get them."""

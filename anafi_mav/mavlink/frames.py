@@ -11,7 +11,7 @@ import inspect
 import re
 import struct
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from enum import Enum
 from operator import attrgetter
 from typing import Any
@@ -100,6 +100,36 @@ class Packed:
         if header != self._header:
             self._header, self._framed = header, frame(self, seq, sysid, compid)
         return self._framed
+
+
+class Batch:
+    """Messages of one sender that leave together, packed once for all channels."""
+
+    __slots__ = ("_frames", "_sequence", "compid", "messages", "sender", "size", "sysid")
+
+    def __init__(self, messages: Sequence[Packed], sysid: int, compid: int) -> None:
+        self.messages = messages
+        self.sysid = sysid
+        self.compid = compid
+        self.sender = (sysid, compid)
+        self.size = sum(len(packed.payload) + FRAME_BYTES for packed in messages)
+        """Bytes of the unsigned frames."""
+        self._sequence = -1
+        self._frames: Sequence[bytes] = ()
+        """The last unsigned frames, of which the first has this sequence number."""
+
+    def framed(self, sequence: int) -> Sequence[bytes]:
+        """Return the unsigned frames.
+
+        Channels with the same streams are at the same sequence numbers: one frame is made for all of them.
+        """
+        if sequence != self._sequence:
+            self._sequence = sequence
+            self._frames = [
+                frame(packed, sequence + place & 0xFF, self.sysid, self.compid)
+                for place, packed in enumerate(self.messages)
+            ]
+        return self._frames
 
 
 def pack(message: dialect.MAVLink_message) -> Packed:
@@ -208,12 +238,19 @@ def _reader(id: int) -> _Reader:
     kind: Any = dialect.mavlink_map[id]
     size, unpacker, names = kind.unpacker.size, kind.unpacker.unpack_from, tuple(kind.ordered_fieldnames)
     codes = [code for _, code in re.findall(r"(\d*)([a-zA-Z])", kind.unpacker.format)]
-    plain = all(length == 1 for length in kind.lengths) and not {"c", "s"}.intersection(codes)
-    attributes = vars(kind(*([0] * len(names)))) if plain else {}
+    has_texts = bool({"c", "s"}.intersection(codes))
+    attributes = {} if has_texts else vars(kind(*([0] * len(names))))
 
     def read_numbers(payload: bytes) -> dict[str, Any]:
         result = attributes.copy()
         result.update(zip(names, unpacker(payload.ljust(size, b"\0")), strict=True))
+        return result
+
+    def read_arrays(payload: bytes) -> dict[str, Any]:
+        result = attributes.copy()
+        flat = unpacker(payload.ljust(size, b"\0"))
+        for name, first, length in zip(names, starts, kind.lengths, strict=True):
+            result[name] = flat[first] if length == 1 else list(flat[first : first + length])
         return result
 
     def read_any(payload: bytes) -> dict[str, Any]:
@@ -230,7 +267,10 @@ def _reader(id: int) -> _Reader:
         return vars(message)
 
     starts = [sum(kind.lengths[:order]) for order in range(len(kind.lengths))]
-    _readers[id] = read_numbers if plain else read_any
+    if has_texts:
+        _readers[id] = read_any
+    else:
+        _readers[id] = read_numbers if all(length == 1 for length in kind.lengths) else read_arrays
     return _readers[id]
 
 

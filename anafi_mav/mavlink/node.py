@@ -24,7 +24,7 @@ from anafi_mav.mavlink.access import STOPPING, Access, concerns_link, needed_acc
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, reason
 from anafi_mav.mavlink.channel import Channel, total
 from anafi_mav.mavlink.endpoint import EndpointFactory, make_endpoint, parse_endpoint
-from anafi_mav.mavlink.frames import Packed, ReceivedFrame, pack
+from anafi_mav.mavlink.frames import Batch, Packed, ReceivedFrame, pack
 from anafi_mav.mavlink.key_ring import KeyRing
 from anafi_mav.mavlink.router import Route, Router, has_target, targets
 from anafi_mav.mavlink.signing import Signing
@@ -232,6 +232,12 @@ class Node:
         for channel in self.channels if to is None else to:
             channel.send_packed(packed, sysid, compid, give_way=give_way)
 
+    def send_batch(self, batch: Batch, to: Iterable[Channel]) -> None:
+        """Send messages of streams of one of our components to some channels."""
+        self._router.own_sources.add(batch.sender)
+        for channel in to:
+            channel.send_batch(batch)
+
     def sources(self, channel: Channel) -> list[tuple[int, int]]:
         """Return the systems and components heard on a channel, sorted."""
         return self._router.sources(channel)
@@ -292,7 +298,7 @@ class Node:
     def received(self, channel: Channel, frames: list[ReceivedFrame], reached: Collection[int] | None = None) -> None:
         reached = channel.system_ids if reached is None else reached
         now = self._clock.monotonic()
-        old = self._stalls is not None and not channel.has_ages and self._stalls.old
+        old = self._stalls is not None and not channel.has_ages and self._stalls.waited > 0.0
         if frames:
             channel.heard_at = now
         for received in frames:
@@ -352,7 +358,7 @@ class Node:
 
         `is_false`: it is an observer's, in the name of another sender.
         """
-        if not self._stays_within(channel, received):
+        if channel.system_ids is not None and not self._stays_within(channel.system_ids, received):
             channel.counters["filtered_frames"] += 1
             return False
         if channel.access is Access.OBSERVE and (is_false or not _is_harmless(received.message)):
@@ -360,18 +366,18 @@ class Node:
             return False
         return True
 
-    def _stays_within(self, channel: Channel, received: ReceivedFrame) -> bool:
-        """Return True if a frame reaches none but the systems of its channel's option `systems`.
+    def _stays_within(self, systems: Collection[int], received: ReceivedFrame) -> bool:
+        """Return True if a frame reaches these systems alone: the channel's option `systems`.
 
         The router decides about frames for one system. To all go a station's heartbeat, and what these systems send
         to no target: a command to system 0 would be one to the systems behind other endpoints. COMMAND_ACK of older
         autopilots has no target though it has the field.
         """
         message = received.message
-        if channel.system_ids is None or targets(message)[0] != 0 or _is_stations_heartbeat(message):
+        if targets(message)[0] != 0 or _is_stations_heartbeat(message):
             return True
         is_ack = isinstance(message, dialect.MAVLink_command_ack_message)
-        return received.sysid in channel.system_ids and (is_ack or not has_target(message))
+        return received.sysid in systems and (is_ack or not has_target(message))
 
     def _stalled(self, seconds: float) -> None:
         logger.warning(

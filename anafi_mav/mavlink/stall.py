@@ -53,16 +53,13 @@ class StallWatch:
             self._timer = None
 
     @property
-    def old(self) -> bool:
-        """True for what is read from a socket now, if it may have arrived during a stall.
+    def waited(self) -> float:
+        """How long what is read from a socket now may have waited there for a stall to end, s.
+
+        0 without a stall.
 
         An event loop reads its sockets before it runs its timers: the first look after a stall finds no beat.
         """
-        return self.waited > 0.0
-
-    @property
-    def waited(self) -> float:
-        """How long what is read from a socket now may have waited there for a stall to end, s."""
         now = self._loop.time()
         if self._timer is None:
             return 0.0

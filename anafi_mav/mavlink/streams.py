@@ -25,30 +25,37 @@ MAX_GROUPS = 256
 
 
 class _Stream:
-    """One message on one channel."""
+    """One message at one interval, on the channels that share it."""
 
-    __slots__ = ("interval", "next", "pace")
+    __slots__ = ("interval", "next", "pace", "users")
 
     def __init__(self, interval: float | None, pace: StreamPace | None) -> None:
         self.interval = interval
         self.pace = pace
         self.next = _NEVER if interval is None else -_NEVER
+        self.users = 1
+        """Channels that share it: they have the same interval, no pace, and got the last message together."""
 
-    def due(self, now: float) -> bool:
-        """True when the message may leave now; it then counts as sent.
+    def leave(self, now: float) -> None:
+        """Count the message, which is due, as sent.
 
         Times are kept on a grid, not from message to message, so that jitter of the source costs no rate: an
         interval equal to the source's passes all but perhaps one of its messages.
         """
         interval = self.interval
-        if interval is None or now < self.next:
-            return False
+        assert interval is not None
         if self.pace is not None:
             interval *= self.pace.slowdown
         late = now - self.next
         # After a silence the grid begins anew; half an interval early, so that the next message may jitter.
         self.next = self.next + interval if late <= interval else now + interval / 2
-        return True
+
+    def part(self, users: int) -> _Stream:
+        """Return the stream of some of its channels, which share it no longer."""
+        part = _Stream(self.interval, self.pace)
+        part.next, part.users = self.next, users
+        self.users -= users
+        return part
 
 
 _OFF = _Stream(None, None)
@@ -60,7 +67,7 @@ class _Lane(Generic[ChannelT]):
 
     __slots__ = ("streams", "until")
 
-    def __init__(self, streams: list[tuple[ChannelT, _Stream]]) -> None:
+    def __init__(self, streams: list[tuple[_Stream, Sequence[ChannelT]]]) -> None:
         self.streams = streams
         self.until = -_NEVER
 
@@ -79,10 +86,12 @@ class _Group(Generic[ChannelT]):
 class _Audience(Generic[ChannelT]):
     """Channels that are asked about together, and what is known of them."""
 
-    __slots__ = ("channels", "groups", "lanes")
+    __slots__ = ("channels", "groups", "lanes", "parts")
 
     def __init__(self, channels: Sequence[ChannelT]) -> None:
         self.channels = channels
+        self.parts: dict[tuple[ChannelT, ...], Sequence[ChannelT]] = {tuple(channels): channels}
+        """One list for the same channels: messages for one list are sent together."""
         self.lanes: dict[int, _Lane[ChannelT]] = {}
         self.groups: dict[tuple[int, ...], _Group[ChannelT]] = {}
 
@@ -122,38 +131,48 @@ class Streams(Generic[ChannelT]):
         known = streams.get(id)
         # A client that says again what it has (QGroundControl does 35 times, for ArduPilot) must not get more by it.
         if known is None or known.interval != interval:
+            if known is not None:
+                known.users -= 1
             streams[id] = _Stream(interval, self._pace(channel))
             self._forget(id)
 
     def reset(self, channel: ChannelT, id: int) -> None:
         """Stream at the default interval again."""
-        if self._channels.get(channel, {}).pop(id, None) is not None:
+        stream = self._channels.get(channel, {}).pop(id, None)
+        if stream is not None:
+            stream.users -= 1
             self._forget(id)
 
     def due_on(
         self, channels: Sequence[ChannelT], ids: tuple[int, ...], now: float
-    ) -> list[tuple[int, list[ChannelT]]]:
+    ) -> list[tuple[int, Sequence[ChannelT]]]:
         """Return the messages that may leave now with their channels; they count as sent there.
 
-        A list of channels that has changed must be another object, as `Node.channels` is.
+        A list of channels that has changed must be another object, as `Node.channels` is. Messages for the same
+        channels have one list.
         """
         audience = self._audience(channels)
         group = audience.groups.get(ids) or self._new_group(audience, ids)
         if now < group.until:
             return []
-        found: list[tuple[int, list[ChannelT]]] = []
+        found: list[tuple[int, Sequence[ChannelT]]] = []
         soonest = _NEVER
         for id, lane in group.lanes:
             if now >= lane.until:
-                due, until = [], _NEVER
-                for channel, stream in lane.streams:
-                    if now >= stream.next and stream.due(now):
-                        due.append(channel)
+                due: Sequence[ChannelT] = ()
+                until, has_first = _NEVER, False
+                for stream, channels in lane.streams:
+                    if now >= stream.next:
+                        has_first = has_first or stream.next == -_NEVER
+                        stream.leave(now)
+                        due = [*due, *channels] if due else channels
                     if stream.next < until:
                         until = stream.next
                 lane.until = until
                 if due:
                     found.append((id, due))
+                if has_first and len(lane.streams) > 1:
+                    self._share(audience, id, lane)
             if lane.until < soonest:
                 soonest = lane.until
         group.until = soonest
@@ -174,18 +193,14 @@ class Streams(Generic[ChannelT]):
         """
         return bool(self._lane(self._audience(channels), id).streams)
 
-    def due(self, channel: ChannelT, id: int, now: float) -> bool:
-        """True when a message may leave now on this channel; it then counts as sent."""
-        self._forget(id)
-        return self._stream(channel, id).due(now)
-
     def channel_closed(self, channel: ChannelT) -> None:
         """Forget a channel, and the lists of channels, which keep it alive.
 
         Its intervals are a table for each component of each drone. What still refers to the channel, a command of its
         client for example, must not keep them.
         """
-        self._channels.pop(channel, None)
+        for stream in self._channels.pop(channel, {}).values():
+            stream.users -= 1
         self._audiences.clear()
 
     def _forget(self, id: int) -> None:
@@ -212,9 +227,47 @@ class Streams(Generic[ChannelT]):
     def _lane(self, audience: _Audience[ChannelT], id: int) -> _Lane[ChannelT]:
         lane = audience.lanes.get(id)
         if lane is None:
-            streams = [(channel, self._stream(channel, id)) for channel in audience.channels]
-            lane = audience.lanes[id] = _Lane([one for one in streams if one[1].interval is not None])
+            lane = audience.lanes[id] = _Lane(self._streams(audience, id))
         return lane
+
+    def _streams(self, audience: _Audience[ChannelT], id: int) -> list[tuple[_Stream, Sequence[ChannelT]]]:
+        """Return the streams of a message with their channels.
+
+        None is shared with a channel elsewhere.
+        """
+        found: dict[_Stream, list[ChannelT]] = {}
+        for channel in audience.channels:
+            stream = self._stream(channel, id)
+            if stream.interval is not None:
+                found.setdefault(stream, []).append(channel)
+        result: list[tuple[_Stream, Sequence[ChannelT]]] = []
+        for stream, channels in found.items():
+            if len(channels) < stream.users:
+                self._forget(id)
+                stream = self._adopt(channels, id, stream.part(len(channels)))
+            result.append((stream, audience.parts.setdefault(tuple(channels), channels)))
+        return result
+
+    def _share(self, audience: _Audience[ChannelT], id: int, lane: _Lane[ChannelT]) -> None:
+        """Let channels with the same interval share a stream.
+
+        The next message comes to all of them when it is due to the first.
+        """
+        shared: dict[float | None, _Stream] = {}
+        for stream, channels in lane.streams:
+            if stream.pace is None:
+                first = shared.setdefault(stream.interval, stream)
+                if first is not stream:
+                    first.next = min(first.next, stream.next)
+                    first.users += len(channels)
+                    self._adopt(channels, id, first)
+        lane.streams = self._streams(audience, id)
+        lane.until = min(stream.next for stream, _ in lane.streams)
+
+    def _adopt(self, channels: Sequence[ChannelT], id: int, stream: _Stream) -> _Stream:
+        for channel in channels:
+            self._channels[channel][id] = stream
+        return stream
 
     def _stream(self, channel: ChannelT, id: int) -> _Stream:
         streams = self._channels.get(channel)

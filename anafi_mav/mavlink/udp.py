@@ -107,7 +107,9 @@ class UdpOut(Endpoint):
     def __init__(self, url: EndpointUrl, sink: Sink, clock: Clock) -> None:
         super().__init__(url, sink, clock)
         self._outbox = Outbox(self._write, _datagram_limit(url), PAUSE)
-        self.channel = shaped_channel(url.text, self._outbox.add, url.options, datagrams=True)
+        self.channel = shaped_channel(
+            url.text, self._outbox.add, url.options, write_all=self._outbox.add_all, datagrams=True
+        )
         self._transport: asyncio.DatagramTransport | None = None
         self._reopening: asyncio.Task[None] | None = None
         self._problem = ""
@@ -255,7 +257,7 @@ class UdpIn(Listener):
             # Not a peer before it has sent something true: garbage must not open channels.
             outbox = Outbox(self._writer(address), _datagram_limit(self.parsed), PAUSE)
             name = f"{self.url} from {self._shown(address)}"
-            channel = shaped_channel(name, outbox.add, self.parsed.options, datagrams=True)
+            channel = shaped_channel(name, outbox.add, self.parsed.options, write_all=outbox.add_all, datagrams=True)
             self._protect(channel)
             channel.proof = None if channel.is_signed or is_loopback(address[0]) else AddressProof()
             frames = channel.receive(data)

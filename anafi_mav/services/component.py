@@ -22,6 +22,7 @@ from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.access import COMMANDS, Access
 from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.frames import Batch, Packed
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.router import EVERY_COMPONENT
 from anafi_mav.services.command.command_service import CommandService
@@ -92,6 +93,9 @@ class ComponentSystem(Protocol):
         self, compid: int, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None, *, give_way: bool
     ) -> None:
         """Send as this component to one channel, to some, or to all (None)."""
+
+    def send_batch(self, batch: Batch, to: Sequence[Channel]) -> None:
+        """Send messages of streams to some channels."""
 
     def send_heartbeat(self) -> None:
         """Send one more HEARTBEAT of the autopilot to all."""
@@ -213,6 +217,13 @@ class Component:
         Nothing is sent while the link is down.
         """
         self._system.send_as(self.compid, message, to, give_way=message.get_msgId() in self.telemetry)
+
+    def send_streams(self, messages: Sequence[Packed], to: Sequence[Channel]) -> None:
+        """Send messages of streams as this component, together, to channels that have these streams.
+
+        Nothing is sent while the link is down.
+        """
+        self._system.send_batch(Batch(messages, self.sysid, self.compid), to)
 
     def send_by_flavour(
         self, build: Callable[[Flavour], dialect.MAVLink_message | None], to: Sequence[Channel] | None = None

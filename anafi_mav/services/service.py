@@ -15,6 +15,7 @@ from anafi_mav.clock import NEVER, Clock
 from anafi_mav.drone import Drone
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.frames import Packed
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Action, ActionGroup, Command
 from anafi_mav.services.definition_link import DefinitionLink
@@ -83,6 +84,12 @@ class Host(Protocol):
 
     def send(self, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None = None) -> None:
         """Send as this component to one channel, to some, or to all.
+
+        Nothing is sent while the link is down.
+        """
+
+    def send_streams(self, messages: Sequence[Packed], to: Sequence[Channel]) -> None:
+        """Send messages of streams as this component, together, to channels that have these streams.
 
         Nothing is sent while the link is down.
         """

@@ -24,6 +24,7 @@ from anafi_mav.drone.values import VALUES
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.access import COMMANDS
 from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.frames import Batch
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.services.camera.camera_service import CameraService
 from anafi_mav.services.camera.capture_service import CaptureService
@@ -172,11 +173,15 @@ SAMPLES: frozenset[type[Message]] = frozenset(
         events.AltitudeChanged,
         events.AttitudeChanged,
         events.GimbalAttitudeChanged,
+        events.GpsLocationChanged,
         events.SpeedChanged,
         *Camera.SAMPLES,
     }
 )
-"""Events that a drone sends many times a second. What follows from one is done by its handlers."""
+"""Events that a drone sends all the time. What follows from one is done by its handlers."""
+
+EARLY = 1e-6
+"""s by which a timer may call too early: asyncio compares times with its clock's resolution."""
 
 SHORTEST = 0.001
 """s between two ticks of a service, however often it wants to be called."""
@@ -420,6 +425,14 @@ class System:
                 channels = [channel for channel in channels if channel.can_stream(message.get_msgId())]
             self._node.send(message, sysid=self.sysid, compid=compid, to=channels, give_way=give_way)
 
+    def send_batch(self, batch: Batch, to: Sequence[Channel]) -> None:
+        """Send messages of streams to channels that have them.
+
+        Nothing is sent while the link is down.
+        """
+        if self.active:
+            self._node.send_batch(batch, to)
+
     def text(self, severity: Severity, text: OperatorText, to: Channel | None = None) -> None:
         """A STATUSTEXT to everybody, and a line in the log; or to one channel alone."""
         if to is None:
@@ -531,7 +544,7 @@ class System:
     def _tick(self) -> None:
         if not self.active:
             return
-        now = self.clock.monotonic()
+        now = self.clock.monotonic() + EARLY
         try:
             if now >= self._next_heartbeat:
                 self._next_heartbeat = max(self._next_heartbeat + HEARTBEAT_EVERY, now + HEARTBEAT_EVERY / 2)

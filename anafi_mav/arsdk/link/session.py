@@ -1,8 +1,8 @@
 """The asyncio shell around one `Transport`: a UDP socket and one timer.
 
-Messages that are sent within one event-loop iteration leave together, which packs them into few frames. The timer is
-restarted only when the next deadline is earlier; when it fires too early it is set again. At a hundred drones with a
-hundred events a second each, that is what keeps the loop idle.
+Messages that are sent within one event-loop iteration leave together, which packs them into few frames, unless they are
+sent `at_once`. The timer is restarted only when the next deadline is earlier; when it fires too early it is set again.
+At a hundred drones with a hundred events a second each, that is what keeps the loop idle.
 """
 
 from __future__ import annotations
@@ -144,13 +144,18 @@ class Session(asyncio.DatagramProtocol):
         """See `Transport.counters`."""
         return self._transport.counters
 
-    def send(self, message: Message | UnknownMessage, rank: Rank = Rank.NORMAL) -> int:
+    def send(self, message: Message | UnknownMessage, rank: Rank = Rank.NORMAL, *, at_once: bool = False) -> int:
         """Send a message at the end of this event-loop iteration; the token is for `cancel`.
+
+        `at_once`: it leaves now with all that waits, or when the messages that are read together are handled.
 
         Raises `LocalProtocolError` when it cannot be encoded. On a link that is lost it does nothing.
         """
         token = self._transport.send(message, self._loop.time(), rank)
-        self._flush_soon()
+        if at_once and not self._is_reading:
+            self._flush()
+        else:
+            self._flush_soon()
         return token
 
     def cancel(self, token: int) -> None:

@@ -92,7 +92,8 @@ class StickStream:
         now = loop_time()
         self._after_gaz = False
         self._sticks.command(position, now, now - age)
-        self.pump()
+        self._next.cancel()
+        self._send_due(now, at_once=True)
 
     def centre(self) -> None:
         """Centred from now on, for two seconds, whether there was anything to send or not."""
@@ -121,10 +122,13 @@ class StickStream:
         lands = self._flight.state.flying == FlyingState.LANDING and not self.landings_asked
         if self.dead is not None and not (lands and self._after_gaz and self._commander.connected):
             self._sticks.stop()
-        now = loop_time()
+        self._send_due(loop_time())
+
+    def _send_due(self, now: float, *, at_once: bool = False) -> None:
+        """Send the PCMD that is due, and set the timer for the next."""
         pcmd = self._sticks.due(now)
         if pcmd is not None:
-            self._send(pcmd)
+            self._send(pcmd, at_once=at_once)
         deadline = self._sticks.deadline
         if deadline is not None:
             self._next.set(deadline)
@@ -154,13 +158,13 @@ class StickStream:
                 self._commander.send(self._sticks.single(CENTRED, loop_time()))
         self.silence()
 
-    def _send(self, message: PCMD) -> None:
+    def _send(self, message: PCMD, *, at_once: bool = False) -> None:
         """For what is worth sending only while there is a link; its loss is reported elsewhere.
 
         So is a newer command, which lets the task that it has replaced centre nothing more.
         """
         try:
-            self._commander.send(message, stops=not is_deflected(message))
+            self._commander.send(message, stops=not is_deflected(message), at_once=at_once)
         except LinkLost as error:
             log.debug("%s not sent: %s", message.NAME, error)
             self._sticks.stop()

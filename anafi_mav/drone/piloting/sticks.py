@@ -15,7 +15,6 @@ import msgspec
 
 from anafi_mav.arsdk.messages.ardrone3 import PCMD
 from anafi_mav.errors import LocalProtocolError
-from anafi_mav.units import clip
 
 PERIOD = 0.05
 """s between two PCMDs: "sends each 50 ms" (ardrone3.xml 1-0-2)."""
@@ -92,7 +91,7 @@ def _share(value: float, limit: float) -> int:
     if math.isnan(value):
         raise LocalProtocolError("a piloting setpoint is not a number")
     # A limit of zero is a drone that may not move that way at all.
-    return round(clip(100.0 * value / limit, -100.0, 100.0)) if limit > 0.0 else 0
+    return round(min(max(100.0 * value / limit, -100.0), 100.0)) if limit > 0.0 else 0
 
 
 def is_deflected(pcmd: PCMD) -> bool:
@@ -133,14 +132,14 @@ class StickSchedule:
     @property
     def deadline(self) -> float | None:
         """When the next PCMD is due; None when none is."""
-        return self._next if self.active else None
+        return self._next if self._remaining != 0 else None
 
     def command(self, position: Percent, now: float, said: float | None = None) -> None:
         """Hold this position until `HOLD_LIMIT` after it was set; then the sticks centre.
 
         `said` is the time at which it was set, None: now.
         """
-        if not self.active or position != self._position:  # the same said again leaves with the next repetition
+        if self._remaining == 0 or position != self._position:  # the same said again leaves with the next repetition
             self._next = max(now, self._paid_until - MIN_SPACING)
         self._position, self._remaining = position, None
         self._expires = (now if said is None else said) + HOLD_LIMIT
@@ -161,7 +160,7 @@ class StickSchedule:
         Repetitions keep their 20 Hz grid when a call is a little late; after a longer pause the missed ones are
         not made up for.
         """
-        if not self.active or now < self._next:
+        if self._remaining == 0 or now < self._next:
             return None
         if self._remaining is None and now >= self._expires:
             self.centre(now)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from anafi_mav.drone import events
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.command.actions import change_mode
@@ -17,6 +18,7 @@ from anafi_mav.services.flavours import STANDARD_MODES, Flavour, flavour_of, mod
 from anafi_mav.services.service import Answer, Host, Request, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
 
 _BY_ITSELF = (FlightMode.ORBIT, FlightMode.TERMINATED)
@@ -108,6 +110,13 @@ class ModesService(Service):
     def link_up(self) -> None:
         self._offered = self.host.vehicle.enterable_modes
         self._sent = None
+
+    def subscriptions(self) -> Subscriptions:
+        return {events.GpsLocationChanged: self._on_location}
+
+    def _on_location(self, message: events.Message, now: float) -> None:
+        if self._offered is None or FlightMode.FOLLOW not in self._offered:  # the place was unknown
+            self.host.look_soon()
 
     def state_changed(self) -> None:
         self._announce()

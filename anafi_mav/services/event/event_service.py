@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from anafi_mav import texts
+from anafi_mav.clock import NEVER
 from anafi_mav.drone import events as parrot
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
@@ -32,8 +33,8 @@ RESET_FOR = 3.0
 That makes three messages, of which one may be lost.
 """
 
-LOOK_EVERY = 1.0
-"""s between looks at causes without an update from the drone.
+LOOK_EVERY = 0.9
+"""s, at least, between looks at causes without an update from the drone: the services tick once a second.
 
 For example a changed fence, or a place on the wrong side of it.
 """
@@ -107,17 +108,12 @@ class EventService(Service):
 
     def tick(self, now: float) -> float:
         self._tell_changes()
-        if now >= self._report_at:
+        if now >= self._next_report + (0.0 if self._stale else LOOK_EVERY - PAUSE):
             self._stale, self._next_report = False, now + PAUSE
             found = report(self.host.vehicle)
             if found != self._report:
                 self._tell(found)
-        return self._report_at
-
-    @property
-    def _report_at(self) -> float:
-        """When the report is due (s)."""
-        return self._next_report + (0.0 if self._stale else LOOK_EVERY - PAUSE)
+        return self._next_report if self._stale else NEVER
 
     def _tell(self, found: HealthReport) -> None:
         self._report = found

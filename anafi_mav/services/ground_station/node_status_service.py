@@ -8,14 +8,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from anafi_mav.clock import NEVER
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
 from anafi_mav.services.service import Host, Request, Service
 
-LOOK_EVERY = 1.0
-"""s over which the rates are taken."""
+LOOK_EVERY = 0.9
+"""s, at least, over which the rates are taken. The services tick once a second."""
 
 
 class _Look(NamedTuple):
@@ -38,13 +39,13 @@ class NodeStatusService(Service):
 
     def tick(self, now: float) -> float:
         if now < self._next_look:
-            return self._next_look
+            return NEVER
         self._next_look = now + LOOK_EVERY
         for channel in self.host.channels:
             look = _Look(now, channel.sent_bytes, channel.received_bytes)
             _, before = self._looks.get(channel, (look, look))
             self._looks[channel] = (before, look)
-        return self._next_look
+        return NEVER
 
     def link_down(self) -> None:
         self._looks.clear()

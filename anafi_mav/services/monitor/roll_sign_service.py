@@ -12,7 +12,7 @@ from anafi_mav import texts
 from anafi_mav.drone import events
 from anafi_mav.drone.piloting.state import Attitude, Velocity
 from anafi_mav.drone.values import Values
-from anafi_mav.services.service import Host, Service
+from anafi_mav.services.service import Service
 from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
@@ -42,12 +42,7 @@ def read(kept: Any, firmware: str | None) -> RollSign:
 class RollSignService(Service):
     """Watches how the drone moves until the sign of its roll is known."""
 
-    def __init__(self, host: Host) -> None:
-        super().__init__(host)
-        self._flies = False
-
     def link_up(self) -> None:
-        self._flies = self.host.vehicle.in_air
         check = self.host.vehicle.roll
         check.recall(read(self.host.memory.settings.get(KEY), self.host.drone.identity.firmware))
         if check.sign is RollSign.INVERTED:
@@ -65,17 +60,16 @@ class RollSignService(Service):
         Earlier motion is discarded then.
         """
         vehicle, state = self.host.vehicle, self.host.drone.piloting.state
-        if not self._flies or state.attitude is None or state.velocity is None:
+        if not vehicle.in_air or state.attitude is None or state.velocity is None:
             vehicle.roll.forget_motion()
             return None
         return state.attitude, state.velocity
 
     def _on_flying_state(self, message: events.FlyingStateChanged, now: float) -> None:
-        self._flies = self.host.vehicle.in_air
         self._motion()
 
     def _on_motion(self, values: Values, now: float) -> None:
-        if not self._flies or (motion := self._motion()) is None:
+        if not self.host.vehicle.in_air or (motion := self._motion()) is None:
             return
         check, (attitude, velocity) = self.host.vehicle.roll, motion
         if events.AttitudeChanged in values:

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from anafi_mav import texts
+from anafi_mav.clock import NEVER
 from anafi_mav.drone import events
 from anafi_mav.drone.events import PlayingState
 from anafi_mav.drone.values import Values
@@ -40,13 +41,13 @@ from anafi_mav.vehicle.fence.fence_watch import (
 from anafi_mav.vehicle.vehicle import Vehicle
 
 LOOK_EVERY = 0.5
-"""s between looks while the drone reports nothing new."""
+"""s between looks in flight while the drone reports nothing new."""
 
 LOOK_SOONEST = 0.1
 """s between looks for a new speed alone. An ANAFI reports its speed every 0.2 s."""
 
-MIRROR_EVERY = 1.0
-"""s between checks whether the drone's own geofence must change."""
+MIRROR_EVERY = 0.9
+"""s, at least, between checks whether the drone's own geofence must change. The services tick once a second."""
 
 DISABLE, ENABLE, DISABLE_FLOOR = 0.0, 1.0, 2.0
 """param1 of MAV_CMD_DO_FENCE_ENABLE."""
@@ -111,7 +112,7 @@ class FenceService(Service):
         if now >= self._mirrored + MIRROR_EVERY:
             self._mirrored = now
             self._mirror.update(now)
-        return min(self._looked + LOOK_EVERY, self._mirrored + MIRROR_EVERY)
+        return NEVER if self.host.vehicle.on_ground else self._looked + LOOK_EVERY
 
     # Watching.
 

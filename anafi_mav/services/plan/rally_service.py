@@ -10,6 +10,7 @@ import asyncio
 import math
 
 from anafi_mav import texts
+from anafi_mav.clock import NEVER
 from anafi_mav.drone import Position
 from anafi_mav.drone.events import RthHomeType
 from anafi_mav.errors import AnafiMavError
@@ -18,8 +19,8 @@ from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.rally import RallyPoint, RallyPoints, Return
 
-LOOK_EVERY = 1.0
-"""s between two choices: the drone's place comes as often."""
+LOOK_EVERY = 0.9
+"""s, at least, between two choices. The services tick once a second, and the drone's place comes as often."""
 
 REJECTED_FOR = 30.0
 """s for which a point that the drone did not accept is not proposed again: it may be too far away only for now."""
@@ -64,7 +65,7 @@ class RallyService(Service):
         if now >= self._looked + LOOK_EVERY:
             self._looked = now
             self._look(now)
-        return self._looked + LOOK_EVERY
+        return NEVER
 
     def _look(self, now: float) -> None:
         if self._task is not None and not self._task.done():

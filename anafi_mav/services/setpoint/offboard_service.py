@@ -50,9 +50,6 @@ class OffboardService(Service):
     def streams(self) -> Mapping[int, MessageStream]:
         return STREAMS
 
-    def link_up(self) -> None:
-        self._flight.link_up()
-
     def subscriptions(self) -> Subscriptions:
         return self._flight.subscriptions()
 

@@ -16,6 +16,7 @@ from anafi_mav.drone.events import Message
 from anafi_mav.drone.values import VALUES, Values
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.frames import Packed, pack
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.streams import Streams
 from anafi_mav.services.commands import Command
@@ -83,12 +84,18 @@ class MessageService(Service):
         self._values: Sequence[type[Message]] = ()
         """Events of values that update some message."""
         self._repeated: tuple[int, ...] = ()
+        self._repeat_at = -math.inf
+        """When messages may be repeated next (s)."""
         self._on_change: list[int] = []
         self._linked_at = 0.0
         self._stamped: dict[int, float] = {}
         """The time (s, monotonic) in the last message of each kind: it never goes back."""
         self._moment: tuple[float, Times] = (math.nan, Times(0, 0, 0))
         """The moment (s, monotonic) of the last message, and its times: the next one is often of the same moment."""
+        self._gathered: list[Packed] = []
+        """Messages that are made and leave together."""
+        self._gathered_for: Sequence[Channel] = ()
+        """The channels that they are for."""
         self._failed: dict[int, float] = {}
         """When it was last logged that a message cannot be made."""
         self._sources: PoseSources[Channel] = PoseSources()
@@ -204,6 +211,7 @@ class MessageService(Service):
             times = self.host.times(shot, pose)
             for id, due in self._intervals.due_on(channels, self._poses, shot):
                 self._show(id, due, times, shot)
+            self._flush()
 
     def _show(self, id: int, to: Sequence[Channel], times: Times, shot: float) -> None:
         """Send a message made of a picture.
@@ -219,15 +227,20 @@ class MessageService(Service):
 
     def tick(self, now: float) -> float:
         self._tracker.pass_time(now)
+        if now < self._repeat_at:
+            return self._repeat_at
+        self._repeat_at = now + REPEATED
         channels = self.host.channels
         for id, due in self._intervals.due_on(channels, self._repeated, now):
             self._leave(id, due, self._times(id))
-        return max(now + REPEATED, self._intervals.next_on(channels, self._repeated))
+        self._flush()
+        return max(self._repeat_at, self._intervals.next_on(channels, self._repeated))
 
     def state_changed(self) -> None:
         """They leave at once."""
         for id in self._on_change:
-            self._leave(id, self.host.channels, self._times(id))
+            self._leave(id, [channel for channel in self.host.channels if channel.can_stream(id)], self._times(id))
+        self._flush()
 
     # Streams.
 
@@ -248,6 +261,7 @@ class MessageService(Service):
                 self._leave(id, to, self._stamp(id, at, pose))
             else:
                 self._leave(id, to, self._stamp(id, at))
+        self._flush()
 
     def _times(self, id: int) -> Times:
         """When the newest of the fields of a message was true.
@@ -284,16 +298,21 @@ class MessageService(Service):
         return times
 
     def _leave(self, id: int, to: Sequence[Channel], times: Times) -> bool:
-        """Send a message; return False when a value that it needs is unknown."""
+        """Send a message with the next `_flush`; return False when a value that it needs is unknown."""
         stream = self._table[id]
         try:
             if stream.flavoured:
+                self._flush()
                 vehicle = self.host.vehicle
                 self.host.send_by_flavour(lambda flavour: stream.build(vehicle, times.for_flavour(flavour)), to)
                 return True
             if (message := stream.build(self.host.vehicle, times)) is None:
                 return False
-            self.host.send(message, to)
+            packed = pack(message)
+            if to is not self._gathered_for:
+                self._flush()
+                self._gathered_for = to
+            self._gathered.append(packed)
         except Exception as error:
             # An unforeseen value of the drone's. The other messages, and the heartbeat, are sent without it.
             now = self.host.clock.monotonic()
@@ -301,6 +320,12 @@ class MessageService(Service):
                 self._failed[id] = now
                 logger.error("%s: message %d cannot be made: %r", self.host.drone.name, id, error)
         return True
+
+    def _flush(self) -> None:
+        """Send the gathered messages."""
+        if self._gathered:
+            messages, self._gathered = self._gathered, []
+            self.host.send_streams(messages, self._gathered_for)
 
     def _is_streamed(self, channel: Channel, id: int) -> bool:
         """Return True for a message that a channel gets by default."""

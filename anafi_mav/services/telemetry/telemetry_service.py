@@ -17,6 +17,7 @@ from anafi_mav.services.service import Host, Service
 from anafi_mav.services.stream import MessageStream
 from anafi_mav.services.telemetry import telemetry_anafi, telemetry_flight, telemetry_link, telemetry_status
 from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.vehicle import POSITION_OLD
 
 CHANGES: frozenset[type[Message]] = frozenset(
@@ -45,6 +46,13 @@ class TelemetryService(Service):
 
     def link_down(self) -> None:
         self._position_is_old = False
+
+    def subscriptions(self) -> Subscriptions:
+        return {events.GpsLocationChanged: self._on_location}
+
+    def _on_location(self, message: Message, now: float) -> None:
+        if self._position_is_old:
+            self.host.look_soon()
 
     def tick(self, now: float) -> float:
         """Send a text when positions stop, and when they continue.

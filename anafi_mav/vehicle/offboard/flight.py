@@ -107,8 +107,6 @@ class OffboardFlight(PlainTask):
         self._motion = MotionEstimate(vehicle.roll)
         self._unread: dict[type[Message], float] = {}
         """Values of motion that were reported since the last look at them, and when (s)."""
-        self._are_motors_off = False
-        """As last reported; False before that."""
         self.warn_throttled: Callable[[OperatorText], None] = lambda text: vehicle.text(Severity.WARNING, text)
         """Says what is wrong with something that arrives many times a second."""
         self.drop: Callable[[Hashable, OperatorText], None] = lambda client, reason: vehicle.text(
@@ -459,10 +457,6 @@ class OffboardFlight(PlainTask):
         if self._vehicle.control.below == _GUIDED:
             self._vehicle.control.adopt(_GUIDED)
 
-    def link_up(self) -> None:
-        """Note whether the motors turn."""
-        self._are_motors_off = self._vehicle.flying_state in MOTORS_OFF
-
     def link_down(self) -> None:
         """Setpoints of before count for nothing."""
         self._moves.forget()
@@ -475,7 +469,7 @@ class OffboardFlight(PlainTask):
     def subscriptions(self) -> Subscriptions:
         """Return the handlers of the events on motion, and on the hover after a take-off."""
         return {
-            events.FlyingStateChanged: lambda message, now: self._on_flying_state(),
+            events.FlyingStateChanged: lambda message, now: self.after_takeoff(),
             events.GpsLocationChanged: self._on_location,
         }
 
@@ -483,15 +477,11 @@ class OffboardFlight(PlainTask):
         """Return the handler of the values that report the drone's motion."""
         return {self._on_motion: MOTION}
 
-    def _on_flying_state(self) -> None:
-        self._are_motors_off = self._vehicle.flying_state in MOTORS_OFF
-        self.after_takeoff()
-
     def _on_motion(self, values: Values, now: float) -> None:
         for kind in values:
             if kind in MOTION:
                 self._unread[kind] = now
-        if self._are_motors_off and self._stream.engagement is None:
+        if self._vehicle.flying_state in MOTORS_OFF and self._stream.engagement is None:
             return  # the motion of a drone that stands is read when it is needed
         self._read_motion()
         setpoint = self._stream.setpoint

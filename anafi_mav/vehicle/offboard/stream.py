@@ -100,6 +100,13 @@ STREAMS = (State.ENGAGED, State.CLIMBING, State.LIFTING, State.JOINED)
 """States in which a stream flies the drone, or is about to: setpoints of other clients are not flown."""
 
 
+SILENCED = (*STREAMS, *COUNTS)
+"""States that silence of the pilot ends."""
+
+FLYING = (*STREAMS, State.SINGLE)
+"""States in which setpoints fly the drone, a stream of them or a single one."""
+
+
 def is_position(setpoint: Setpoint) -> bool:
     """It can be flown to its end: a position can, a velocity has none."""
     return isinstance(setpoint, MotionSetpoint) and setpoint.moves
@@ -164,7 +171,13 @@ class OffboardStream(Struct, frozen=True):
     @property
     def flying(self) -> bool:
         """Setpoints fly the drone, a stream of them or a single one."""
-        return self.state is State.SINGLE or self.state in STREAMS
+        return self.engagement is not None and self.engagement.state in FLYING
+
+    @property
+    def _flown(self) -> Received | None:
+        """The pilot's newest setpoint as it was received; None while none is flown."""
+        engagement = self.engagement
+        return self.received[engagement.pilot] if engagement is not None and engagement.state in FLYING else None
 
     @property
     def pilot(self) -> Hashable:
@@ -179,12 +192,14 @@ class OffboardStream(Struct, frozen=True):
     @property
     def setpoint(self) -> Setpoint | None:
         """The pilot's newest setpoint; None while none is flown."""
-        return self.received[self.pilot].setpoint if self.flying else None
+        return None if (flown := self._flown) is None else flown.setpoint
 
     @property
     def deadline(self) -> float | None:
         """When the pilot's silence will have lasted too long; None without a stream."""
-        return self.received[self.pilot].over if self.state in STREAMS or self.state in COUNTS else None
+        engagement = self.engagement
+        silenced = engagement is not None and engagement.state in SILENCED
+        return self.received[self.pilot].over if silenced else None
 
     @property
     def climbs_since(self) -> float | None:
@@ -196,7 +211,7 @@ class OffboardStream(Struct, frozen=True):
 
         Sticks expire `SILENCE` after an age of 0.
         """
-        return max(0.0, now - self.received[self.pilot].over + SILENCE) if self.flying else 0.0
+        return 0.0 if (flown := self._flown) is None else max(0.0, now - flown.over + SILENCE)
 
     # Setpoints.
 

@@ -50,6 +50,17 @@ async def test_frames_leave_together_once_in_a_pause() -> None:
     assert [data for _, data in lots] == [b"ab", b"cd", b"e"]
 
 
+async def test_frames_of_a_batch_fill_lots_and_leave_alone_without_a_limit() -> None:
+    lots: list[bytes] = []
+    outbox = Outbox(lots.append, 4)
+    outbox.add_all([b"aa", b"bb", b"cc", b"dd", b"ee"])
+    assert lots == [b"aabb", b"ccdd"]
+    await asyncio.sleep(0)
+    assert lots == [b"aabb", b"ccdd", b"ee"]
+    Outbox(lots.append, 0).add_all([b"ff", b"gg"])
+    assert lots[3:] == [b"ff", b"gg"]
+
+
 async def test_full_lot_and_answer_leave_within_a_pause() -> None:
     lots: list[bytes] = []
     outbox = Outbox(lots.append, 4, pause=60.0)

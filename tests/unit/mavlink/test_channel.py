@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
 
 from anafi_mav.errors import LocalProtocolError
 from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.address_proof import AddressProof
 from anafi_mav.mavlink.channel import Channel, total
-from anafi_mav.mavlink.frames import FRAME_BYTES, Parser, ReceivedFrame, frame, pack
+from anafi_mav.mavlink.frames import FRAME_BYTES, Batch, Parser, ReceivedFrame, frame, pack
 
 ATTITUDE = dialect.MAVLink_attitude_message(1, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5)
 ACK = dialect.MAVLink_command_ack_message(400, 0)
@@ -18,9 +20,15 @@ ACK = dialect.MAVLink_command_ack_message(400, 0)
 class Wire:
     """What a channel wrote."""
 
-    def __init__(self, **options: Any) -> None:
+    def __init__(self, *, joins: bool = False, **options: Any) -> None:
         self.written: list[bytes] = []
-        self.channel = Channel("a wire", self.written.append, **options)
+        self.lots: list[int] = []
+        """Frames of each lot that was written at once."""
+        self.channel = Channel("a wire", self.written.append, write_all=self._write_all if joins else None, **options)
+
+    def _write_all(self, frames: Sequence[bytes]) -> None:
+        self.lots.append(len(frames))
+        self.written += frames
 
     def read(self) -> list[ReceivedFrame]:
         """The frames written since the last call."""
@@ -68,6 +76,54 @@ def test_channels_at_one_number_share_a_frame() -> None:
     assert (sequence(frames, (1, 1)), sequence(frames, (2, 1))) == ([0, 1], [0])
     assert sequence(other.read(), (1, 1)) == [0]
     assert sequence(third.read(), (1, 1)) == [0, 1]
+
+
+def test_batch_leaves_at_once_with_the_frames_of_single_messages() -> None:
+    joined, single = Wire(joins=True), Wire()
+    messages = [pack(ATTITUDE), pack(ACK), pack(ATTITUDE)]
+    for _ in range(100):  # the numbers wrap within a batch
+        joined.channel.send_batch(Batch(messages, 1, 1))
+        for packed in messages:
+            single.channel.send_packed(packed, 1, 1, give_way=True)
+    joined.channel.send(ACK, 1, 1)
+    single.channel.send(ACK, 1, 1)
+    assert joined.written == single.written
+    assert joined.lots == [3] * 100
+    assert (joined.channel.sent_frames, joined.channel.sent_bytes) == (301, sum(map(len, joined.written)))
+
+
+def test_batch_is_framed_once_for_channels_at_one_number() -> None:
+    batch = Batch([pack(ATTITUDE), pack(ACK)], 1, 1)
+    assert batch.framed(7) is batch.framed(7)
+    assert [raw[4] for raw in batch.framed(255)] == [255, 0]
+    assert batch.size == sum(map(len, batch.framed(3)))
+
+
+def test_batch_waits_as_streams_while_the_peer_is_held() -> None:
+    wire = Wire(joins=True)
+    wire.channel.pause()
+    wire.channel.send_batch(Batch([pack(ATTITUDE), pack(ATTITUDE)], 1, 1))
+    wire.channel.send(ACK, 1, 1)
+    assert wire.written == []
+    wire.channel.resume()
+    assert [received.message.get_type() for received in wire.read()] == ["COMMAND_ACK", "ATTITUDE", "ATTITUDE"]
+    wire.channel.close()
+    wire.channel.send_batch(Batch([pack(ATTITUDE), pack(ATTITUDE)], 1, 1))
+    assert wire.channel.counters == {"sent_frames": 3, "dropped_frames": 2}
+
+
+def test_batch_to_a_peer_without_proof_is_withheld() -> None:
+    wire = Wire(joins=True)
+    wire.channel.proof = AddressProof()
+    wire.channel.send_batch(Batch([pack(ATTITUDE), pack(ATTITUDE)], 1, 1))
+    assert wire.written == []
+    assert wire.channel.counters == {"withheld_frames": 2}
+
+
+def test_batch_counts_in_a_byte_budget() -> None:
+    wire = Wire(joins=True, bytes_per_second=1000.0)
+    wire.channel.send_batch(Batch([pack(ATTITUDE), pack(ACK)], 1, 1))
+    assert (wire.lots, len(wire.read())) == ([], 2)
 
 
 def test_full_socket_queues_frames_and_answers_leave_first() -> None:

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import common as stock
 from anafi_mav.errors import LocalProtocolError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
-from anafi_mav.mavlink.frames import SIGNED, Parser, Verdict, frame, pack, with_flags
+from anafi_mav.mavlink.frames import SIGNED, Batch, Parser, Verdict, frame, pack, with_flags
 from anafi_mav.mavlink.signing import (
     LATEST,
     MAX_RECENT,
@@ -253,9 +253,15 @@ class Link:
 
     def __init__(self, key: Signing, *, is_local: bool = False) -> None:
         self.written: list[bytes] = []
-        self.channel = Channel("a link", self.written.append, datagrams=True)
+        self.channel = Channel("a link", self.written.append, write_all=self.written.extend, datagrams=True)
         self.channel.is_local = is_local
         self.channel.protect(key)
+
+
+def test_each_frame_of_a_batch_is_signed() -> None:
+    link, key = Link(signing()), signing()
+    link.channel.send_batch(Batch([pack(HEARTBEAT), pack(HEARTBEAT)], 1, 1))
+    assert [judged(key, raw) for raw in link.written] == [Verdict.VERIFIED, Verdict.VERIFIED]
 
 
 def test_channel_with_a_key_delivers_verified_frames_only() -> None:

@@ -18,13 +18,13 @@ async def test_stall_marks_data_old_until_sockets_are_drained() -> None:
     with everybodys():
         await asyncio.sleep(0)  # the next callbacks run on the clock of everybody
         time.sleep(1.2 * STALL)  # noqa: ASYNC251
-        assert watch.old  # before any timer has run
+        assert watch.waited  # before any timer has run
         assert watch.waited >= 1.2 * STALL
         assert watch.stalled >= 1.2 * STALL
         assert stalls == []
         await asyncio.sleep(0.1)  # a beat
         assert watch.waited >= 1.2 * STALL  # what arrived during the stall may still be in a socket
-        while watch.old:  # noqa: ASYNC110
+        while watch.waited:  # noqa: ASYNC110
             await asyncio.sleep(0.05)
         assert watch.waited == 0.0
         assert stalls[0] >= STALL
@@ -39,7 +39,7 @@ async def test_stopped_watch_finds_nothing_old() -> None:
     with everybodys():
         await asyncio.sleep(0)  # the next callbacks run on the clock of everybody
         time.sleep(1.2 * STALL)  # noqa: ASYNC251
-        assert not watch.old
+        assert not watch.waited
 
 
 async def test_slow_callback_beside_a_thread_is_no_stall_of_the_host() -> None:
@@ -50,7 +50,7 @@ async def test_slow_callback_beside_a_thread_is_no_stall_of_the_host() -> None:
     work = asyncio.get_running_loop().run_in_executor(None, written.wait)
     await asyncio.sleep(0)
     time.sleep(1.2 * STALL)  # noqa: ASYNC251
-    assert not watch.old
+    assert not watch.waited
     await asyncio.sleep(0.2)  # two beats
     written.set()
     await work
@@ -67,7 +67,7 @@ async def test_slow_callback_beside_a_process_that_only_reacts_is_no_stall_of_th
     only_reacts(process)
     await asyncio.sleep(0)
     time.sleep(1.2 * STALL)  # noqa: ASYNC251
-    assert not watch.old
+    assert not watch.waited
     await asyncio.sleep(0.2)  # two beats
     process.kill()
     await process.wait()

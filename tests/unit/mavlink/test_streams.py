@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import random
+from collections.abc import Sequence
 
 import pytest
 
@@ -19,8 +20,12 @@ class Key:
     """Stands for a channel: anything that can be referred to weakly will do."""
 
 
+def due(streams: Streams[Key], channel: Key, id: int, now: float) -> bool:
+    return bool(streams.due_on([channel], (id,), now))
+
+
 def sent(streams: Streams[Key], channel: Key, id: int, times: list[float]) -> list[float]:
-    return [now for now in times if streams.due(channel, id, now)]
+    return [now for now in times if due(streams, channel, id, now)]
 
 
 def test_default_interval_applies_before_set_and_after_reset() -> None:
@@ -38,16 +43,16 @@ def test_default_interval_applies_before_set_and_after_reset() -> None:
 def test_message_without_default_is_streamed_on_request_only() -> None:
     streams, channel = Streams[Key](DEFAULTS), Key()
     assert streams.interval(channel, UNKNOWN) is None
-    assert not streams.due(channel, UNKNOWN, 0.0)
+    assert not due(streams, channel, UNKNOWN, 0.0)
     streams.set(channel, UNKNOWN, 1.0)
-    assert streams.due(channel, UNKNOWN, 0.0)
+    assert due(streams, channel, UNKNOWN, 0.0)
 
 
 def test_channels_do_not_share_intervals_or_times() -> None:
     streams, one, other = Streams[Key](DEFAULTS), Key(), Key()
     streams.set(one, ATTITUDE, None)
-    assert not streams.due(one, ATTITUDE, 0.0)
-    assert streams.due(other, ATTITUDE, 0.0)
+    assert not due(streams, one, ATTITUDE, 0.0)
+    assert due(streams, other, ATTITUDE, 0.0)
     assert streams.interval(other, ATTITUDE) == 0.1
 
 
@@ -59,8 +64,8 @@ def test_an_interval_is_a_positive_number(interval: float) -> None:
 
 def test_first_message_is_due_immediately_the_next_later() -> None:
     streams, channel = Streams[Key](DEFAULTS), Key()
-    assert streams.due(channel, SYS_STATUS, 1000.0)
-    assert not streams.due(channel, SYS_STATUS, 1000.05)
+    assert due(streams, channel, SYS_STATUS, 1000.0)
+    assert not due(streams, channel, SYS_STATUS, 1000.05)
 
 
 @pytest.mark.parametrize(
@@ -96,7 +101,7 @@ def test_closed_channel_is_removed() -> None:
     assert len(streams._channels) == 0
 
 
-def due_on(streams: Streams[Key], channels: list[Key], now: float) -> list[Key]:
+def due_on(streams: Streams[Key], channels: list[Key], now: float) -> Sequence[Key]:
     """The channels on which ATTITUDE is due, of two messages of which the other never is."""
     found = dict(streams.due_on(channels, (UNKNOWN, ATTITUDE), now))
     assert UNKNOWN not in found
@@ -161,3 +166,42 @@ def test_lists_of_channels_asked_about_in_turn_share_intervals() -> None:
     streams.channel_closed(one)
     assert streams._audiences == []
     assert (streams.interval(one, ATTITUDE), streams.interval(other, ATTITUDE)) == (1.0, 0.5)
+
+
+def test_channels_with_equal_intervals_get_each_message_together() -> None:
+    """A new channel gets its first message at once, and the next ones with the others."""
+    streams, one, other, third = Streams[Key]({ATTITUDE: 1.0}), Key(), Key(), Key()
+    assert streams.due_on([one], (ATTITUDE,), 0.0) == [(ATTITUDE, [one])]
+    channels = [one, other, third]
+    streams.set(third, ATTITUDE, 0.3)
+    assert streams.due_on(channels, (ATTITUDE,), 0.2) == [(ATTITUDE, [other, third])]
+    assert streams.due_on(channels, (ATTITUDE,), 0.5) == [(ATTITUDE, [one, other, third])]
+    assert streams.due_on(channels, (ATTITUDE,), 0.7) == [(ATTITUDE, [third])]
+    assert streams.due_on(channels, (ATTITUDE,), 1.5) == [(ATTITUDE, [one, other, third])]
+
+
+def test_messages_for_the_same_channels_have_one_list_of_them() -> None:
+    streams, one, other = Streams[Key](DEFAULTS), Key(), Key()
+    channels = [one, other]
+    streams.due_on(channels, (ATTITUDE, SYS_STATUS), 0.0)  # the first ones
+    (_, first), (_, second) = streams.due_on(channels, (ATTITUDE, SYS_STATUS), 0.9)
+    assert first is second is channels
+    for id in (ATTITUDE, SYS_STATUS):
+        streams.set(other, id, 0.5)
+    (_, first), (_, second) = streams.due_on(channels, (ATTITUDE, SYS_STATUS), 0.91)
+    assert first == [other]
+    assert first is second
+
+
+def test_channel_with_an_interval_of_its_own_leaves_the_others_theirs() -> None:
+    streams, one, other = Streams[Key]({ATTITUDE: 1.0}), Key(), Key()
+    channels = [one, other]
+    streams.due_on(channels, (ATTITUDE,), 0.0)  # the next is due at 0.5
+    streams.set(one, ATTITUDE, None)
+    assert streams.due_on(channels, (ATTITUDE,), 0.4) == []
+    assert streams.due_on(channels, (ATTITUDE,), 0.5) == [(ATTITUDE, [other])]
+    streams.reset(one, ATTITUDE)
+    assert streams.due_on(channels, (ATTITUDE,), 0.6) == [(ATTITUDE, [one])]
+    streams.channel_closed(one)
+    assert streams.due_on([other], (ATTITUDE,), 1.0) == []
+    assert streams.due_on([other], (ATTITUDE,), 1.5) == [(ATTITUDE, [other])]

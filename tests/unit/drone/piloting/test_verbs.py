@@ -1053,3 +1053,44 @@ async def test_a_command_reported_failed_is_never_carried_out(drone: Drone, devi
     device.script[ardrone3.MaxTilt] = lambda command: [ardrone3.MaxTiltChanged(command.current, 1.0, 40.0)]
     await drone.piloting.set_max_tilt(15.0)
     assert device.got(ardrone3.TakeOff) == []
+
+
+async def iterations(count: int) -> None:
+    """Let the event loop run: a datagram is received in the iteration after the one that sends it."""
+    for _ in range(count):
+        await asyncio.sleep(0)
+
+
+async def test_sticks_leave_in_the_iteration_that_sets_them(drone: Drone, device: ScriptedDevice) -> None:
+    await flying(drone, device)
+    drone.piloting.pilot(PilotingCommand(roll_deg=5.0))
+    await iterations(2)
+    assert [pcmd.roll > 0 for pcmd in device.got(ardrone3.PCMD)] == [True]
+
+
+async def test_move_leaves_in_the_iteration_that_asks_for_it(drone: Drone, device: ScriptedDevice) -> None:
+    await flying(drone, device)
+    device.script[ardrone3.MoveTo] = lambda command: [running(command)]
+    move = asyncio.ensure_future(drone.piloting.move_to(48.1, 2.1, 10.0))
+    await iterations(3)
+    assert len(device.got(ardrone3.MoveTo)) == 1
+    await move
+
+
+async def test_commands_of_one_iteration_share_a_frame_with_the_one_that_leaves_at_once(
+    drone: Drone, device: ScriptedDevice
+) -> None:
+    """The moveTo waits for no acknowledgement of the CancelMoveTo before it."""
+
+    async def again() -> None:
+        drone.piloting.hover()
+        await drone.piloting.move_to(48.2, 2.2, 10.0)
+
+    await flying(drone, device)
+    device.script[ardrone3.MoveTo] = lambda command: [running(command)]
+    await drone.piloting.move_to(48.1, 2.1, 10.0)
+    move = asyncio.ensure_future(again())
+    await iterations(4)  # the datagram before has the sticks
+    assert [command.latitude for command in device.got(ardrone3.MoveTo)] == [48.1, 48.2]
+    assert len(device.got(ardrone3.CancelMoveTo)) == 1
+    await move
