@@ -859,7 +859,7 @@ class Drone:
             self._report(values, now)
 
     def _deferrable(self) -> Mapping[type[Message], Sequence[Element[Any]]]:
-        """Return the events of values whose messages are not wanted, with the elements that keep them."""
+        """Return the events of values of which no message is wanted, with their elements."""
         if message_log.isEnabledFor(logging.DEBUG):
             return {}
         waiting = self._commander.waiting

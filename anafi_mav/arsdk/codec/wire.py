@@ -239,7 +239,10 @@ def carry(id: MessageId, codec: Codec) -> None:
 
 
 def value_events() -> Iterator[tuple[type[Message], int]]:
-    """Return the events of values declared so far, which `receive` leaves packed, and their bytes."""
+    """Return the events of values declared so far, with the bytes of each.
+
+    `receive` leaves them packed.
+    """
     return ((kind, size) for kind, size, _ in _VALUES.values())
 
 
