@@ -179,7 +179,7 @@ class EndpointOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
         Literal["tcp", "udp", "tls", "quic"],
         Meta(
             description="Transport of the link to the zenoh router. `tls` and `quic` encrypt. `udp` repeats nothing "
-            "that is lost: a station or a drone may stay unseen, so use it on a wire only. `zenoh` only.",
+            "that is lost: stations and drones may be seen seconds late, so use it on a wire only. `zenoh` only.",
             extra=expected("tcp, udp, tls or quic"),
         ),
     ] = "tcp"

@@ -78,9 +78,13 @@ class FabricConnection:
             raise OSError(MISSING) from error
         options = self._url.options
         if options.link == "udp":
-            logger.warning("%s: udp repeats nothing that is lost: a drone or station may stay unseen", self._url.text)
+            logger.warning("%s: udp repeats nothing that is lost: drones and stations may be seen late", self._url.text)
         self._zenoh = module.ZenohSession(
-            session_settings(self._url), self._queue, self._arrivals.put, retries=not options.listen
+            session_settings(self._url),
+            self._queue,
+            self._arrivals.put,
+            retries=not options.listen,
+            is_lossy=options.link == "udp" and not options.listen,
         )
         assert self._zenoh is not None
         self._zenoh.start()

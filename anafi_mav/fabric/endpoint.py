@@ -340,6 +340,7 @@ class FabricEndpoint(Endpoint):
             channel.counters["repeated_samples"] += 1
             return
         station.heard = now
+        self._connection.zenoh.is_in_use = True
         channel.counters["lost_samples"] = station.input.lost
         station.input.hear(sysid)
         age = station.input.age(envelope, now)

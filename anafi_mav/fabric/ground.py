@@ -233,7 +233,9 @@ class FabricGround:
         station = None if key is None else self._by_name.get(key.owner)
         if key is None or station is None:
             self.counters["unknown_keys"] += 1
-        elif key.kind is KeyKind.PING:
+            return
+        self._connection.zenoh.is_in_use = True
+        if key.kind is KeyKind.PING:
             ping = Ping.decode(sample.payload)
             if ping is not None:
                 pong = Pong(ping.session, ping.sent, micros(self._clock.monotonic()))

@@ -1,7 +1,11 @@
 """One zenoh session, in threads of its own.
 
-The only module that imports zenoh, an optional dependency; `connection` loads it. One thread opens the session,
-declares and publishes: each of these may block. zenoh calls back in threads of its own, which only hand bytes on.
+Only this module and `declaration_check` import zenoh, an optional dependency; `connection` loads it. One thread opens
+the session, declares and publishes: each of these may block. zenoh calls back in threads of its own, which only hand
+bytes on.
+
+Over a link that loses datagrams a third thread looks regularly at what the router knows: it reports tokens that were
+lost on the way here, and opens another session where a declaration of ours was lost on the way there.
 """
 
 from __future__ import annotations
@@ -24,6 +28,7 @@ from anafi_mav.fabric.arrivals import (
     TokenChange,
     TokensListed,
 )
+from anafi_mav.fabric.declaration_check import DeclarationCheck, is_probe, probe_of
 from anafi_mav.fabric.envelope import MAX_SAMPLE
 
 logger = logging.getLogger(__name__)
@@ -37,6 +42,9 @@ RETRY_PAUSE = 0.5
 LIST_LIMIT = 2.0
 """s for a list of the tokens that exist."""
 
+CHECK_FIRST, CHECK_EVERY = 1.0, 3.0
+"""s until the first look at what the router knows, and between further ones."""
+
 MAX_QUERIES = 64
 """Queries that may be open at once: each waits for the event loop and for the thread that publishes."""
 
@@ -44,18 +52,27 @@ MAX_ATTACHMENT = 64
 """Bytes; an envelope has fewer. What is larger is not copied."""
 
 NO_LINK = "no answer"
+LOST_DECLARATION = "a declaration was lost"
 
 
 class ZenohSession:
     """A session from `start` to `stop`. Everything asked of it before it is open is done then."""
 
     def __init__(
-        self, settings: Mapping[str, Any], queue: SampleQueue, report: Callable[[Arrival], bool], *, retries: bool
+        self,
+        settings: Mapping[str, Any],
+        queue: SampleQueue,
+        report: Callable[[Arrival], bool],
+        *,
+        retries: bool,
+        is_lossy: bool = False,
     ) -> None:
         """`report` is called in other threads, and returns False for what has no room.
 
-        `retries`: the first attempt to open may fail.
+        `retries`: the first attempt to open may fail. `is_lossy`: the link to the router loses datagrams.
         """
+        self.is_in_use = False
+        """Set by the owner when it has heard from another program: then no other session is opened for some seconds."""
         self.opened = threading.Event()
         """Set when the first attempt to open has ended."""
         self.failure = ""
@@ -70,13 +87,25 @@ class ZenohSession:
         self._free_queries = threading.BoundedSemaphore(MAX_QUERIES)
         self._declared: dict[tuple[str, str], Any] = {}
         """Subscribers, tokens, publishers and queryables, by kind and key."""
+        self._declarations: dict[tuple[str, str], Callable[[zenoh.Session], Any]] = {}
+        """How each of these is declared again in another session."""
+        self._alive: set[str] = set()
+        """Tokens that were reported and have not ended."""
+        self._probed: set[str] = set()
+        """Probes that have arrived in this session."""
+        self._is_lossy = is_lossy
+        self._reopens = False
+        """True when another session is to be opened."""
         self._is_up: bool | None = None
         self._looked = 0
         self._thread = threading.Thread(target=self._run, name="zenoh", daemon=True)
+        self._checker = threading.Thread(target=self._check_regularly, name="zenoh check", daemon=True)
 
     def start(self) -> None:
         """Begin to open the session."""
         self._thread.start()
+        if self._is_lossy:
+            self._checker.start()
 
     def stop(self) -> None:
         """Begin to close it; `ended` is set afterwards."""
@@ -166,12 +195,14 @@ class ZenohSession:
     def _declare(self, kind: str, key: str, declare: Callable[[zenoh.Session], Any]) -> None:
         def work(session: zenoh.Session) -> None:
             if (kind, key) not in self._declared:
+                self._declarations[kind, key] = declare
                 self._declared[kind, key] = declare(session)
 
         self._queue.add_work(work)
 
     def _end(self, kind: str, key: str) -> None:
         def work(session: zenoh.Session) -> None:
+            self._declarations.pop((kind, key), None)
             declared = self._declared.pop((kind, key), None)
             if declared is not None:
                 declared.undeclare()
@@ -182,8 +213,11 @@ class ZenohSession:
         session: zenoh.Session | None = None
         try:
             session = self._open()
-            if session is not None:
+            while session is not None:
                 self._serve(session)
+                if self._stopping.is_set():
+                    break
+                session = self._open_again(session)
         except Exception as error:
             # Without this thread nothing is published: better off the fabric, and said so, than half on it.
             logger.exception("the zenoh session has ended: a mistake of ours")
@@ -193,6 +227,8 @@ class ZenohSession:
             if session is not None:
                 self._declared.clear()
                 session.close()  # type: ignore[no-untyped-call]
+            if self._checker.is_alive():
+                self._checker.join(CHECK_EVERY)
             self.ended.set()
 
     def _open(self) -> zenoh.Session | None:
@@ -216,11 +252,54 @@ class ZenohSession:
                 return session
         return None
 
+    def _open_again(self, session: zenoh.Session) -> zenoh.Session | None:
+        """Close a session and open another one with the same declarations."""
+        self._declared.clear()
+        session.close()  # type: ignore[no-untyped-call]
+        self._note(is_up=False, problem=LOST_DECLARATION)
+        for token in tuple(self._alive):
+            self._note_token(token, is_alive=False)
+        self._probed.clear()
+        self._reopens = False
+        opened = self._open()
+        if opened is not None:
+            for key, declare in self._declarations.items():
+                self._declared[key] = declare(opened)
+        return opened
+
+    def _check_regularly(self) -> None:
+        pause = CHECK_FIRST
+        while not self._stopping.wait(pause):
+            pause = CHECK_EVERY
+            if not self._is_up or self._reopens:
+                continue
+            declarations = tuple(self._declarations)
+            check = DeclarationCheck(self._settings, [key for kind, key in declarations if kind == "tokens"])
+            own = {key for kind, key in declarations if kind == "token"}
+            probes = {probe_of(key) for kind, key in declarations if kind == "subscriber"}
+            missing = check.missing(own, probes, self._probed.__contains__, self._stopping)
+            missing -= {key if kind == "token" else probe_of(key) for kind, key in declarations
+                        if (kind, key) not in self._declarations}  # fmt: skip
+            for token in check.tokens - own:
+                self._note_token(token, is_alive=True)
+            is_in_use, self.is_in_use = self.is_in_use, False
+            if missing and not is_in_use and not self._stopping.is_set():
+                logger.warning("declarations lost on the way, opening another session: %s", ", ".join(sorted(missing)))
+                self._reopens, pause = True, CHECK_FIRST
+                self._queue.add_work(lambda session: None)
+
+    def _note_token(self, key: str, *, is_alive: bool) -> None:
+        if is_alive:
+            self._alive.add(key)
+        else:
+            self._alive.discard(key)
+        self._report(TokenChange(key, is_alive))
+
     def _serve(self, session: zenoh.Session) -> None:
         drop = zenoh.CongestionControl.DROP
         count = 0
         self._look(session)
-        while not self._stopping.is_set():
+        while not (self._stopping.is_set() or self._reopens):
             due = self._queue.next(LOOK_EVERY)
             count += 1
             if due is None or count >= 1000:
@@ -254,6 +333,9 @@ class ZenohSession:
     # In zenoh's threads.
 
     def _sample(self, sample: zenoh.Sample) -> None:
+        if self._is_lossy and is_probe(str(sample.key_expr)):
+            self._probed.add(str(sample.key_expr))
+            return
         attachment = sample.attachment
         if len(sample.payload) > MAX_SAMPLE or (attachment is not None and len(attachment) > MAX_ATTACHMENT):
             self._report(FabricSample(str(sample.key_expr), b"", b""))  # an empty one counts as bad
@@ -262,4 +344,4 @@ class ZenohSession:
         self._report(FabricSample(str(sample.key_expr), sample.payload.to_bytes(), raw))
 
     def _token(self, sample: zenoh.Sample) -> None:
-        self._report(TokenChange(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT))
+        self._note_token(str(sample.key_expr), is_alive=sample.kind == zenoh.SampleKind.PUT)

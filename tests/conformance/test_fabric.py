@@ -212,7 +212,7 @@ async def test_system_id_of_another_gateway_is_left_to_it(tmp_path: Path, monkey
         monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))  # one gateway uses one state folder
         async with world(endpoints=(node.url,)) as other:
             await notified(other.client)
-            assert (await station.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
+            await accepted(station, dialect.MAV_CMD_REQUEST_MESSAGE, 148)
             await w.gateway.close()
             mark = station.mark()
             await station.heartbeat(lambda beat: True, since=mark, timeout=10.0)

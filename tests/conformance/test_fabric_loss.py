@@ -6,11 +6,13 @@ The station repeats what is not answered (support/repeating.py). tests/bench/fab
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import math
 from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager
 from typing import Any
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support import missions, repeating
 from support.fabric import FabricStation, ground, router
@@ -43,7 +45,7 @@ async def stalling(*, flying: bool = False) -> AsyncIterator[tuple[World, Stalli
 async def lossy(*, flying: bool = False) -> AsyncIterator[tuple[World, LossyRelay]]:
     """A world whose first client is a station on the fabric; the gateway's link is 50 ms late and loses 5 %.
 
-    It loses nothing before the station is known: zenoh does not repeat a lost declaration (docs/fabric.md).
+    It loses nothing before the station is known: a lost declaration is found after seconds (docs/fabric.md).
     """
     async with router(also="udp") as node:
         relay = LossyRelay(node.other_port, loss=0.0, delay=DELAY)
@@ -158,3 +160,46 @@ async def test_setpoints_over_a_lossy_link_end_with_their_sender_and_land_gets_t
 
 def now() -> float:
     return asyncio.get_running_loop().time()
+
+
+async def accepted(station: FabricStation) -> None:
+    """Wait until a command is accepted."""
+    for _ in range(20):
+        with contextlib.suppress(repeating.Unanswered):
+            ack, _ = await repeating.command(station, dialect.MAV_CMD_REQUEST_MESSAGE, 148)
+            if ack.result == ACCEPTED:
+                return
+        await station.heartbeat(lambda beat: True, timeout=20.0)
+    raise AssertionError("no command is accepted")
+
+
+@pytest.mark.parametrize("lost", [b"anafi/1/drone", b"anafi/1/up", b"anafi/station"])
+async def test_lost_declaration_of_the_gateway_is_made_again(lost: bytes) -> None:
+    """Its token, its subscription, and that to the tokens of stations."""
+    async with router(also="udp") as node:
+        relay = LossyRelay(node.other_port, loss=0.0, delay=DELAY)
+        relay.lose_next = lost
+        url = f"zenoh://127.0.0.1:{await relay.start()}?link=udp"
+        try:
+            async with world(endpoints=(url,)) as w, ground(node.url) as port:
+                station = w.take(await FabricStation().join(port))
+                await accepted(station)
+                assert (relay.lost, relay.lose_next) == (1, b"")
+                # In use: nothing that a look misses opens another session.
+                assert w.gateway.counters()["reopened"] <= 1
+        finally:
+            await relay.close()
+
+
+async def test_station_whose_token_was_lost_on_the_way_to_the_gateway_is_found() -> None:
+    async with router(also="udp") as node:
+        relay = LossyRelay(node.other_port, loss=0.0, delay=DELAY)
+        url = f"zenoh://127.0.0.1:{await relay.start()}?link=udp"
+        try:
+            async with world(endpoints=(url,)) as w, ground(node.url) as port:
+                await accepted(w.take(await FabricStation().join(port)))
+                relay.lose_next = b"anafi/station/v1"
+                await accepted(w.take(await FabricStation(254).join(port)))
+                assert (relay.lost, w.gateway.counters()["reopened"]) == (1, 0)
+        finally:
+            await relay.close()
