@@ -36,7 +36,7 @@ class _Stream:
         self.users = 1
         """Channels that share it: they have the same interval, no pace, and got the last message together."""
 
-    def leave(self, now: float) -> None:
+    def leave(self, now: float, *, is_repeated: bool) -> None:
         """Count the message, which is due, as sent.
 
         Times are kept on a grid, not from message to message, so that jitter of the source costs no rate: an
@@ -47,8 +47,8 @@ class _Stream:
         if self.pace is not None:
             interval *= self.pace.slowdown
         late = now - self.next
-        # After a silence the grid begins anew; half an interval early, so that the next message may jitter.
-        self.next = self.next + interval if late <= interval else now + interval / 2
+        # After a silence the grid begins anew; half an interval early, so that the next update may jitter.
+        self.next = self.next + interval if late <= interval else now + (interval if is_repeated else interval / 2)
 
     def part(self, users: int) -> _Stream:
         """Return the stream of some of its channels, which share it no longer."""
@@ -144,12 +144,12 @@ class Streams(Generic[ChannelT]):
             self._forget(id)
 
     def due_on(
-        self, channels: Sequence[ChannelT], ids: tuple[int, ...], now: float
+        self, channels: Sequence[ChannelT], ids: tuple[int, ...], now: float, *, is_repeated: bool = False
     ) -> list[tuple[int, Sequence[ChannelT]]]:
         """Return the messages that may leave now with their channels; they count as sent there.
 
         A list of channels that has changed must be another object, as `Node.channels` is. Messages for the same
-        channels have one list.
+        channels have one list. `is_repeated`: they leave at their times, and not with updates.
         """
         audience = self._audience(channels)
         group = audience.groups.get(ids) or self._new_group(audience, ids)
@@ -164,7 +164,7 @@ class Streams(Generic[ChannelT]):
                 for stream, channels in lane.streams:
                     if now >= stream.next:
                         has_first = has_first or stream.next == -_NEVER
-                        stream.leave(now)
+                        stream.leave(now, is_repeated=is_repeated)
                         due = [*due, *channels] if due else channels
                     if stream.next < until:
                         until = stream.next

@@ -20,6 +20,8 @@ from anafi_mav.clock import NEVER, Alarm, Clock, Schedule
 from anafi_mav.drone import Drone, events
 from anafi_mav.drone.events import Message
 from anafi_mav.drone.payload.camera import Camera
+from anafi_mav.drone.status.battery import Battery
+from anafi_mav.drone.status.link import Link
 from anafi_mav.drone.values import VALUES
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.access import COMMANDS
@@ -175,7 +177,9 @@ SAMPLES: frozenset[type[Message]] = frozenset(
         events.GimbalAttitudeChanged,
         events.GpsLocationChanged,
         events.SpeedChanged,
+        *Battery.SAMPLES,
         *Camera.SAMPLES,
+        *Link.SAMPLES,
     }
 )
 """Events that a drone sends all the time. What follows from one is done by its handlers."""
@@ -325,7 +329,7 @@ class System:
         self._subscribe()
         self._changed()
         now, self._stalled = self.clock.monotonic(), self._node.stalled
-        self._next_heartbeat = now + HEARTBEAT_EVERY
+        self._next_heartbeat = NEVER  # a second after the first tick: with the messages that are repeated every second
         self._schedule.bring_forward(now)
         self._ticker.set(now)
 
@@ -546,7 +550,9 @@ class System:
             return
         now = self.clock.monotonic() + EARLY
         try:
-            if now >= self._next_heartbeat:
+            if self._next_heartbeat == NEVER:
+                self._next_heartbeat = now + HEARTBEAT_EVERY
+            elif now >= self._next_heartbeat:
                 self._next_heartbeat = max(self._next_heartbeat + HEARTBEAT_EVERY, now + HEARTBEAT_EVERY / 2)
                 self._send_heartbeats()
                 self._schedule.bring_forward(now)

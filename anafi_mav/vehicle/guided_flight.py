@@ -105,7 +105,7 @@ class GuidedFlight:
         if move is None or move.target is None:
             return None
         goto = control.active
-        if isinstance(goto, Goto) and goto.is_to(move.target):
+        if isinstance(goto, Goto):
             return goto
         if control.mode is not FlightMode.GUIDED:
             return None
@@ -169,7 +169,7 @@ class GuidedFlight:
             try:
                 await self.move(goto)
             except BaseException:
-                if before is not None and grant.is_current and self._flies_to(before):
+                if before is not None and self._flies_to(before):
                     control.adopt(before, below=Hover(before.mode))  # what a change of height or speed changes
                 raise
 

@@ -299,7 +299,6 @@ class Takeoff(PlainTask):
         Until it has succeeded or failed, the armed state does not lapse.
         """
         self._enter(step(self._situation, Event.LIFT))
-        self._vehicle.control.resume()  # a pause that comes from here on ends this take-off
         try:
             await self._vehicle.drone.piloting.take_off()
         finally:

@@ -23,7 +23,7 @@ from support.setpoints import NO_ACCELERATION, NO_YAW, NO_YAW_RATE, allow_speed,
 from support.world import HOME, MODES, World, world
 
 from anafi_mav import geo, mav_enums
-from anafi_mav.arsdk.messages import ardrone3
+from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim.world.faults import CLEAR, Impairment
@@ -250,6 +250,67 @@ async def test_conf_076_fence_action_ended_by_a_client_allows_flight(flavour: st
         assert len(w.commands(name)) == 1
         assert len([text for text in texts(w.client, mark) if " m beyond " in text]) == 1
         assert w.drone.pose.north > 12.0
+
+
+async def test_conf_076_breach_after_an_action_that_a_client_has_ended_is_acted_upon() -> None:
+    """A Hold ends the return of the first breach; flown back inside and out again, the drone returns."""
+    async with world(also="px4", speed=1.0) as w:
+        assert (await upload(w.client, square(PLACE, 12.0), FENCE)).type == TAKEN
+        await put(w, ACTION["px4"], NUMBER["px4"]["return"])
+        await put(w, "ANF_FENCE_AHEAD", 0, 6)
+        await w.take_off()
+        mark = w.client.mark()
+        async with flown(w):
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 9.0, 15.0)
+            w.drone.faults.down = Impairment(delay=0.5)  # the answer comes late
+            await w.client.wait("STATUSTEXT", lambda m: " m beyond " in m.text, since=mark, timeout=15.0)
+            assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 3, timeout=10.0)).result == ACCEPTED
+            w.drone.faults.down = CLEAR
+        mark = w.client.mark()
+        ack = await w.client.command(REPOSITION, -1, 1, 0, NAN, frame=6, x=PLACE[0], y=PLACE[1], z=5.0)
+        assert ack.result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["north"]) < 1.0, 20.0, since=w.drone.log[-1].t)
+        returns = len(w.commands("rth.return_to_home"))
+        async with flown(w):
+            await w.client.wait("STATUSTEXT", lambda m: " m beyond " in m.text, since=mark, timeout=15.0)
+            await w.client.heartbeat(lambda beat: beat.custom_mode == MODES["px4"].returning)
+        assert len(w.commands("rth.return_to_home")) == returns + 1
+
+
+async def test_conf_076_return_that_the_drone_cannot_fly_becomes_a_hold() -> None:
+    """The goto that leads out of the fence is not flown on."""
+    async with world(speed=1.0) as w:
+        await put(w, ACTION["px4"], NUMBER["px4"]["return"])
+        await w.take_off(10.0)
+        away = geo.destination(*PLACE, 200.0, 0.0)
+        ack = await w.client.command(REPOSITION, -1, 1, 0, NAN, frame=6, x=away[0], y=away[1], z=10.0)
+        assert ack.result == ACCEPTED
+        w.drone.inject(rth.State(rth.RthState.UNAVAILABLE, rth.StateReason.DISABLED))
+        assert (await upload(w.client, square(PLACE, 40.0), FENCE)).type == TAKEN
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 2.0, 20.0)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == MODES["px4"].hold, timeout=20.0)
+        await said(w.client, "return home is unavailable", timeout=20.0)
+        await at_rest(w)
+        assert 10.0 < farthest(w) < 60.0
+        assert w.commands("rth.return_to_home") == []
+
+
+async def test_conf_076_action_that_has_failed_is_tried_again() -> None:
+    """The drone does not report the landing, so that it counts as failed beyond the boundary."""
+    async with world(speed=1.0) as w:
+        await w.take_off(10.0)
+        away = geo.destination(*PLACE, 200.0, 0.0)
+        ack = await w.client.command(REPOSITION, -1, 1, 0, NAN, frame=6, x=away[0], y=away[1], z=10.0)
+        assert ack.result == ACCEPTED
+        mark = w.client.mark()
+        await put(w, ACTION["px4"], NUMBER["px4"]["land"])
+        await put(w, "ANF_FENCE_AHEAD", 0, 6)
+        w.drone.faults.untold = frozenset({ardrone3.FlyingStateChanged.NAME})
+        assert (await upload(w.client, square(PLACE, 20.0), FENCE)).type == TAKEN
+        await said(w.client, "Fence landing failed: ", since=mark, timeout=30.0)
+        before = len(w.commands("ardrone3.Piloting.Landing"))
+        await w.drone.wait_log(lambda e: e.name == "ardrone3.Piloting.Landing", 10.0, since=w.drone.log[-1].t)
+        assert len(w.commands("ardrone3.Piloting.Landing")) == before + 1
 
 
 async def test_conf_076_below_the_floor_the_zones_hold() -> None:

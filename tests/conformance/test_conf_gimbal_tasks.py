@@ -325,6 +325,35 @@ def owner(status: Any) -> tuple[int, int]:
     return status.primary_control_sysid, status.primary_control_compid
 
 
+@pytest.mark.parametrize("changes", [frozenset(), frozenset({"gimbal"}), frozenset({"photos"})])
+@both
+async def test_conf_074_payload_changed_during_a_pause_is_set_again(flavour: str, changes: frozenset[str]) -> None:
+    """A survey goes on with its own pitch and photos; untouched ones go on in the file that the drone has."""
+    aim = Item(MOUNT, 0.0, 0.0, z=TARGETING, p1=-60.0, p2=NAN, p3=NAN, p4=NAN, frame=2)
+    begin = Item(dialect.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, p1=0.0, p2=2.0, p3=0.0, p4=NAN, frame=2)
+    end = Item(dialect.MAV_CMD_IMAGE_STOP_CAPTURE, 0.0, 0.0, p1=0.0, frame=2)
+    async with world(flavour=flavour, web=True) as w:
+        await put(w, [takeoff(6.0), aim, begin, way(60.0, 0.0, 6.0), way(60.0, 20.0, 6.0), end])
+        await start(w)
+        await state(w, ACTIVE, seq=3, since=0)
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", since=0, timeout=30.0)
+        mark = w.client.mark()
+        assert (await w.client.command(PAUSE, 0.0)).result == ACCEPTED
+        await state(w, PAUSED, seq=3, since=mark)
+        if "gimbal" in changes:
+            assert (await w.client.command(PITCHYAW, 20.0, x=LEVEL)).result == ACCEPTED
+            await looks(w, pitch_absolute=20.0)
+        if "photos" in changes:
+            stop = dialect.MAV_CMD_IMAGE_STOP_CAPTURE
+            assert (await w.client.command(stop, 0.0, target=(1, 100))).result == ACCEPTED
+        assert (await w.client.command(PAUSE, 1.0)).result == ACCEPTED
+        await looks(w, pitch_absolute=-60.0)
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", timeout=30.0)
+        await state(w, ACTIVE, seq=3)
+        before, after = (entry.args["filepath"] for entry in w.commands("common.Mavlink.Start"))
+        assert (before != after) is bool(changes)
+
+
 @both
 async def test_conf_100_mission_has_the_gimbal_while_its_items_come(flavour: str) -> None:
     aim = Item(PITCHYAW, 0.0, 0.0, z=1.0, p1=-30.0, p2=NAN, p3=NAN, p4=NAN, frame=2)

@@ -6,13 +6,16 @@ import asyncio
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import ACCEPTED, REJECTED, goto, heard
+from support.fault_scenarios import ACCEPTED, GOTO, IN_PROGRESS, REJECTED, goto, heard, somebody_else, until
 from support.mav import NAN
 from support.setpoints import POSITION_ONLY, earth, engage, said, streaming, texts
 from support.world import HOME, World, world
 
 from anafi_mav import geo
+from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.skyctrl import Source
+
+DENIED = dialect.MAV_RESULT_DENIED
 
 PITCH_STICK = 3
 """Its axis at the Skycontroller (mapper.xml)."""
@@ -38,6 +41,46 @@ async def test_goto_that_the_drone_aborts_is_reported_and_flown_when_sent_again(
         await w.client.wait("GPS_RAW_INT", lambda m: m.fix_type >= dialect.GPS_FIX_TYPE_3D_FIX, since=w.client.mark())
         assert await goto(w, AWAY, 10.0) == ACCEPTED
         assert len(heard(w, "moveTo")) == 2
+
+
+async def test_goto_after_one_that_has_failed_is_flown_once_and_answered_when_sent_again() -> None:
+    async with world(speed=1.0) as w:
+        await on_its_way(w)
+        mark = w.client.mark()
+        somebody_else(w, ardrone3.CancelMoveTo())
+        await said(w.client, "Goto ended: ", mark)
+        for _ in range(2):
+            assert await goto(w, 100.0, 10.0) == ACCEPTED
+        await asyncio.sleep(1.0)  # what is sent twice arrives
+        assert len(heard(w, "moveTo")) == 2
+
+
+async def test_height_command_after_a_goto_that_was_cancelled_elsewhere_keeps_the_place() -> None:
+    """Not the target of the goto, although no location has arrived since."""
+    async with world(speed=1.0) as w:
+        await on_its_way(w)
+        mark = w.client.mark()
+        await w.client.wait("GLOBAL_POSITION_INT", since=mark)
+        somebody_else(w, ardrone3.CancelMoveTo())
+        await said(w.client, "Goto ended: ", mark)
+        ack = await w.client.command(dialect.MAV_CMD_DO_CHANGE_ALTITUDE, 20.0, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT)
+        assert ack.result == ACCEPTED
+        target = w.commands("ardrone3.Piloting.moveTo")[-1].args
+        assert geo.offset(*HOME[:2], target["latitude"], target["longitude"])[0] < 50.0
+
+
+@pytest.mark.parametrize(("north", "height"), [(20.0, 1000.0), (9000.0, 10.0)], ids=["height", "place"])
+async def test_goto_that_is_refused_during_the_climb_leaves_the_one_that_waits(north: float, height: float) -> None:
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == ACCEPTED
+        assert (await w.client.command(dialect.MAV_CMD_NAV_TAKEOFF, x=0.0, y=0.0, z=10.0)).result == ACCEPTED
+        mark, place = w.client.mark(), geo.destination(*HOME[:2], 15.0, 0.0)
+        w.client.send_command(GOTO, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=10.0)
+        await w.client.wait("COMMAND_ACK", lambda m: m.result == IN_PROGRESS, since=mark)
+        assert await goto(w, north, height) == DENIED
+        assert w.drone.pose.up < 8.0
+        assert (await until(w.client, mark, 2))[-1] == (GOTO, ACCEPTED)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["north"] - 15.0) < 1.0, 20.0)
 
 
 async def test_goto_ended_by_the_pilot_is_reported_and_refused_when_sent_again() -> None:

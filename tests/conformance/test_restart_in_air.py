@@ -17,7 +17,7 @@ from support.world import HOME, WEB_PORT, World, loopback, world
 
 from anafi_mav import mav_enums
 from anafi_mav.arsdk.codec.wire import Message
-from anafi_mav.arsdk.messages import rth
+from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
@@ -60,7 +60,7 @@ async def flying(
             await w.connect()
             armed = dialect.MAV_MODE_FLAG_SAFETY_ARMED
             await w.client.heartbeat(lambda beat: beat.base_mode & armed, since=0, timeout=30.0)
-            await w.client.wait("GLOBAL_POSITION_INT", since=0)
+            await w.client.wait("GPS_RAW_INT" if ardrone3.AltitudeChanged in untold else "GLOBAL_POSITION_INT", since=0)
             yield w
             for client in w.clients:
                 await client.close()
@@ -107,6 +107,14 @@ async def test_restart_without_flight_id_estimates_the_height_safely(tmp_path: P
         await at(w.drone, 10.0, 18.0)
         assert await goto(w, 0.0, 5.0, RELATIVE) == ACCEPTED  # above take-off: no bridge is needed
         await at(w.drone, 0.0, 5.0)
+
+
+async def test_goto_that_keeps_the_height_needs_a_reported_one(tmp_path: Path) -> None:
+    async with flying(tmp_path, 10.0, untold=[ardrone3.AltitudeChanged]) as w:
+        mark = w.client.mark()
+        assert await goto(w, 10.0, math.nan, RELATIVE) == REJECTED
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Goto refused: height unknown", since=mark)
+        assert await goto(w, 10.0, 12.0, RELATIVE) == ACCEPTED
 
 
 async def test_restart_without_flight_id_follows_no_target_near_the_estimated_ground(tmp_path: Path) -> None:

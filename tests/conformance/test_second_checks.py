@@ -30,14 +30,15 @@ from support.fault_scenarios import (
 )
 from support.mav import NAN
 from support.missions import put, takeoff, way
-from support.params import send_set
-from support.setpoints import VELOCITY_ONLY, heard, local, motion, said, streaming
+from support.params import send_set, write
+from support.setpoints import VELOCITY_ONLY, heard, local, motion, said, streaming, texts
 from support.world import HOME, World, world
 
 from anafi_mav.arsdk.messages import ardrone3, piloting_style, rth
 from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.vehicle.takeoff import AUTO_DISARM
 
+FAILED = dialect.MAV_RESULT_FAILED
 START, ORBIT = dialect.MAV_CMD_MISSION_START, dialect.MAV_CMD_DO_ORBIT
 OFFBOARD, FOLLOW = (1, 6, 0), (1, 4, 8)
 FORCE = 21196
@@ -76,7 +77,32 @@ async def test_motor_cut_is_followed_by_nothing_of_what_it_replaces() -> None:
         assert [one for one in names[names.index("Emergency") + 1 :] if one != "PCMD"] == []
 
 
+async def test_command_during_a_motor_cut_is_refused_and_sends_nothing() -> None:
+    async with world(speed=1.0, allow_kill=True) as w:
+        await w.take_off(UP)
+        w.drone.faults.down = Impairment(delay=1.0)
+        w.client.send_command(ARM, 0, FORCE)
+        await w.drone.wait_log(lambda e: e.kind == "command" and e.name.endswith(".Emergency"), 5.0)
+        mark, began = w.client.mark(), now()
+        assert await goto(w, 90.0, UP) == REJECTED
+        await said(w.client, "Command refused: motor cut in progress", mark)
+        assert flown(w, began) == []
+
+
 # The pilot's switch.
+
+
+async def test_goto_that_the_drone_has_not_confirmed_is_over_when_the_pilot_is_given_the_aircraft() -> None:
+    """It was answered with FAILED: no text may report its end once more."""
+    async with world(speed=1.0, skycontroller=3) as w:
+        await w.take_off(UP)
+        w.drone.faults.untold = frozenset({ardrone3.MoveToChanged.NAME})
+        assert await goto(w, 30.0, UP) == FAILED
+        w.drone.faults.untold = frozenset()
+        mark = w.client.mark()
+        await write(w.client, "ANF_SC_OFFBOARD", 0, dialect.MAV_PARAM_TYPE_INT32)
+        await watched(2.0)
+        assert [text for text in texts(w.client, mark) if text.startswith("Goto")] == []
 
 
 @pytest.mark.parametrize("command", [LAND_CMD, RTL], ids=["landing", "return"])

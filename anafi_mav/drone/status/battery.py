@@ -93,3 +93,6 @@ class Battery(Element[BatteryState]):
             state, charge_level=_CHARGE_LEVELS.get(message.state, AlertLevel.NONE)
         ),
     }
+
+    SAMPLES: ClassVar[tuple[type[Message], ...]] = (battery.Voltage, battery.CellVoltage, battery.Temperature)
+    """Events that come all the time."""

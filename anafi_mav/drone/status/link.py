@@ -48,3 +48,6 @@ class Link(Element[LinkState]):
         common.WifiSignalChanged: lambda state, message: replace(state, rssi_dbm=message.rssi),
         wifi.RssiChanged: lambda state, message: replace(state, rssi_dbm=message.rssi),
     }
+
+    SAMPLES: ClassVar[tuple[type[Message], ...]] = (common.WifiSignalChanged, wifi.RssiChanged)
+    """Events that come all the time."""

@@ -231,7 +231,7 @@ class MessageService(Service):
             return self._repeat_at
         self._repeat_at = now + REPEATED
         channels = self.host.channels
-        for id, due in self._intervals.due_on(channels, self._repeated, now):
+        for id, due in self._intervals.due_on(channels, self._repeated, now, is_repeated=True):
             self._leave(id, due, self._times(id))
         self._flush()
         return max(self._repeat_at, self._intervals.next_on(channels, self._repeated))

@@ -89,11 +89,6 @@ class Grant:
         self._control = control
         self._attempt = attempt
 
-    @property
-    def is_current(self) -> bool:
-        """True while no newer request, the ground or the loss of the link has replaced it."""
-        return self._control.epoch == self._attempt.number
-
     def begin(self, *, pauses: bool | None = None) -> None:
         """Make the task active: its mode is shown from now on. Later calls do nothing."""
         attempt = self._attempt if pauses is None else replace(self._attempt, pauses=pauses)

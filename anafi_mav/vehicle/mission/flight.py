@@ -51,6 +51,7 @@ from anafi_mav.vehicle.mission.effects import (
 from anafi_mav.vehicle.mission.files import FilesOnDrone
 from anafi_mav.vehicle.mission.machine import PROOF, MissionMachine, State
 from anafi_mav.vehicle.mission.path import check_path, lay_out
+from anafi_mav.vehicle.mission.payload_state import payload_after
 from anafi_mav.vehicle.mission.record import MissionRecord
 from anafi_mav.vehicle.mission.steps import fly_step
 from anafi_mav.vehicle.mission.store_wait import StoreWait
@@ -334,13 +335,23 @@ class MissionFlight(PlainTask):
         return Course(tuple(parts), rest)
 
     def _resumes(self, attempt: MissionAttempt) -> bool:
-        """The drone hovers, with the rest of what is to be flown in its memory."""
+        """The drone hovers, with the rest of what is to be flown in its memory.
+
+        Its payload is as the executed lines have set it.
+        """
         machine, progress, plan = self.machine, self.machine.progress, self._vehicle.drone.flight_plan.state
         paused = plan.playing == PlayingState.PAUSED and plan.uid == progress.uid
         whole = progress.leg is not None and progress.course.later is None
         same = machine.rest is State.PAUSED and attempt.item == progress.current and attempt.jumps == progress.jumps
         decided = not self._vehicle.drone.flight_plan.is_undecided(progress.uid)
-        return same and whole and paused and decided and self._vehicle.in_air
+        return same and whole and paused and decided and self._vehicle.in_air and self._payload_holds
+
+    @property
+    def _payload_holds(self) -> bool:
+        drone, progress = self._vehicle.drone, self.machine.progress
+        if progress.leg is None:
+            return True
+        return payload_after(progress.leg, progress.line, drone.flight_plan.version).holds(drone)
 
     async def _acquire(self, work: Acquire, by: Right | None) -> list[Effect]:
         """Acquire control, and hover; return the effects of the grant.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import math
 import random
 from collections.abc import Sequence
 
@@ -205,3 +206,20 @@ def test_channel_with_an_interval_of_its_own_leaves_the_others_theirs() -> None:
     streams.channel_closed(one)
     assert streams.due_on([other], (ATTITUDE,), 1.0) == []
     assert streams.due_on([other], (ATTITUDE,), 1.5) == [(ATTITUDE, [other])]
+
+
+def test_repeated_messages_of_one_beginning_stay_in_step() -> None:
+    """An update may jitter about its time, so its grid begins half an interval early; a repetition does not."""
+    streams, one = Streams[Key]({ATTITUDE: 0.5, SYS_STATUS: 1.0}), Key()
+    channels, both = [one], (ATTITUDE, SYS_STATUS)
+
+    def due(now: float) -> list[int]:
+        return [id for id, _ in streams.due_on(channels, both, now, is_repeated=True)]
+
+    assert due(10.0) == [ATTITUDE, SYS_STATUS]
+    assert streams.next_on(channels, both) == 10.5
+    assert due(10.4) == []
+    assert due(10.5) == [ATTITUDE]
+    assert due(11.0) == [ATTITUDE, SYS_STATUS]
+    assert streams.next_on(channels, both) == 11.5
+    assert streams.next_on(channels, (SYS_STATUS,)) == -math.inf  # not asked about before

@@ -30,7 +30,7 @@ else:
 REPOSITORY = Path(__file__).parents[3]
 MISSIONS = REPOSITORY / "missions"
 BUILD_ONLY = ("pymavlink", "lxml")
-OPTIONAL = ("anafi_mav.fabric.zenoh_session", "anafi_mav.web.webrtc")
+OPTIONAL = ("anafi_mav.fabric.declaration_check", "anafi_mav.fabric.zenoh_session", "anafi_mav.web.webrtc")
 """Modules that need an extra; nothing imports them before a user asks for what they do."""
 with (REPOSITORY / "pyproject.toml").open("rb") as file:
     PYPROJECT = tomllib.load(file)
