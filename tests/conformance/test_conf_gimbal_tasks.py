@@ -26,7 +26,7 @@ from support.gimbal import (
     truth,
 )
 from support.mav import Client
-from support.missions import ACTIVE, PAUSED, put, start, state, takeoff, way
+from support.missions import ACTIVE, COMPLETE, PAUSED, put, start, state, takeoff, way
 from support.plans import Item
 from support.world import HOME, World, loopback, world
 
@@ -352,6 +352,29 @@ async def test_conf_074_payload_changed_during_a_pause_is_set_again(flavour: str
         await state(w, ACTIVE, seq=3)
         before, after = (entry.args["filepath"] for entry in w.commands("common.Mavlink.Start"))
         assert (before != after) is bool(changes)
+
+
+@pytest.mark.parametrize("tilts", [True, False])
+async def test_ai_resumes_at_its_height_and_reports_a_changed_gimbal(tilts: bool) -> None:
+    """A new file would begin with a climb to the height of a return, 20 m."""
+    aim = Item(MOUNT, 0.0, 0.0, z=TARGETING, p1=-60.0, p2=NAN, p3=NAN, p4=NAN, frame=2)
+    async with world(model="ai", web=True) as w:
+        await put(w, [takeoff(6.0), way(5.0, 0.0, 6.0), aim, way(60.0, 0.0, 6.0)])
+        await start(w)
+        await state(w, ACTIVE, seq=3, since=0)
+        await looks(w, pitch_absolute=-60.0)
+        mark = w.client.mark()
+        assert (await w.client.command(PAUSE, 0.0)).result == ACCEPTED
+        await state(w, PAUSED, seq=3, since=mark)
+        if tilts:
+            assert (await w.client.command(PITCHYAW, 20.0, x=LEVEL)).result == ACCEPTED
+            await looks(w, pitch_absolute=20.0)
+        assert (await w.client.command(PAUSE, 1.0)).result == ACCEPTED
+        await state(w, COMPLETE, since=mark)
+        said = [m.text for _, m in w.client.since(mark, "STATUSTEXT")]
+        assert ("Mission resumes: gimbal or camera were changed" in said) is tilts
+        assert len({entry.args["flightplan_id"] for entry in w.commands("flight_plan.start_at_v2")}) == 1
+        assert w.drone.pose.up < 8.0
 
 
 @both

@@ -337,14 +337,15 @@ class MissionFlight(PlainTask):
     def _resumes(self, attempt: MissionAttempt) -> bool:
         """The drone hovers, with the rest of what is to be flown in its memory.
 
-        Its payload is as the executed lines have set it.
+        Its payload is as the executed lines have set it. An Ai resumes in any case: it would climb for a new file.
         """
         machine, progress, plan = self.machine, self.machine.progress, self._vehicle.drone.flight_plan.state
         paused = plan.playing == PlayingState.PAUSED and plan.uid == progress.uid
         whole = progress.leg is not None and progress.course.later is None
         same = machine.rest is State.PAUSED and attempt.item == progress.current and attempt.jumps == progress.jumps
         decided = not self._vehicle.drone.flight_plan.is_undecided(progress.uid)
-        return same and whole and paused and decided and self._vehicle.in_air and self._payload_holds
+        goes_on = self._vehicle.drone.flight_plan.version == 2 or self._payload_holds
+        return same and whole and paused and decided and self._vehicle.in_air and goes_on
 
     @property
     def _payload_holds(self) -> bool:
@@ -389,6 +390,8 @@ class MissionFlight(PlainTask):
             await plan.start(uid, line, continue_on_disconnect=goes_on, cause=work.attempt)
         except CommandRejected as error:
             raise DroneRefused(refusal(plan.state, error)) from error
+        if work.prepared.resumes and not self._payload_holds:
+            self._vehicle.text(Severity.WARNING, texts.MISSION_PAYLOAD_CHANGED)
 
     def _require_freedom(self) -> None:
         vehicle = self._vehicle
