@@ -29,6 +29,8 @@ def main() -> int:
 
     status = run(imported=_collect_garbage)
     _end_at_once_on_interrupt(status)
+    if "zenoh" in sys.modules:
+        _end_without_finalization(status)
     return status
 
 
@@ -45,6 +47,22 @@ def _end_at_once_on_interrupt(status: int) -> None:
     """
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, lambda number, frame: os._exit(status))
+
+
+def _end_without_finalization(status: int) -> None:
+    """End the process while threads of zenoh may still call back.
+
+    Before 3.14 Python ends a thread that needs it during finalization by unwinding its stack (cpython#87135). In one of
+    zenoh this aborts the process: "FATAL: exception not rethrown".
+    """
+    import atexit
+    import contextlib
+
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):  # closed by the reader
+            stream.flush()
+    os._exit(status)
 
 
 if __name__ == "__main__":

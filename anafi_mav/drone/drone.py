@@ -16,6 +16,7 @@ from functools import partial
 from typing import Any, TypeAlias, TypeVar
 
 from anafi_mav import models
+from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.codec.secret_fields import without_secrets
 from anafi_mav.arsdk.codec.wire import Message, PackedMessage, Received, UnknownMessage
 from anafi_mav.arsdk.link.controller import ControllerSession
@@ -191,9 +192,10 @@ class Drone:
         }
         self._subscriptions: tuple[tuple[Callback, frozenset[type[Message]]], ...] = ()
         """Each callback with the kinds of messages that it is not called with."""
-        self._wanted: frozenset[type[Message]] = frozenset()
-        """Events of values that a callback is called with."""
+        self._holders: Mapping[type[Message], Sequence[Element[Any]]] = {}
+        """Events of values that no callback is called with, and the elements that keep them."""
         self._on_values: tuple[OnValues, ...] = ()
+        self._set_subscriptions(())
 
         self._session: ControllerSession | None = None
         self._fading: ControllerSession | None = None
@@ -724,7 +726,11 @@ class Drone:
 
     def _set_subscriptions(self, subscriptions: tuple[tuple[Callback, frozenset[type[Message]]], ...]) -> None:
         self._subscriptions = subscriptions
-        self._wanted = frozenset[type[Message]]().union(*(VALUES - without for _, without in subscriptions))
+        self._holders = {
+            kind: [self._elements[place] for place, _ in self._routes.get(kind, ())]
+            for kind in VALUES
+            if all(kind in without for _, without in subscriptions)
+        }
 
     def subscribe_values(self, callback: OnValues) -> Callable[[], None]:
         """Call `callback(values, time)` with the events of values, which arrive often.
@@ -824,35 +830,42 @@ class Drone:
         Events of values wait undecoded in their elements, unless their messages are wanted.
         """
         values: dict[type[Message], PackedMessage] = {}
-        waiting, routes, elements = self._commander.waiting, self._routes, self._elements
-        is_logged = message_log.isEnabledFor(logging.DEBUG)
+        deferrable = self._deferrable()
         for message in messages:
             # Not by isinstance, which takes as long for these classes as a reducer.
             if type(message) is PackedMessage:
                 kind = message.kind
-                is_wanted = kind in self._wanted or kind in waiting or is_logged
-                if values and (is_wanted or kind in values):
+                elements = deferrable.get(kind)
+                if values and (elements is None or kind in values):
                     self._report(values, now)
                     values = {}
                 values[kind] = message
-                if not is_wanted:
-                    for place, _ in routes.get(kind, ()):
-                        elements[place].defer(message)
+                if elements is not None:
+                    for element in elements:
+                        element.defer(message)
                     continue
-                unpacked = message.unpack()
-            else:
-                if values:
-                    self._report(values, now)
-                    values = {}
-                unpacked = message
+            elif values:
+                self._report(values, now)
+                values = {}
             if session.lost.done():
                 return
+            unpacked = wire.unpacked(message)
             try:
                 self._handle(unpacked, now)
             except Exception as error:
                 session.report(error, unpacked)
+            deferrable = self._deferrable()
         if values:
             self._report(values, now)
+
+    def _deferrable(self) -> Mapping[type[Message], Sequence[Element[Any]]]:
+        """Return the events of values of which no message is wanted, with their elements."""
+        if message_log.isEnabledFor(logging.DEBUG):
+            return {}
+        waiting = self._commander.waiting
+        if not waiting:
+            return self._holders
+        return {kind: elements for kind, elements in self._holders.items() if kind not in waiting}
 
     def _report(self, values: Values, now: float) -> None:
         for callback in self._on_values:

@@ -66,7 +66,8 @@ class Element(Generic[StateT]):
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]]
 
     def __init__(self) -> None:
-        self._state: Any = self.NOTHING
+        self.settled: StateT = self.NOTHING
+        """The state without the events that wait, for fields that no value changes. Only `state` sets it."""
         self._deferred: dict[bytes, PackedMessage] = {}
         """Events of values that are not part of the state yet, by their keys."""
 
@@ -82,24 +83,16 @@ class Element(Generic[StateT]):
     def state(self) -> StateT:
         """The last state reported by the drone."""
         if self._deferred:
-            reducers, state = self.REDUCERS, self._state
+            reducers, state = self.REDUCERS, self.settled
             for message in self._deferred.values():
                 state = reducers[message.kind](state, message.unpack())
             self.state = state
-        return self._state  # type: ignore[no-any-return]
+        return self.settled
 
     @state.setter
     def state(self, state: StateT) -> None:
         self._deferred.clear()
-        self._state = state
-
-    @property
-    def settled(self) -> StateT:
-        """The state without the events that wait, for fields that no value changes.
-
-        Nothing is decoded.
-        """
-        return self._state  # type: ignore[no-any-return]
+        self.settled = state
 
 
 class StateWatch:

@@ -10,10 +10,16 @@ from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
 import anafi_mav.arsdk.messages  # noqa: F401  # declares them
-from anafi_mav.arsdk.codec.wire import Message, PackedMessage, value_events
+from anafi_mav.arsdk.codec.wire import Message, PackedMessage, decode, value_events
 
-VALUES: frozenset[type[Message]] = frozenset(value_events())
+SIZES: Mapping[type[Message], int] = dict(value_events())
+"""Bytes of the command of each kind; later firmware may append more."""
+
+VALUES = frozenset(SIZES)
 """The kinds of all of them."""
+
+unpack = decode
+"""Return the message in the bytes of a `PackedMessage`."""
 
 Values: TypeAlias = Mapping[type[Message], PackedMessage]
 """Those that arrived together, one of each kind, in their sequence."""

@@ -507,7 +507,9 @@ class Vehicle(Aircraft):
 
     @property
     def descent(self) -> OperatorText | None:
-        return texts.LANDS if self.landing else texts.RETURNS if self.descends else None
+        if not self.descends:
+            return None
+        return texts.LANDS if self.landing else texts.RETURNS
 
     @property
     def _forced_landing(self) -> bool:

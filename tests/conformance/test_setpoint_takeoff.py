@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -30,6 +31,7 @@ from support.world import ARMED, HOLD, HOME, OFFBOARD, World, world
 
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import rth
+from anafi_mav.drone import events
 from anafi_mav.sim.skycontroller import TAKEOFF_LAND
 from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.sim.world.quirks import Quirk
@@ -439,3 +441,14 @@ async def test_setpoint_takeoff_on_bad_link_with_other_client_arming(flavour: st
             await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["up"] > 3.0, 30.0)
         w.drone.faults.up = w.drone.faults.down = Impairment()
         assert len(heard(w, "TakeOff")) == 1
+
+
+async def test_motion_of_a_drone_with_its_motors_off_is_read_when_it_is_needed() -> None:
+    async with world() as w:
+        (system,) = w.gateway.systems
+        for heading in (1.0, -2.0):
+            w.drone.place(0.0, 0.0, heading)
+            await system.drone.expect(
+                events.AttitudeChanged, lambda message, yaw=heading: math.isclose(message.yaw, yaw, abs_tol=1e-3)
+            )
+            assert system.vehicle.offboard.motion.yaw == pytest.approx(heading, abs=1e-3)

@@ -6,7 +6,9 @@ import asyncio
 import socket
 from typing import Any
 
-from anafi_mav.receive_buffer import MOST, SIZE, limit_reads, read_waiting
+from anafi_mav.arsdk.link.interface import open_connection
+from anafi_mav.drone.rest import Rest
+from anafi_mav.receive_buffer import MOST, SIZE, OpenSocket, limit_reads, read_waiting
 
 
 class _Peer(asyncio.DatagramProtocol):
@@ -122,3 +124,48 @@ async def test_error_of_a_connected_socket_is_reported() -> None:
         await asyncio.sleep(0)
     transport.close()
     assert [type(failure) for failure in reader.failures] == [ConnectionRefusedError]
+
+
+class _NotingLoop(asyncio.SelectorEventLoop):
+    """Notes the sockets that are to be read after those of clients."""
+
+    def __init__(self) -> None:
+        self.last: set[int] = set()
+        """Their ports."""
+        super().__init__()
+
+    def read_after_clients(self, sock: OpenSocket) -> None:
+        with socket.socket(fileno=socket.dup(sock.fileno())) as copy:
+            self.last.add(copy.getsockname()[1])
+
+
+def test_connections_to_a_drone_are_read_after_those_of_clients() -> None:
+    """Those of ARSDK and RTSP, and of the drone's web server."""
+    loop = _NotingLoop()
+    peers: list[int] = []
+
+    async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        peers.append(writer.get_extra_info("peername")[1])
+        await reader.readuntil(b"\r\n\r\n")
+        writer.write(b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\nConnection: close\r\n\r\n{}")
+        writer.close()
+
+    async def talk() -> None:
+        server = await asyncio.start_server(serve, "127.0.0.1", 0)
+        port = server.sockets[0].getsockname()[1]
+        reader, writer = await open_connection("127.0.0.1", port)
+        writer.write(b"\r\n\r\n")
+        await reader.read()
+        writer.close()
+        rest = Rest("127.0.0.1", port)
+        assert await rest.json("GET", "/media") == {}
+        await rest.close()
+        server.close()
+
+    try:
+        loop.run_until_complete(talk())
+        assert len(peers) == 2
+        # That of the web server has no port of its own yet when it is made.
+        assert loop.last == {peers[0], 0}
+    finally:
+        loop.close()

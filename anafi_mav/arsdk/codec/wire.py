@@ -238,9 +238,12 @@ def carry(id: MessageId, codec: Codec) -> None:
     _CODECS[HEADER.pack(*id)] = codec
 
 
-def value_events() -> Iterator[type[Message]]:
-    """Return the events of values declared so far, which `receive` leaves packed."""
-    return (kind for kind, _, _ in _VALUES.values())
+def value_events() -> Iterator[tuple[type[Message], int]]:
+    """Return the events of values declared so far, with the bytes of each.
+
+    `receive` leaves them packed.
+    """
+    return ((kind, size) for kind, size, _ in _VALUES.values())
 
 
 def declared_messages() -> Iterator[type[Message]]:
@@ -391,16 +394,23 @@ def decode(data: bytes) -> Message | UnknownMessage | None:
     return codec.decode(data)
 
 
-def receive(data: bytes) -> Received | None:
-    """As `decode`, but leave events of values packed."""
-    header = data[:4]
-    known = _VALUES.get(header)
-    if known is None:
-        return decode(data)
-    kind, size, has_number = known
-    if len(data) < size:
-        return None
-    return PackedMessage(kind, data[:5] if has_number else header, data)
+def receive(commands: Iterable[bytes]) -> list[Received]:
+    """Decode the messages in these command bytes, and leave events of values packed.
+
+    Those that are too short are left out, as `decode` returns None for them.
+    """
+    messages: list[Received] = []
+    for data in commands:  # one loop for all: it runs 50 000 times a second
+        header = data[:4]
+        value = _VALUES.get(header)
+        if value is None:
+            if (message := decode(data)) is not None:
+                messages.append(message)
+            continue
+        kind, size, has_number = value
+        if len(data) >= size:
+            messages.append(PackedMessage(kind, data[:5] if has_number else header, data))
+    return messages
 
 
 def unpacked(received: Received) -> Message | UnknownMessage:

@@ -194,7 +194,7 @@ class DeviceServer(Mutable):
     async def _accept(self, request: ConnectRequest, peer: str) -> ConnectReply:
         version = handshake.pick_version(request, self._versions)
         if self._closed:
-            return _refusal("closing")
+            return ConnectReply(handshake.REJECTED, 0)  # no warning: it is we who end
         if version is None:
             return _refusal(f"{peer} speaks protocol versions {request.proto_v_min} to {request.proto_v_max}")
         if request.device_id not in ("", self.info.serial):

@@ -273,7 +273,7 @@ class Transport:
         return -10 <= seq - last <= 0
 
     def _commands(self, commands: list[bytes], events: list[Event]) -> None:
-        messages = [message for message in map(wire.receive, commands) if message is not None]
+        messages = wire.receive(commands)
         if messages:
             self.counters["received"] += len(messages)
             events.append(ReceivedMessages(messages))

@@ -8,9 +8,9 @@ from typing import Any, TypeAlias
 from anafi_mav.drone import Drone, events
 from anafi_mav.drone.element import position
 from anafi_mav.drone.payload.gimbal import MAIN
-from anafi_mav.drone.values import Values
+from anafi_mav.drone.values import SIZES, Values, unpack
 from anafi_mav.drone.video.video import VideoFrame
-from anafi_mav.services.camera.pose_track import CameraPose, PoseSource, PoseTrack, SampleTrack
+from anafi_mav.services.camera.pose_track import SPACING, CameraPose, EventTrack, PoseSource, PoseTrack
 from anafi_mav.units import RAD_PER_DEG
 
 Sample: TypeAlias = tuple[float, ...]
@@ -57,32 +57,47 @@ def _height(message: events.AltitudeChanged) -> Sample:
     return (message.altitude,)
 
 
-def _place(message: events.GpsLocationChanged) -> Sample | None:
-    known = position(message.latitude, message.longitude, message.altitude)
-    return None if known is None else (known.latitude, known.longitude)
+def _track(kind: type[events.Message], sample: Callable[[Any], Sample | None], *, angles: bool = False) -> EventTrack:
+    return EventTrack(SIZES[kind], lambda data: sample(unpack(data)), angles=angles, spacing=SPACING)
 
 
-_SAMPLES: Mapping[type[events.Message], tuple[Callable[[PoseSource], SampleTrack], Callable[[Any], Sample | None]]] = {
-    events.AttitudeChanged: (lambda source: source.headings, _heading),
-    events.GimbalAttitudeChanged: (lambda source: source.gimbals, _gimbal),
-    events.SpeedChanged: (lambda source: source.velocities, _velocity),
-    events.AltitudeChanged: (lambda source: source.heights, _height),
-    events.GpsLocationChanged: (lambda source: source.places, _place),
-}
-"""Track of each kind of values, and its sample; None: it is none of the camera, or unknown."""
+class EventSamples(PoseSource):
+    """Samples of the drone's events."""
 
-SAMPLED = tuple(_SAMPLES)
-"""The kinds of values of which samples are kept."""
+    KINDS = (
+        events.AttitudeChanged,
+        events.GimbalAttitudeChanged,
+        events.SpeedChanged,
+        events.AltitudeChanged,
+        events.GpsLocationChanged,
+    )
+    """The values of which samples are kept."""
 
+    def __init__(self) -> None:
+        super().__init__(SPACING)
+        self.headings = heading = _track(events.AttitudeChanged, _heading, angles=True)
+        self.gimbals = gimbal = _track(events.GimbalAttitudeChanged, _gimbal, angles=True)
+        self.velocities = velocity = _track(events.SpeedChanged, _velocity)
+        self.heights = height = _track(events.AltitudeChanged, _height)
+        self._tracks: Mapping[type[events.Message], EventTrack] = {
+            events.AttitudeChanged: heading,
+            events.GimbalAttitudeChanged: gimbal,
+            events.SpeedChanged: velocity,
+            events.AltitudeChanged: height,
+        }
 
-def add_values(source: PoseSource, values: Values, now: float) -> None:
-    """Add what the drone's events report."""
-    for kind, packed in values.items():
-        if kind in _SAMPLES:
-            track_of, sample_of = _SAMPLES[kind]
-            track = track_of(source)
-            if track.is_due(now) and (sample := sample_of(packed.unpack())) is not None:
-                track.add(now, *sample)
+    def add(self, values: Values, now: float) -> None:
+        """Add what the drone's events report."""
+        for kind, packed in values.items():
+            if (track := self._tracks.get(kind)) is not None:
+                track.add_event(now, packed.data)
+            elif kind is events.GpsLocationChanged:
+                self._add_place(packed.unpack(), now)
+
+    def _add_place(self, message: events.GpsLocationChanged, now: float) -> None:
+        place = position(message.latitude, message.longitude, message.altitude)
+        if place is not None:  # else no place is the newest one
+            self.places.add(now, place.latitude, place.longitude)
 
 
 def add_frame(track: PoseTrack, frame: VideoFrame) -> None:

@@ -20,11 +20,10 @@ from anafi_mav import texts, units
 from anafi_mav.drone.payload.camera_state import CaptureProgress, CaptureUpdate
 from anafi_mav.drone.payload.media import MediaItem
 from anafi_mav.drone.payload.media_file import Resource
-from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError, CommandRejected
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.camera.camera_pose import SAMPLED, add_frame, add_values
+from anafi_mav.services.camera.camera_pose import EventSamples, add_frame
 from anafi_mav.services.camera.photo_log import KEY, CapturedImage, PhotoLog, renumbered
 from anafi_mav.services.camera.pose_track import CameraPose, PoseTrack
 from anafi_mav.services.camera.shot_tracker import CapturedShot, ShotTracker, named
@@ -59,7 +58,8 @@ class PhotoReporter:
         self._log = PhotoLog()
         self._generation = -1
         self._shots = ShotTracker()
-        self._track = PoseTrack()
+        self._samples = EventSamples()
+        self._track = PoseTrack(self._samples)
         self._poses: dict[float, CameraPose] = {}
         """Poses of photos whose shutter has opened, by that time."""
         self._undo: Callable[[], None] | None = None
@@ -106,10 +106,7 @@ class PhotoReporter:
 
     def value_subscriptions(self) -> ValueSubscriptions:
         """Return the handler of the values that change the camera's pose."""
-        return {self._on_pose: SAMPLED}
-
-    def _on_pose(self, values: Values, now: float) -> None:
-        add_values(self._track.events, values, now)
+        return {self._samples.add: EventSamples.KINDS}
 
     def receive(self, update: CaptureUpdate, now: float) -> None:
         """Handle an event about a photo of the active camera."""

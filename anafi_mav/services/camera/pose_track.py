@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import msgspec
 
@@ -67,20 +68,18 @@ class SampleTrack:
         self.newest = -math.inf
         """Time of the newest sample."""
 
-    def is_due(self, at: float) -> bool:
-        """Return True if a sample of this moment is kept."""
-        return at - self.newest > self._spacing
-
     def add(self, at: float, *values: float) -> None:
         """Add a sample.
 
         One that is not newer than the last by the spacing, or not finite, is left out.
         """
-        if not (self.is_due(at) and math.isfinite(sum(values))):
-            return
+        if at - self.newest > self._spacing and math.isfinite(sum(values)):
+            self._put(at, *values)
+
+    def _put(self, at: float, *row: Any) -> None:
         if not self._ring:
             self._ring = bytearray(SAMPLES * self._row.size)
-        self._row.pack_into(self._ring, self._count % SAMPLES * self._row.size, at, *values)
+        self._row.pack_into(self._ring, self._count % SAMPLES * self._row.size, at, *row)
         self._count += 1
         self.newest = at
 
@@ -90,6 +89,9 @@ class SampleTrack:
 
     def _latest_first(self) -> Iterator[tuple[float, tuple[float, ...]]]:
         """Yield time and values of each sample."""
+        return self._rows()
+
+    def _rows(self) -> Iterator[tuple[float, tuple[Any, ...]]]:
         for number in range(self._count - 1, max(self._count - SAMPLES, 0) - 1, -1):
             at, *values = self._row.unpack_from(self._ring, number % SAMPLES * self._row.size)
             yield at, tuple(values)
@@ -118,6 +120,32 @@ class SampleTrack:
             return tuple(one + share * step for one, step in zip(before[1], steps, strict=True))
         nearest = min((s for s in (before, after) if s is not None), key=lambda s: abs(s[0] - at), default=None)
         return nearest[1] if nearest is not None and abs(nearest[0] - at) <= FURTHEST else None
+
+
+class EventTrack(SampleTrack):
+    """Samples that are the bytes of events, read when a moment is looked up: photos are rare."""
+
+    def __init__(
+        self, size: int, read: Callable[[bytes], tuple[float, ...] | None], *, angles: bool = False, spacing: float
+    ) -> None:
+        """Create it empty.
+
+        `size`: bytes that are kept of an event, `read`: returns its values; None: they are unknown.
+        """
+        super().__init__(0, angles=angles, spacing=spacing)
+        self._row = struct.Struct(f"d{size}s")
+        self._read = read
+
+    def add_event(self, at: float, data: bytes) -> None:
+        """Add a sample, unless it is not newer than the last by the spacing."""
+        if at - self.newest > self._spacing:
+            self._put(at, data)
+
+    def _latest_first(self) -> Iterator[tuple[float, tuple[float, ...]]]:
+        for at, (data,) in self._rows():
+            values = self._read(data)
+            if values is not None and math.isfinite(sum(values)):
+                yield at, values
 
 
 class PoseSource:
@@ -164,8 +192,8 @@ class PoseSource:
 class PoseTrack:
     """The pose of the last seconds, from events and from pictures."""
 
-    def __init__(self) -> None:
-        self.events = PoseSource(SPACING)
+    def __init__(self, events: PoseSource | None = None) -> None:
+        self.events = events or PoseSource(SPACING)
         self.pictures = PoseSource()
 
     def clear(self) -> None:

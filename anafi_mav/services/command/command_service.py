@@ -208,7 +208,8 @@ class CommandService(Service):
         # Before it is known whether it is a retransmission: a program that repeats its Hold is to be noticed.
         counted = command.effect is not Effect.HOLD or self.host.vehicle.holds.arrive(command.client, now)
         command = replace(command, at=now, counted=counted, component=self.host.compid)
-        flies = command.group is ActionGroup.FLIGHT
+        group = command.group
+        flies = group is ActionGroup.FLIGHT
         if flies:
             ended_at = self.host.vehicle.flight_facts.landing_ended_at
             repeated = self._history.retransmission(command.client, command, now, mode, ended_at)
@@ -219,12 +220,12 @@ class CommandService(Service):
             if not (quiet and repeated == dialect.MAV_RESULT_IN_PROGRESS):
                 self._acknowledge(inbound, command.id, repeated)
             return
-        if self._all.is_full(command.group):
+        if self._all.is_full(group):
             self._acknowledge(inbound, command.id, dialect.MAV_RESULT_TEMPORARILY_REJECTED)
             self._note(inbound, command.id, dialect.MAV_RESULT_TEMPORARILY_REJECTED, "too many commands wait")
             return
         execution = self._history.begin(command.client, command) if flies else self.host.payload_history.begin(command)
-        running = RunningAction(command.client, (inbound, execution), group=command.group)
+        running = RunningAction(command.client, (inbound, execution), group=group)
         self._spawn(self._execute(inbound, execution), running, is_order=True)
 
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:

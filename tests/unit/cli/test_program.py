@@ -1,4 +1,7 @@
-"""The start of the program: the garbage collector works when a command runs, and leaves the modules alone."""
+"""The start of the program: the garbage collector works when a command runs, and leaves the modules alone.
+
+Its end: without finalization where zenoh is loaded, whose threads would abort the process.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +21,34 @@ cli.COMMANDS["probe"] = "say what the collector does"
 sys.argv = ["anafi-mav", "probe"]
 sys.exit(main())
 """
+
+END = """
+import atexit, gc, os, sys, types
+from anafi_mav import cli
+from anafi_mav.__main__ import main
+
+class Finalized:
+    def __del__(self, write=os.write):
+        write(1, b"finalized\\n")
+
+kept = Finalized()
+probe = types.ModuleType("anafi_mav.cli.probe")
+probe.add_arguments = lambda parser: None
+probe.run = lambda arguments: gc.unfreeze() or 3  # what is frozen is not finalized
+sys.modules[probe.__name__] = probe
+cli.COMMANDS["probe"] = "end"
+if sys.argv[1:]:
+    sys.modules["zenoh"] = types.ModuleType("zenoh")
+sys.argv = ["anafi-mav", "probe"]
+atexit.register(print, "ends")
+sys.exit(main())
+"""
+
+
+def test_program_with_zenoh_ends_without_finalization() -> None:
+    for words, printed in (["zenoh"], ["ends"]), ([], ["ends", "finalized"]):
+        done = subprocess.run([sys.executable, "-c", END, *words], capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stdout.splitlines(), done.stderr) == (3, printed, "")
 
 
 def test_garbage_collector_is_off_during_import_and_on_in_the_command() -> None:

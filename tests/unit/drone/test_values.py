@@ -28,7 +28,7 @@ BOUNDS = (b"\0\0\0\0", b"\xff\xff\xff\xff", b"\0\0\xc0\x7f", b"\0\0\x80\x7f", b"
 
 
 def packed(message: Message) -> PackedMessage:
-    received = wire.receive(wire.encode(message))
+    (received,) = wire.receive([wire.encode(message)])
     assert isinstance(received, PackedMessage)
     return received
 
@@ -36,7 +36,7 @@ def packed(message: Message) -> PackedMessage:
 def noise(kind: type[Message], rng: random.Random) -> PackedMessage:
     """An event of values with any bytes, of one of two cameras or gimbals if it is of one."""
     arguments = b"".join(rng.choice(BOUNDS) if rng.random() < 0.3 else rng.randbytes(4) for _ in range(16))
-    received = wire.receive(struct.pack("<BBHB", *kind.ID, rng.randrange(2)) + arguments)
+    (received,) = wire.receive([struct.pack("<BBHB", *kind.ID, rng.randrange(2)) + arguments])
     assert isinstance(received, PackedMessage)
     assert received.kind is kind
     return received
@@ -67,7 +67,7 @@ async def test_deferred_values_give_the_states_of_values_reduced_at_once() -> No
 def test_value_that_is_too_short_is_not_received(kind: type[Message]) -> None:
     whole = noise(kind, random.Random(2))
     size = next(size for size in range(64) if wire.decode(whole.data[:size]) is not None and size >= 4)
-    assert wire.receive(whole.data[: size - 1]) is None
+    assert wire.receive([whole.data[: size - 1]]) == []
     assert repr(wire.unpacked(whole)) == repr(wire.decode(whole.data[:size]))
 
 

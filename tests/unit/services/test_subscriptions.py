@@ -6,12 +6,14 @@ from collections.abc import Callable
 
 import pytest
 
+from anafi_mav.arsdk.codec import wire
 from anafi_mav.clock import SystemClock
 from anafi_mav.drone import Drone, events
 from anafi_mav.drone.events import Message
+from anafi_mav.drone.values import Values
 from anafi_mav.mavlink.node import Node
 from anafi_mav.services.system import System
-from anafi_mav.vehicle.base.subscriptions import in_order
+from anafi_mav.vehicle.base.subscriptions import ValueHandlers, in_order
 
 
 def test_handlers_of_several_tables_keep_table_order() -> None:
@@ -53,3 +55,41 @@ async def test_event_reaches_vehicle_then_services_then_change_messages(kind: ty
     system = System(Node(clock=clock), Drone("127.0.42.1"), 1, clock, 0.0, allow_kill=False)
     joined = in_order(system.subscriptions())
     assert [call.__qualname__.partition(".")[0] for call in joined.get(kind, ())] == owners.split()
+
+
+def test_handler_of_values_is_called_once_for_those_that_arrive_together() -> None:
+    called: list[str] = []
+
+    def handler(name: str) -> Callable[[Values, float], None]:
+        return lambda values, now: called.append(f"{name}: {len(values)} at {now}")
+
+    handlers = ValueHandlers(
+        [
+            {handler("vehicle"): (events.SpeedChanged, events.AttitudeChanged)},
+            {handler("speed"): (events.SpeedChanged,), handler("height"): (events.AltitudeChanged,)},
+        ]
+    )
+    for values in (
+        (events.AttitudeChanged(0.0, 0.0, 0.0), events.SpeedChanged(0.0, 0.0, 0.0)),
+        (events.AltitudeChanged(1.0),),
+    ):
+        for now in (1.5, 2.5):
+            packed = [one for one in wire.receive(map(wire.encode, values)) if isinstance(one, wire.PackedMessage)]
+            handlers.call({one.kind: one for one in packed}, now)
+    assert called == [
+        *("vehicle: 2 at 1.5", "speed: 2 at 1.5", "vehicle: 2 at 2.5", "speed: 2 at 2.5"),
+        *("height: 1 at 1.5", "height: 1 at 2.5"),
+    ]
+
+
+async def test_values_are_handled_in_the_sequence_of_services() -> None:
+    clock = SystemClock()
+    system = System(Node(clock=clock), Drone("127.0.42.1"), 1, clock, 0.0, allow_kill=False)
+    owners = [
+        handler.__qualname__.partition(".")[0]
+        for table in system.value_subscriptions()
+        for handler, kinds in table.items()
+        if events.SpeedChanged in kinds
+    ]
+    expected = "MessageService OrbitService FenceService RollSignService OffboardFlight FollowFlight HighLatencyService"
+    assert owners == [*expected.split(), "EventSamples"]

@@ -6,7 +6,12 @@ import math
 
 import pytest
 
-from anafi_mav.services.camera.pose_track import FURTHEST, SAMPLES, PoseTrack, SampleTrack
+from anafi_mav.arsdk.codec import wire
+from anafi_mav.drone import events
+from anafi_mav.drone.events import FrameOfReference, Message
+from anafi_mav.drone.values import Values
+from anafi_mav.services.camera.camera_pose import EventSamples
+from anafi_mav.services.camera.pose_track import FURTHEST, SAMPLES, SPACING, PoseTrack, SampleTrack
 
 
 def test_value_is_interpolated_between_samples() -> None:
@@ -96,3 +101,55 @@ def test_pose_is_complete_once_newer_samples_have_arrived() -> None:
     poses.events.gimbals.add(1.2, 0.0, 0.0, 0.0)
     poses.events.places.add(1.2, 48.0, 2.0)
     assert poses.is_complete(1.1)
+
+
+def reported(*messages: Message) -> Values:
+    """Return events as they arrive."""
+    packed = [one for one in wire.receive(map(wire.encode, messages)) if isinstance(one, wire.PackedMessage)]
+    assert len(packed) == len(messages)
+    return {one.kind: one for one in packed}
+
+
+def attitude_of_gimbal(id: int, yaw: float) -> Message:
+    frame = FrameOfReference.RELATIVE
+    return events.GimbalAttitudeChanged(id, frame, frame, frame, yaw, 99.0, 99.0, 99.0, -30.0, 5.0)
+
+
+def test_samples_of_events_are_read_from_their_bytes() -> None:
+    samples = EventSamples()
+    poses = PoseTrack(samples)
+    speed, height, heading = (
+        events.SpeedChanged(10.0, 0.0, 99.0),
+        events.AltitudeChanged(12.5),
+        events.AttitudeChanged(99.0, 99.0, 0.5),
+    )
+    samples.add(reported(heading, speed, height, attitude_of_gimbal(0, 20.0)), 1.0)
+    samples.add(reported(events.GpsLocationChanged(48.0, 2.0, 100.0, 1, 1, 1)), 1.0)
+    pose = poses.pose(1.0)
+    assert pose.place == pytest.approx((48.0, 2.0))
+    assert pose.height == 12.5
+    assert pose.camera == pytest.approx((math.radians(5.0), math.radians(-30.0), 0.5 + math.radians(20.0)))
+    assert poses.is_complete(1.0)
+    later = poses.pose(2.0).place
+    assert later is not None
+    assert later[0] == pytest.approx(48.0 + 10.0 / 111_200.0, abs=1e-6)
+
+
+def test_events_without_values_are_no_samples() -> None:
+    samples = EventSamples()
+    samples.add(reported(events.AltitudeChanged(12.5), attitude_of_gimbal(0, 20.0)), 1.0)
+    samples.add(reported(events.AltitudeChanged(math.nan), attitude_of_gimbal(1, 80.0)), 1.2)
+    assert samples.heights.value(1.2) == (12.5,)
+    gimbal = samples.gimbals.value(1.2)
+    assert gimbal is not None
+    assert gimbal[2] == pytest.approx(math.radians(20.0))
+    samples.add(reported(events.GpsLocationChanged(500.0, 500.0, 500.0, -1, -1, -1)), 1.2)
+    assert not PoseTrack(samples).is_complete(1.2)
+
+
+def test_events_closer_than_the_spacing_are_left_out() -> None:
+    samples = EventSamples()
+    for number in range(4):
+        samples.add(reported(events.AltitudeChanged(float(number))), 1.0 + 0.75 * SPACING * number)
+    assert samples.heights.value(1.0 + 0.75 * SPACING) == pytest.approx((1.0,))
+    assert samples.heights.newest == 1.0 + 1.5 * SPACING
