@@ -174,7 +174,7 @@ class Takeoff(PlainTask):
 
     @property
     def _airborne(self) -> OperatorText:
-        """Return the reason of a refusal while the drone does not stand on the ground, as far as it reports that."""
+        """Return the reason of a refusal while the drone does not report that it stands."""
         return texts.FLYING_STATE_UNKNOWN if self._vehicle.flying_state is None else texts.IN_AIR
 
     async def _land(self, by: By) -> None:
