@@ -16,6 +16,7 @@ from anafi_mav import texts
 from anafi_mav.clock import Alarm
 from anafi_mav.drone.events import AltitudeChanged, FlyingState, FlyingStateChanged
 from anafi_mav.errors import AnafiMavError
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import check_height
 from anafi_mav.vehicle.base.control import Control
@@ -168,8 +169,13 @@ class Takeoff(PlainTask):
             await vehicle.terminate(by)
             return
         else:
-            raise Refused(texts.DISARM, texts.IN_AIR)
+            raise Refused(texts.DISARM, self._airborne)
         self._set_disarmed()
+
+    @property
+    def _airborne(self) -> OperatorText:
+        """Return the reason of a refusal while the drone does not report that it stands."""
+        return texts.FLYING_STATE_UNKNOWN if self._vehicle.flying_state is None else texts.IN_AIR
 
     async def _land(self, by: By) -> None:
         async with self._vehicle.control.acquire(DISARM, by=by):
@@ -197,7 +203,7 @@ class Takeoff(PlainTask):
         height = vehicle.settings.takeoff_height if ato is None else ato
         check_height(vehicle, height)
         if not vehicle.on_ground:
-            raise Refused(texts.TAKEOFF, texts.IN_AIR)
+            raise Refused(texts.TAKEOFF, self._airborne)
         if problems := vehicle.prearm_problems():
             raise not_ready(problems)
         if not self.armed:

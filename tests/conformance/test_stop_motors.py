@@ -24,6 +24,7 @@ from support.mav import NAN, Client
 from support.world import ARMED, World, world
 
 from anafi_mav.arsdk.messages import ardrone3
+from anafi_mav.sim import SimulatedDrone
 from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.sim.world.quirks import Quirk
 
@@ -180,3 +181,16 @@ async def test_pause_holds_against_setpoints_of_every_client(pause: str, positio
             await standing(w)
             assert (await who.command(PAUSE, 1)).result == ACCEPTED
             await w.drone.wait_log(lambda entry: w.drone.pose.vn > 1.0, 15.0)
+
+
+async def test_refusal_without_a_flying_state_does_not_place_the_drone_in_the_air() -> None:
+    def silent(drone: SimulatedDrone) -> None:
+        drone.faults.untold = frozenset({ardrone3.FlyingStateChanged.NAME})
+
+    async with world(before=silent) as w:
+        for what, command, params in (("Takeoff", TAKEOFF_CMD, ()), ("Disarm", *DISARM[:1], DISARM[1:])):
+            mark = w.client.mark()
+            ack = await w.client.command(command, *params, x=0.0, y=0.0, z=5.0)
+            assert ack.result == REJECTED
+            text = await w.client.wait("STATUSTEXT", lambda m: "refused" in m.text, since=mark)
+            assert text.text == f"{what} refused: flying state unknown"
