@@ -210,11 +210,16 @@ class Outbox:
             for raw in frames:
                 self._write(raw)
             return
-        for raw in frames:
-            if self._size + len(raw) > self._limit and self._frames:
-                self._give()
-            self._frames.append(raw)
-            self._size += len(raw)
+        size = sum(map(len, frames))
+        if self._size + size <= self._limit:
+            self._frames += frames
+            self._size += size
+        else:
+            for raw in frames:
+                if self._size + len(raw) > self._limit and self._frames:
+                    self._give()
+                self._frames.append(raw)
+                self._size += len(raw)
         if self._due is None and not self._held:
             loop = asyncio.get_running_loop()
             is_paused = self._pause > 0.0 and loop.time() < self._next

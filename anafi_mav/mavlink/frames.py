@@ -112,8 +112,8 @@ class Batch:
         self.sysid = sysid
         self.compid = compid
         self.sender = (sysid, compid)
-        self.size = sum(len(packed.payload) + FRAME_BYTES for packed in messages)
-        """Bytes of the unsigned frames."""
+        self.size = 0
+        """Bytes of the frames that `framed` returned."""
         self._sequence = -1
         self._frames: Sequence[bytes] = ()
         """The last unsigned frames, of which the first has this sequence number."""
@@ -129,6 +129,7 @@ class Batch:
                 frame(packed, sequence + place & 0xFF, self.sysid, self.compid)
                 for place, packed in enumerate(self.messages)
             ]
+            self.size = sum(map(len, self._frames))
         return self._frames
 
 

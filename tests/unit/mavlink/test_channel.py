@@ -96,7 +96,7 @@ def test_batch_is_framed_once_for_channels_at_one_number() -> None:
     batch = Batch([pack(ATTITUDE), pack(ACK)], 1, 1)
     assert batch.framed(7) is batch.framed(7)
     assert [raw[4] for raw in batch.framed(255)] == [255, 0]
-    assert batch.size == sum(map(len, batch.framed(3)))
+    assert batch.size == sum(map(len, batch.framed(3))) == sum(len(one.payload) + FRAME_BYTES for one in batch.messages)
 
 
 def test_batch_waits_as_streams_while_the_peer_is_held() -> None:
