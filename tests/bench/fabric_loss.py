@@ -83,7 +83,7 @@ async def measure(link: str, number: int, seconds: float, tally: Tally, authorit
         if link == "tcp":
             relay = StallingRelay(node.port, delay=0.05, stall_time=1.0, stall_every=20.0)
         else:
-            relay = LossyRelay(node.other_port, seed=number)
+            relay = LossyRelay(node.other, seed=number)
         url = f"zenoh://127.0.0.1:{await relay.start()}?link={link}"
         if link == "quic":
             url += f"&ca={authority.path}"
@@ -165,7 +165,7 @@ async def declaration(seconds: float) -> None:
     lost, kept = "bench/lost", "bench/kept"
     seen: set[str] = set()
     async with router(also="udp") as node:
-        relay = LossyRelay(node.other_port, loss=0.0)
+        relay = LossyRelay(node.other, loss=0.0)
         locator = f"udp/127.0.0.1:{await relay.start()}"
         session = await asyncio.to_thread(opened, locator)
         observer = await asyncio.to_thread(opened, f"tcp/127.0.0.1:{node.port}")

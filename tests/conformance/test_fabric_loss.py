@@ -48,7 +48,7 @@ async def lossy(*, flying: bool = False) -> AsyncIterator[tuple[World, LossyRela
     It loses nothing before the station is known: a lost declaration is found after seconds (docs/fabric.md).
     """
     async with router(also="udp") as node:
-        relay = LossyRelay(node.other_port, loss=0.0, delay=DELAY)
+        relay = LossyRelay(node.other, loss=0.0, delay=DELAY)
         try:
             async with joined(f"zenoh://127.0.0.1:{await relay.start()}?link=udp", node.url, flying=flying) as w:
                 relay.loss = LOSS
@@ -177,7 +177,7 @@ async def accepted(station: FabricStation) -> None:
 async def test_lost_declaration_of_the_gateway_is_made_again(lost: bytes) -> None:
     """Its token, its subscription, and that to the tokens of stations."""
     async with router(also="udp") as node:
-        relay = LossyRelay(node.other_port, loss=0.0, delay=DELAY)
+        relay = LossyRelay(node.other, loss=0.0, delay=DELAY)
         relay.lose_next = lost
         url = f"zenoh://127.0.0.1:{await relay.start()}?link=udp"
         try:
@@ -193,7 +193,7 @@ async def test_lost_declaration_of_the_gateway_is_made_again(lost: bytes) -> Non
 
 async def test_station_whose_token_was_lost_on_the_way_to_the_gateway_is_found() -> None:
     async with router(also="udp") as node:
-        relay = LossyRelay(node.other_port, loss=0.0, delay=DELAY)
+        relay = LossyRelay(node.other, loss=0.0, delay=DELAY)
         url = f"zenoh://127.0.0.1:{await relay.start()}?link=udp"
         try:
             async with world(endpoints=(url,)) as w, ground(node.url) as port:

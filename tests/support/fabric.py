@@ -19,6 +19,7 @@ from anafi_mav.fabric.ground import FabricGround
 from anafi_mav.mavlink.endpoint import parse_endpoint
 from support.clock import only_reacts
 from support.mav import Client
+from support.world import loopback
 
 ROUTER = """
 import json, sys, zenoh
@@ -30,6 +31,9 @@ with zenoh.open(config):
     sys.stdin.read()
 """
 """The Python package as a router, until its stdin ends."""
+
+OTHER_PORT = 7447
+"""zenoh's own: outside of the ports that the system gives to sockets of other tests."""
 
 
 def free_port() -> int:
@@ -45,15 +49,15 @@ class RouterProcess:
 
     def __init__(self, port: int, settings: Mapping[str, Any], link: str, file: Path | None, also: str) -> None:
         self.port = port
-        self.other_port = free_port() if also else 0
-        """Of a second listener."""
+        self.other = (loopback(), OTHER_PORT)
+        """Address of a second listener."""
         self._file = [] if file is None else [str(file)]
         self.url = f"zenoh://127.0.0.1:{port}"
         self._settings = {
             "mode": "router",
             "listen/endpoints": [
                 f"{link}/127.0.0.1:{port}",
-                *([f"{also}/127.0.0.1:{self.other_port}"] if also else []),
+                *([f"{also}/{self.other[0]}:{self.other[1]}"] if also else []),
             ],
             "scouting/multicast/enabled": False,
             "scouting/gossip/enabled": False,
@@ -84,7 +88,7 @@ async def router(
 ) -> AsyncIterator[RouterProcess]:
     """A router for the length of a block. `settings` come after those of a configuration `file`.
 
-    `also`: another kind of zenoh's links that it listens for, at `other_port`.
+    `also`: another kind of zenoh's links that it listens for, at `other`.
     """
     held = RouterProcess(free_port(), settings or {}, link, file, also)
     await held.start()

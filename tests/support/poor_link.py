@@ -14,11 +14,11 @@ MAX_WAITING = 4096
 class LossyRelay:
     """UDP to UDP: each datagram of both directions is lost by chance, or arrives `delay` s later."""
 
-    def __init__(self, port: int, *, loss: float = 0.05, delay: float = 0.05, seed: int = 1) -> None:
+    def __init__(self, target: tuple[str, int], *, loss: float = 0.05, delay: float = 0.05, seed: int = 1) -> None:
         self.passed = self.lost = 0
         self.lose_next = b""
         """The next datagram with these bytes is lost; none: by chance only."""
-        self._to = port
+        self._to = target
         self.loss, self._delay = loss, delay
         self._chance = random.Random(seed)
         self._listener: asyncio.DatagramTransport | None = None
@@ -60,7 +60,7 @@ class LossyRelay:
             self._later(self._listener, data, client)
 
         transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
-            lambda: _Receiver(back), remote_addr=("127.0.0.1", self._to)
+            lambda: _Receiver(back), remote_addr=self._to
         )
         self._onward[client] = transport
         for data in self._opening.pop(client):

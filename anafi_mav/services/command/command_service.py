@@ -170,7 +170,10 @@ class CommandService(Service):
     ) -> asyncio.Task[None]:
         """Run an action of a message that has no acknowledgement; its refusal is sent as a text."""
         self._all.forget(client, group)  # this client used other means than its newest command
-        return self._spawn(self._explained(work), RunningAction(client, None, group), is_order=is_order)
+        task = self._spawn(self._explained(work), RunningAction(client, None, group), is_order=is_order)
+        # Cancelled before it began, `work` would complain that nothing awaited it.
+        task.add_done_callback(lambda _: work.close())
+        return task
 
     @property
     def replaced_by_order(self) -> bool:
@@ -318,8 +321,6 @@ class CommandService(Service):
             await work
         except AnafiMavError as error:
             self._explain(error)
-        finally:
-            work.close()  # cancelled before it began, it would complain that nobody awaited it
 
     def _acknowledge(self, inbound: Inbound, command: int, result: int) -> None:
         self.host.send(

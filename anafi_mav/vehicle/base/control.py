@@ -315,6 +315,8 @@ class Control:
         `is_order`: a client has commanded it; neither the gateway began it, nor a stream of setpoints.
         """
         task = asyncio.get_running_loop().create_task(self._explained(work))
+        # Cancelled before it began, `work` would complain that nothing awaited it.
+        task.add_done_callback(lambda _: work.close())
         self.actions.add(task, FlightAction(client, is_order, is_of_core=True))
         self.actions.announce(client)
         return task
@@ -332,8 +334,6 @@ class Control:
         except AnafiMavError as error:
             critical = isinstance(error, Refused) and error.critical
             self._aircraft.text(Severity.CRITICAL if critical else Severity.WARNING, text_of(error))
-        finally:
-            work.close()  # cancelled before it began, it would complain that nothing awaited it
 
     # What the drone reports.
 
