@@ -214,6 +214,18 @@ class Session(asyncio.DatagramProtocol):
                 read_waiting(self._endpoint, self._receive, self.error_received)
         finally:
             self._is_reading = False
+        self._call_after_read()
+
+    def _read_waiting(self) -> None:
+        """Read what waits in the socket."""
+        self._is_reading = True
+        try:
+            read_waiting(self._endpoint, self._receive, self.error_received)
+        finally:
+            self._is_reading = False
+        self._call_after_read()
+
+    def _call_after_read(self) -> None:
         calls, self._after_read = self._after_read, []
         for call in calls:
             try:
@@ -341,6 +353,7 @@ class Session(asyncio.DatagramProtocol):
     def _expire(self) -> None:
         self._timer = None
         self._timer_at = float("inf")
+        self._read_waiting()  # a busy event loop runs timers before it has read each socket: that is no silence
         if self.lost.done():
             return
         now = self._loop.time()

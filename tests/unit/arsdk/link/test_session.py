@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import os
 import socket
 from collections.abc import AsyncIterator, Callable
 from typing import Any
@@ -20,6 +21,7 @@ from anafi_mav.arsdk.link.handshake import DeviceInfo
 from anafi_mav.arsdk.link.session import OnMessage
 from anafi_mav.arsdk.messages import ardrone3, common
 from anafi_mav.errors import LinkLost, LocalProtocolError, RemoteProtocolError
+from support.clock import Loop
 
 HOST = "127.0.0.1"
 INFO = DeviceInfo(0x0914, "PI040416DA9H000001", 0, "ANAFI-H000001")
@@ -271,6 +273,26 @@ async def test_silent_drone_is_lost_and_resumes_when_heard() -> None:
         assert await drone.heard.next() == common.AllStates()
         await session.close()
         await again.close()
+
+
+async def test_datagrams_that_wait_are_no_silence() -> None:
+    """With 250 drones the loop runs a timer before it has read every socket."""
+    async with flying() as (_, server):
+        session = await join(server, ping_after=0.05, silence_limit=0.12)
+        never_read(session)
+        await asyncio.sleep(0.5)  # long enough for a loss
+        assert not session.lost.done()
+        await session.close()
+
+
+def never_read(session: ControllerSession) -> None:
+    """Let the event loop not look at the session's socket."""
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, Loop)
+    for fd in tuple(loop.waits.get_map()):
+        with socket.socket(fileno=os.dup(fd)) as same:
+            if same.type == socket.SOCK_DGRAM and same.getsockname() == session.address:
+                loop.waits.unregister(fd)
 
 
 async def test_datagrams_that_wait_are_not_read_one_in_each_iteration() -> None:
