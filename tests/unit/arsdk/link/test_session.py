@@ -11,6 +11,7 @@ from collections.abc import AsyncIterator, Callable
 from typing import Any
 
 import pytest
+from support.clock import Loop
 
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.link import handshake
@@ -21,7 +22,6 @@ from anafi_mav.arsdk.link.handshake import DeviceInfo
 from anafi_mav.arsdk.link.session import OnMessage
 from anafi_mav.arsdk.messages import ardrone3, common
 from anafi_mav.errors import LinkLost, LocalProtocolError, RemoteProtocolError
-from support.clock import Loop
 
 HOST = "127.0.0.1"
 INFO = DeviceInfo(0x0914, "PI040416DA9H000001", 0, "ANAFI-H000001")
