@@ -42,7 +42,7 @@ STATE_EVERY = 1.0
 FIRST_PINGS = 0.2
 """s between pings until the first is answered: a station's frames are dropped until then."""
 
-LIST_LIMIT = 5.0
+LIST_LIMIT = 15.0
 """s for a link to the router and a list of the tokens there."""
 
 REPORT_EVERY = 10.0

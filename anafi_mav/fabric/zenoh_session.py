@@ -42,6 +42,9 @@ RETRY_PAUSE = 0.5
 LIST_LIMIT = 2.0
 """s for a list of the tokens that exist."""
 
+LIST_TRIES = 3
+"""Requests of such a list: a router that lists nothing to us must not keep us off the fabric."""
+
 CHECK_FIRST, CHECK_EVERY = 1.0, 3.0
 """s until the first look at what the router knows, and between further ones."""
 
@@ -123,13 +126,22 @@ class ZenohSession:
         )
 
     def list_tokens(self, *expressions: str) -> None:
-        """Report the tokens of these keys once, and then the end of the list."""
+        """Report the tokens of these keys once, and then the end of the list.
+
+        A list that the router does not complete in time is requested again.
+        """
 
         def work(session: zenoh.Session) -> None:
-            for expression in expressions:
-                for reply in session.liveliness().get(expression, timeout=LIST_LIMIT):
-                    if reply.ok is not None:
-                        self._token(reply.ok)
+            for _ in range(LIST_TRIES):
+                is_complete = True
+                for expression in expressions:
+                    for reply in session.liveliness().get(expression, timeout=LIST_LIMIT):
+                        if reply.ok is not None:
+                            self._token(reply.ok)
+                        else:
+                            is_complete = False  # an error: "Timeout"
+                if is_complete or self._stopping.is_set():
+                    break
             self._report(TokensListed())
 
         self._queue.add_work(work)

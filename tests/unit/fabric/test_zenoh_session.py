@@ -8,7 +8,7 @@ from typing import Any
 
 import zenoh
 
-from anafi_mav.fabric.arrivals import Arrival, FabricSample, SampleQueue, StateQuery
+from anafi_mav.fabric.arrivals import Arrival, FabricSample, SampleQueue, StateQuery, TokenChange, TokensListed
 from anafi_mav.fabric.zenoh_session import MAX_QUERIES, ZenohSession
 
 
@@ -26,6 +26,15 @@ class Session:
 
     def __init__(self) -> None:
         self.callbacks: list[Any] = []
+
+        self.lists: list[list[Any]] = []
+        """Replies to requests for tokens, in turn."""
+
+    def liveliness(self) -> Session:
+        return self
+
+    def get(self, expression: str, timeout: float) -> list[Any]:
+        return self.lists.pop(0)
 
     def declare_queryable(self, expression: str, callback: Any) -> None:
         self.callbacks.append(callback)
@@ -90,3 +99,21 @@ def test_content_of_oversized_samples_is_not_copied() -> None:
         FabricSample("up", b"", b""),
         FabricSample("up", bytes(12), b""),
     ]
+
+
+def test_list_of_tokens_that_the_router_has_not_completed_is_requested_again() -> None:
+    """zenoh's reply is an error "Timeout" then: an id would count as free that another gateway holds."""
+    reported: list[Arrival] = []
+    queue, zenohs = SampleQueue(8, Counter()), Session()
+    session = ZenohSession({}, queue, lambda arrival: reported.append(arrival) is None, retries=False)
+    late = SimpleNamespace(ok=None)
+    held = SimpleNamespace(ok=SimpleNamespace(key_expr="1/drone", kind=zenoh.SampleKind.PUT))
+    zenohs.lists = [[late], [held]]
+    session.list_tokens("*/drone")
+    perform(queue, zenohs)
+    assert reported == [TokenChange("1/drone", True), TokensListed()]
+
+    zenohs.lists = [[late]] * 3
+    session.list_tokens("*/drone")
+    perform(queue, zenohs)  # and with one that never answers it ends
+    assert (zenohs.lists, reported[2:]) == ([], [TokensListed()])
