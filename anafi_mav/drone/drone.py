@@ -832,6 +832,8 @@ class Drone:
         values: dict[type[Message], PackedMessage] = {}
         deferrable = self._deferrable()
         for message in messages:
+            if session.lost.done():
+                return
             # Not by isinstance, which takes as long for these classes as a reducer.
             if type(message) is PackedMessage:
                 kind = message.kind
@@ -847,15 +849,13 @@ class Drone:
             elif values:
                 self._report(values, now)
                 values = {}
-            if session.lost.done():
-                return
             unpacked = wire.unpacked(message)
             try:
                 self._handle(unpacked, now)
             except Exception as error:
                 session.report(error, unpacked)
             deferrable = self._deferrable()
-        if values:
+        if values and not session.lost.done():
             self._report(values, now)
 
     def _deferrable(self) -> Mapping[type[Message], Sequence[Element[Any]]]:

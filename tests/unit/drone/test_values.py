@@ -159,6 +159,18 @@ async def test_values_of_a_frame_are_reported_together_until_one_is_repeated(
     assert journal.lines == [("AttitudeChanged", "SpeedChanged", 0.5), ("AttitudeChanged", "ZoomLevel", 0.25)]
 
 
+async def test_values_behind_the_end_of_a_session_are_not_received(drone: Drone, device: ScriptedDevice) -> None:
+    """A Skycontroller that loses its drone ends the session while a frame is handled."""
+    journal, session = Journal(drone), drone._session
+    assert session is not None
+    drone.subscribe(lambda message, now: session.end("test"), without=VALUES - {ardrone3.SpeedChanged})
+    device.say(SPEED, ATTITUDE, ZOOM)
+    await asyncio.wait_for(asyncio.shield(session.lost), 3.0)
+    await asyncio.sleep(0)  # to the end of the frame
+    assert journal.lines == []
+    assert drone.piloting.state.attitude is None
+
+
 async def test_subscriber_gets_each_value_after_those_before_it_are_reported(
     drone: Drone, device: ScriptedDevice
 ) -> None:
