@@ -47,7 +47,7 @@ class _Stream:
         if self.pace is not None:
             interval *= self.pace.slowdown
         late = now - self.next
-        # After a silence the grid begins anew; half an interval early, so that the next update may jitter.
+        # After a silence the grid begins again; half an interval early, so that the next update may jitter.
         self.next = self.next + interval if late <= interval else now + (interval if is_repeated else interval / 2)
 
     def part(self, users: int) -> _Stream:

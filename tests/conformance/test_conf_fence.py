@@ -222,20 +222,27 @@ async def test_conf_076_a_breach_is_acted_upon_once(flavour: str, action: str, c
             assert north[-1] < max(north) - 1.0
 
 
+@asynccontextmanager
+async def breached(w: World, flavour: str, action: str) -> AsyncIterator[int]:
+    """Fly out of a fence whose action the drone answers late; the client's mark of before, and setpoints that go on."""
+    assert (await upload(w.client, square(PLACE, 12.0), FENCE)).type == TAKEN
+    await put(w, ACTION[flavour], NUMBER[flavour][action])
+    await put(w, "ANF_FENCE_AHEAD", 0, 6)
+    await w.take_off()
+    mark = w.client.mark()
+    async with flown(w):
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 9.0, 15.0)
+        w.drone.faults.down = Impairment(delay=0.5)
+        await w.client.wait("STATUSTEXT", lambda m: " m beyond " in m.text, since=mark, timeout=15.0)
+        yield mark
+
+
 @both
 @pytest.mark.parametrize("action", ["return", "land"])
 async def test_conf_076_fence_action_ended_by_a_client_allows_flight(flavour: str, action: str) -> None:
     """A Hold that arrives before the drone has answered the return or landing of a breach ends it for good."""
     async with world(flavour=flavour, also="px4", speed=1.0) as w:
-        assert (await upload(w.client, square(PLACE, 12.0), FENCE)).type == TAKEN
-        await put(w, ACTION[flavour], NUMBER[flavour][action])
-        await put(w, "ANF_FENCE_AHEAD", 0, 6)
-        await w.take_off()
-        mark = w.client.mark()
-        async with flown(w):
-            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 9.0, 15.0)
-            w.drone.faults.down = Impairment(delay=0.5)  # the answer comes late
-            await w.client.wait("STATUSTEXT", lambda m: " m beyond " in m.text, since=mark, timeout=15.0)
+        async with breached(w, flavour, action) as mark:
             hold = (1, BRAKE) if flavour == "ardupilot" else (1, 4, 3)
             ack = await w.client.command(dialect.MAV_CMD_DO_SET_MODE, *hold, timeout=10.0)
             assert ack.result == ACCEPTED
@@ -255,15 +262,7 @@ async def test_conf_076_fence_action_ended_by_a_client_allows_flight(flavour: st
 async def test_conf_076_breach_after_an_action_that_a_client_has_ended_is_acted_upon() -> None:
     """A Hold ends the return of the first breach; flown back inside and out again, the drone returns."""
     async with world(also="px4", speed=1.0) as w:
-        assert (await upload(w.client, square(PLACE, 12.0), FENCE)).type == TAKEN
-        await put(w, ACTION["px4"], NUMBER["px4"]["return"])
-        await put(w, "ANF_FENCE_AHEAD", 0, 6)
-        await w.take_off()
-        mark = w.client.mark()
-        async with flown(w):
-            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 9.0, 15.0)
-            w.drone.faults.down = Impairment(delay=0.5)  # the answer comes late
-            await w.client.wait("STATUSTEXT", lambda m: " m beyond " in m.text, since=mark, timeout=15.0)
+        async with breached(w, "px4", "return"):
             assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 3, timeout=10.0)).result == ACCEPTED
             w.drone.faults.down = CLEAR
         mark = w.client.mark()

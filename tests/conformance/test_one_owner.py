@@ -55,9 +55,10 @@ async def test_action_that_ignores_its_end_sends_nothing_that_collides_with_a_ho
     """In the wait of a Hold it may stop what it has begun; after that wait it sends nothing at all."""
     async with world(speed=1.0) as w:
         await w.take_off(UP)
-        vehicle, refused = w.gateway.systems[0].vehicle, []
+        vehicle, refused, begun = w.gateway.systems[0].vehicle, [], asyncio.Event()
 
         async def stubborn() -> None:
+            begun.set()
             with contextlib.suppress(asyncio.CancelledError):
                 await asyncio.sleep(60.0)
             await asyncio.sleep(late)
@@ -68,7 +69,7 @@ async def test_action_that_ignores_its_end_sends_nothing_that_collides_with_a_ho
                 refused.append(verb)
 
         action = vehicle.control.run(None, stubborn())
-        await asyncio.sleep(0.1)
+        await begun.wait()
         began = asyncio.get_running_loop().time()
         assert (await w.client.command(SET_MODE, 1, 4, 3)).result == ACCEPTED
         await asyncio.wait({action})
