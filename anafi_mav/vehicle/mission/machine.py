@@ -349,7 +349,9 @@ class MissionMachine:
 
     def is_at(self, item: int) -> bool:
         """Return True while this item is flown, with all turns of every loop to come."""
-        return self.state in (S.FLYING_FILE, S.FLYING_ITEM) and self.progress.current == item and not self.progress.jumps
+        return (
+            self.state in (S.FLYING_FILE, S.FLYING_ITEM) and self.progress.current == item and not self.progress.jumps
+        )
 
     @property
     def ending(self) -> bool:
