@@ -59,6 +59,10 @@ class Quirk(enum.Enum):
         "ramping-ignores-landing",
         "Landing and UserTakeOff(0) do nothing while the motors ramp up",
     )
+    RETURN_ENDS_ABOVE_HOME = (
+        "return-ends-above-home",
+        "the height at the end of a return counts from that of the home, not from the take-off",
+    )
     NO_FLIGHT_ID = ("no-flight-id", "FlightId is never reported")
     GPS_LOCATION_STOPS = ("gps-location-stops", "GpsLocationChanged is no longer sent although the drone reports a fix")
     UPLOAD_REFUSED_WHILE_PAUSED = (
