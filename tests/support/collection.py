@@ -10,6 +10,7 @@ import os
 from collections.abc import Generator
 
 import pytest
+
 from support.order import WORKERS
 
 WORKER = "PYTEST_XDIST_WORKER"
