@@ -1,6 +1,6 @@
 """Guided flight by single commands: speed, height, heading, pause, home.
 
-What goes to a place is `actions.reposition`; what circles is `orbit_service`. A handler returns when the drone
+What goes to a place is `flight_service`; what circles is `orbit_service`. A handler returns when the drone
 confirmed. Regions of interest are in `services.gimbal`. Conformance A4, B1, B2, D1 and items 78-83, 143.
 """
 
