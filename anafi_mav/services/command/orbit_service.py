@@ -7,7 +7,6 @@ held from here, and whatever ends the gateway ends them. Conformance A4, B1 and 
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -17,7 +16,6 @@ from anafi_mav import geo, texts, units
 from anafi_mav.drone import events
 from anafi_mav.drone.piloting.moves import Move, MoveEnd
 from anafi_mav.drone.values import Values
-from anafi_mav.errors import LinkLost
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.command_targets import height, place
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
@@ -114,8 +112,7 @@ class OrbitService(Service, PlainTask):
         if orbit is None:
             return []
         orbit.is_over = True
-        with contextlib.suppress(LinkLost):
-            self.host.drone.piloting.pilot(None)
+        self.host.vehicle.centre_sticks()
         if orbit.approach is None or orbit.approach is asyncio.current_task():
             return []
         orbit.approach.cancel()
@@ -262,8 +259,7 @@ class OrbitService(Service, PlainTask):
 
     def _stop(self, why: OperatorText, severity: Severity) -> None:
         self.host.vehicle.control.release(self)
-        with contextlib.suppress(LinkLost):
-            self.host.drone.piloting.hover()
+        self.host.vehicle.hover()
         self.host.text(severity, texts.TASK_ENDED.fill(what=texts.ORBIT, reason=why))
 
     def _status(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:

@@ -9,6 +9,7 @@ of them needs to know the others.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from anafi_mav import texts
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import FlyingState, PilotingStyleStyle
+from anafi_mav.errors import LinkLost
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.control import Control
 from anafi_mav.vehicle.base.flight_task import Needs
@@ -26,6 +28,7 @@ from anafi_mav.vehicle.base.geo_point import GeoPoint, point_of
 from anafi_mav.vehicle.base.height import HeightReference
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.move_heading import MoveHeading
+from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import By
 from anafi_mav.vehicle.base.roll_sign import RollCheck, RollSign
 from anafi_mav.vehicle.base.severity import Severity
@@ -223,6 +226,11 @@ class Aircraft(ABC):
             problems.append(problem)
         return problems
 
+    def require_ready(self) -> None:
+        """Raise `Refused` with the reasons why the drone would not take off."""
+        if problems := self.prearm_problems():
+            raise Refused(texts.ARMING, texts.joined(problems), form=texts.PREARM)
+
     @property
     def fence_problem(self) -> OperatorText | None:
         """The reason why the fence keeps the drone on the ground, in a sentence; None without one."""
@@ -233,7 +241,19 @@ class Aircraft(ABC):
                 return error.reason
         return None
 
-    # What everybody who flies it needs. Each verb returns when the drone confirmed, or raises.
+    # What everybody who flies it needs.
+
+    def centre_sticks(self) -> None:
+        """Centre the sticks; without a link none are held."""
+        with contextlib.suppress(LinkLost):
+            self.drone.piloting.pilot(None)
+
+    def hover(self) -> None:
+        """End every motion of ours; without a link the drone does that by itself."""
+        with contextlib.suppress(LinkLost):
+            self.drone.piloting.hover()
+
+    # Each verb returns when the drone confirmed, or raises.
 
     @abstractmethod
     async def hold(self, mode: FlightMode, by: By) -> None:
