@@ -31,6 +31,7 @@ from support.fault_scenarios import (
 from support.mav import NAN
 from support.missions import put, takeoff, way
 from support.params import send_set, write
+from support.plans import clear
 from support.setpoints import VELOCITY_ONLY, heard, local, motion, said, streaming, texts
 from support.world import HOME, World, world
 
@@ -171,6 +172,19 @@ async def test_mission_start_whose_arming_lapses_in_the_wait_is_refused() -> Non
         await watched(4.0)
         assert flown(w, began) == []
         assert w.drone.pose.up < 0.1
+
+
+async def test_mission_mode_on_the_ground_whose_mission_is_deleted_in_its_wait_is_not_entered() -> None:
+    async with world(speed=1.0) as w:
+        await put(w, [takeoff(6.0), way(20.0, 0.0, 6.0)])
+        await home_being_undone(w)
+        mark = w.client.mark()
+        w.client.send_command(START)  # disarmed: it would wait for arming
+        await watched(0.5)
+        assert (await clear(w.client, dialect.MAV_MISSION_TYPE_MISSION)).type == dialect.MAV_MISSION_ACCEPTED
+        assert (START, REJECTED) in await until(w.client, mark, 2)
+        await watched(2.0)
+        assert (await w.client.heartbeat(lambda beat: True)).custom_mode == w.modes.idle
 
 
 # What acquires control, and what happens in its wait.
