@@ -157,6 +157,30 @@ async def test_takeoff_command_whose_landing_has_ended_on_the_ground_is_refused(
         assert w.drone.pose.up < 0.1
 
 
+async def test_takeoff_whose_arming_lapses_in_the_wait_is_refused() -> None:
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        await watched(AUTO_DISARM - 2.0)
+        await home_being_undone(w)
+        mark, began = w.client.mark(), now()
+        w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
+        assert (TAKEOFF_CMD, REJECTED) in await until(w.client, mark, 2)
+        await watched(4.0)
+        assert heard(w, "TakeOff", since=began) == []
+
+
+async def test_takeoff_whose_client_arms_in_the_wait_is_flown() -> None:
+    async with world(speed=1.0) as w:
+        await home_being_undone(w)
+        mark = w.client.mark()
+        w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
+        await watched(0.5)
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        assert (TAKEOFF_CMD, ACCEPTED) in await until(w.client, mark, 3)
+        await w.at_height(5.0)
+        assert "not armed" not in " ".join(m.text for _, m in w.client.since(mark, "STATUSTEXT"))
+
+
 # A mission.
 
 
