@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 
 from anafi_mav import texts
@@ -203,6 +203,9 @@ class Vehicle(Aircraft):
     @property
     def armed(self) -> bool:
         return self.takeoff.armed or (self.flying_state is not None and not self.on_ground)
+
+    def is_armed_by(self, client: Hashable) -> bool:
+        return self.takeoff.is_armed_by(client)
 
     @property
     def origin(self) -> GeoPoint | None:

@@ -198,6 +198,21 @@ async def test_mission_start_whose_arming_lapses_in_the_wait_is_refused() -> Non
         assert w.drone.pose.up < 0.1
 
 
+@pytest.mark.parametrize("own", [True, False])
+async def test_mission_start_whose_client_arms_in_the_wait_is_flown(own: bool) -> None:
+    """The arming of another client starts no motor."""
+    async with world(speed=1.0, web=True, clients=2) as w:
+        await put(w, [takeoff(6.0), way(20.0, 0.0, 6.0)])
+        await home_being_undone(w)
+        mark, began = w.client.mark(), now()
+        w.client.send_command(START)
+        await watched(0.5)
+        assert (await w.clients[0 if own else 1].command(ARM, 1)).result == ACCEPTED
+        assert (START, ACCEPTED) in await until(w.client, mark, 3 if own else 2)
+        await watched(8.0)
+        assert bool(flown(w, began)) is own
+
+
 async def test_mission_mode_on_the_ground_whose_mission_is_deleted_in_its_wait_is_not_entered() -> None:
     async with world(speed=1.0) as w:
         await put(w, [takeoff(6.0), way(20.0, 0.0, 6.0)])

@@ -137,6 +137,8 @@ class MissionFlight(PlainTask):
             if machine.state is not State.AWAIT_ARM:  # the mission was deleted in the wait
                 raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
         self._handle(effects)
+        if vehicle.is_armed_by(by.client):  # since it requested this
+            self.armed(by.client)
 
     async def choose(self, by: Right, item: int) -> None:
         """Make an item the current one; a mission that is flown, or about to be, continues there."""
