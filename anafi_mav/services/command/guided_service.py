@@ -20,7 +20,7 @@ from anafi_mav.services.command_targets import UnsupportedFrame, height, height_
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
-from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST, check_height, check_on_earth
+from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST, check_height, check_on_earth, home_height
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
@@ -265,7 +265,8 @@ class GuidedService(Service):
             before = home.state.preferred_type
             try:
                 await home.set_preferred_type(RthHomeType.CUSTOM)
-                given = await home.set_custom_location(where.latitude, where.longitude, ato)
+                at = home_height(vehicle, ato)
+                given = await home.set_custom_location(where.latitude, where.longitude, at)
             except BaseException:
                 # The custom home of some other day must not stay: a return that replaces this waits until it is gone.
                 if before is not None and before != RthHomeType.CUSTOM:

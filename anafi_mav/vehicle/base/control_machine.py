@@ -292,7 +292,8 @@ def _resume(now: Situation[TaskT], about: Input[TaskT]) -> Step[TaskT]:
 
 
 def _descend(now: Situation[TaskT], about: Input[TaskT]) -> Step[TaskT]:
-    after = replace(now, act=about.act or now.act or DroneAct.LANDING, task=None, successor=None)
+    # The hovering mode ends too: a stream that was flown in it would fly the drone away from home, or off again.
+    after = replace(now, act=about.act or now.act or DroneAct.LANDING, task=None, below=None, successor=None)
     return Step(after, _those(now.task, now.below, now.successor))
 
 

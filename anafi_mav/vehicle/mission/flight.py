@@ -141,12 +141,18 @@ class MissionFlight(PlainTask):
             self.armed(by.client)
 
     async def choose(self, by: Right, item: int) -> None:
-        """Make an item the current one; a mission that is flown, or about to be, continues there."""
+        """Make an item the current one; a mission that is flown, or about to be, continues there.
+
+        Without effect on the item that is flown: clients repeat the request, and each start stops the drone first.
+        """
         await self.storing.over()
         if not self.there:
             raise Refused(texts.CURRENT_ITEM, texts.NO_MISSION)
         if not 0 <= item < len(self.machine.mission.items):
             raise Refused(texts.CURRENT_ITEM, texts.NO_SUCH_ITEM.fill(number=item + FIRST_LABEL), lasting=True)
+        if self.machine.is_at(item):
+            self.outlet.mission_changed()  # the answer to a message
+            return
         if self.machine.flying or self.machine.state in (State.PREPARING, State.TAKING_OVER, State.STARTING):
             await self.engage(by, item)
         else:

@@ -332,6 +332,12 @@ class MissionMachine:
         """The item that a start begins with: the current one, and the first again after the end."""
         return 0 if self.rest is S.COMPLETE else self.progress.current
 
+    def is_at(self, item: int) -> bool:
+        """Return True while this item is flown, with all turns of every loop to come."""
+        return (
+            self.state in (S.FLYING_FILE, S.FLYING_ITEM) and self.progress.current == item and not self.progress.jumps
+        )
+
     @property
     def ending(self) -> bool:
         """The drone flies to the item that lands or returns: that it does so is no surprise."""
