@@ -68,7 +68,7 @@ def check_height(vehicle: Aircraft, ato: float) -> None:
 
 
 def check_limits(vehicle: Aircraft, ato: float) -> None:
-    """Raise `Refused` for a height (m above take-off) above the drone's ceiling or below the fence's floor."""
+    """Raise `Refused` for a height (m above take-off) above the ceiling or below the fence."""
     ceiling = vehicle.drone.piloting.state.max_altitude
     if ceiling is not None and ato > ceiling.current:
         raise Refused(
