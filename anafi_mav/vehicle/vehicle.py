@@ -37,7 +37,7 @@ from anafi_mav.drone.events import (
 from anafi_mav.errors import CommandRejected
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.aborted_return import AbortedReturn
-from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.aircraft import Aircraft, CommandedSpeeds
 from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.control_machine import DroneAct, State
 from anafi_mav.vehicle.base.flight_task import LAND, MOTOR_CUT, FlightTask, Hover
@@ -665,6 +665,7 @@ class Vehicle(Aircraft):
         takeoff = self.drone.home.state.takeoff_location
         self._note_landing(before)
         if state in ON_GROUND and before is not None:
+            self.commanded_speeds = CommandedSpeeds()
             self.return_end.on_ground()
             self.takeoff.came_down()
             self.control.on_ground()
@@ -739,7 +740,7 @@ class Vehicle(Aircraft):
         """
         self.height.recall(kept)
         if self.on_ground:  # maybe another aircraft, or carried elsewhere
-            self.flight_facts = FlightFacts()
+            self.flight_facts, self.commanded_speeds = FlightFacts(), CommandedSpeeds()
         self.on_flying_state()
         self.on_location()  # the one that it has reported counts for as long as a new one
         if self.flying_state is not None and not self.on_ground:

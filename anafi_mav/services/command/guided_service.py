@@ -150,8 +150,9 @@ class GuidedService(Service):
         A move that is under way changes its speed at once. A mission, a return and a landing are flown at a speed of
         the drone's own, so it is refused there (ArduCopter: FAILED in modes without a speed).
 
-        Unset and -1 change nothing, -2 restores the drone's own speed. The drone itself limits a value above its
-        maximum. An ANAFI measures no airspeed: both horizontal types are over ground.
+        Unset and -1 change nothing, -2 restores the speed of the parameter (ANF_CRUISE_SPEED, ANF_CLIMB_SPEED), and so
+        does the landing. The drone itself limits a value above its maximum. An ANAFI measures no airspeed: both
+        horizontal types are over ground.
         """
         kind, speed, throttle = command.params[:3]
         if not (math.isnan(throttle) or throttle in (0.0, KEEP, DEFAULT)):
@@ -165,13 +166,13 @@ class GuidedService(Service):
         if speed != DEFAULT and not SLOWEST <= speed <= FASTEST:
             raise Refused(texts.SPEED, texts.PARAM2_SPEED.fill(slowest=SLOWEST, fastest=FASTEST), lasting=True)
         wanted = None if speed == DEFAULT else speed
-        vehicle, settings = self.host.vehicle, self.host.vehicle.settings
+        vehicle = self.host.vehicle
         if vehicle.mode in _OWN_SPEED:
             raise Refused(texts.SPEED, texts.FIXED_IN_MODE.fill(mode=vehicle.mode.value))
         if kind in (_AIRSPEED, _GROUNDSPEED):
-            vehicle.settings = replace(settings, cruise_speed=wanted)
+            vehicle.commanded_speeds = replace(vehicle.commanded_speeds, cruise=wanted)
         else:
-            vehicle.settings = replace(settings, climb_speed=wanted)
+            vehicle.commanded_speeds = replace(vehicle.commanded_speeds, climb=wanted)
         if (goto := vehicle.guided.goto) is not None:
             await vehicle.guided.go(goto, by=command.right)
 
