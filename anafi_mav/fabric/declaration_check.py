@@ -67,7 +67,7 @@ class AgreedLooks:
 
 
 class KnownKeys(NamedTuple):
-    """What a session has declared and heard."""
+    """The keys that a session has declared and heard."""
 
     own: Collection[str]
     """Liveliness tokens."""
@@ -80,10 +80,13 @@ class KnownKeys(NamedTuple):
 
 
 class DeclarationCheck:
-    """One look at the router, compared with what a session knows. `look` once; then read the rest."""
+    """One look at the router, compared with the keys that a session knows. `look` once."""
 
     def __init__(self, settings: Mapping[str, Any], watched: Collection[str], published: Collection[str]) -> None:
-        """`watched`: expressions of the tokens that the session watches. `published`: keys whose readers it follows."""
+        """Create it, before its look.
+
+        `watched`: expressions of the tokens that the session watches. `published`: keys whose readers it follows.
+        """
         self._settings = settings
         self._watched = watched
         self._published = published
