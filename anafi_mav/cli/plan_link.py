@@ -17,7 +17,19 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.plan_client import Download, Outcome, Upload
 from anafi_mav.plans.formats.lists import fence_items, points_of, rally_items, zones_of
-from anafi_mav.plans.plan import GLOBAL, WAYPOINT, Item, Plan, Point, counted, shifted
+from anafi_mav.plans.plan import (
+    GLOBAL,
+    HEADED,
+    NORTH,
+    WAYPOINT,
+    Item,
+    Plan,
+    Point,
+    counted,
+    shifted,
+    with_heading,
+    without_zero_heading,
+)
 from anafi_mav.services.memory import NOT_KEPT
 from anafi_mav.services.plan.item_messages import item_int, item_of
 from anafi_mav.services.plan.mission_items import from_wire, to_wire
@@ -69,25 +81,15 @@ class Lists:
         return carried
 
 
-_HEADED = (dialect.MAV_CMD_NAV_WAYPOINT, dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_NAV_LAND)
-
-
 def _without_none(item: Item) -> Item:
-    """Replace parameters that are not set by 0, as ArduPilot requires.
+    """Replace parameters that are not set by 0, as ArduPilot requires, and heading 0 by 360.
 
     It refuses NaN (AP_Mission.cpp sanity_check_params).
     """
+    if item.command in HEADED and item.params[3] == 0.0:
+        item = with_heading(item, NORTH)
     one, two, three, four, five, six, seven = (0.0 if value is None else value for value in item.params)
     return replace(item, params=(one, two, three, four, five, six, seven))
-
-
-def _without_heading(item: Item) -> Item:
-    """Its 0 is no heading north: it knows none in a waypoint, a take-off or a landing."""
-    one, two, three, four, *place = item.params
-    if item.command not in _HEADED or four != 0.0:
-        return item
-    five, six, seven = place
-    return replace(item, params=(one, two, three, None, five, six, seven))
 
 
 def upload(arguments: argparse.Namespace) -> int:
@@ -208,7 +210,7 @@ async def take(ground: Ground) -> Plan:
         latitude, longitude, height = first.params[4:]
         if latitude and longitude:
             home = Point(latitude, longitude, height or 0.0)
-        items = [_without_heading(shifted(item, -1)) for item in items]
+        items = [without_zero_heading(shifted(item, -1)) for item in items]
     zones, back = zones_of(await _take_list(ground, FENCE), f"{source}: fence")
     rally = points_of(await _take_list(ground, RALLY), f"{source}: rally points")
     return Plan(tuple(items), home, zones, back, rally)

@@ -14,6 +14,20 @@ from anafi_mav import mav_enums
 WAYPOINT = mav_enums.MAV_CMD_NAV_WAYPOINT
 DO_JUMP = mav_enums.MAV_CMD_DO_JUMP
 
+HEADED = frozenset(
+    {
+        mav_enums.MAV_CMD_NAV_WAYPOINT,
+        mav_enums.MAV_CMD_NAV_LOITER_UNLIM,
+        mav_enums.MAV_CMD_NAV_LOITER_TIME,
+        mav_enums.MAV_CMD_NAV_LAND,
+        mav_enums.MAV_CMD_NAV_TAKEOFF,
+    }
+)
+"""Items whose param4 is a heading (deg from north, None: not set). ArduPilot's clients send 0 for "not set"."""
+
+NORTH = 360.0
+"""Heading north (deg) where 0 means "not set"."""
+
 GLOBAL, MISSION, RELATIVE, GLOBAL_INT, RELATIVE_INT, TERRAIN, TERRAIN_INT = (
     mav_enums.MAV_FRAME_GLOBAL,
     mav_enums.MAV_FRAME_MISSION,
@@ -141,6 +155,20 @@ def shifted(item: Item, by: int) -> Item:
     if item.command != DO_JUMP or target is None:
         return item
     return replace(item, params=(target + by, two, three, four, five, six, seven))
+
+
+def with_heading(item: Item, heading: float | None) -> Item:
+    """Return the item with another param4."""
+    one, two, three, _, five, six, seven = item.params
+    return replace(item, params=(one, two, three, heading, five, six, seven))
+
+
+def without_zero_heading(item: Item) -> Item:
+    """Return the item of a list in which a heading of 0 means "not set", and `NORTH` is north."""
+    heading = item.params[3]
+    if item.command not in HEADED or heading not in (0.0, NORTH):
+        return item
+    return with_heading(item, None if heading == 0.0 else 0.0)
 
 
 def counted(number: int, what: str) -> str:

@@ -179,15 +179,15 @@ class GuidedFlight:
 
     async def move(self, goto: Goto) -> None:
         """Let the drone begin the move of the active task; no await before the moveTo."""
-        vehicle, settings = self._vehicle, self._vehicle.settings
-        orientation, heading = oriented(settings.move_heading, vehicle.place, goto.place, goto.yaw)
+        vehicle = self._vehicle
+        orientation, heading = oriented(vehicle.settings.move_heading, vehicle.place, goto.place, goto.yaw)
         await vehicle.drone.piloting.move_to(
             goto.place.latitude,
             goto.place.longitude,
             goto.ato,
             heading_deg=heading,
-            horizontal_speed=settings.cruise_speed if goto.speed is None else goto.speed,
-            vertical_speed=settings.climb_speed,
+            horizontal_speed=vehicle.cruise_speed if goto.speed is None else goto.speed,
+            vertical_speed=vehicle.climb_speed,
             orientation=orientation,
         )
         if (move := vehicle.drone.piloting.move) is not None:

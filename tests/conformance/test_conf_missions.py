@@ -26,6 +26,7 @@ from support.missions import (
     first,
     flown,
     mode,
+    on_the_way,
     put,
     reached,
     said,
@@ -369,6 +370,24 @@ async def test_conf_072_the_current_item(flavour: str) -> None:
         await state(w, ACTIVE, seq=3, since=mark)
         await state(w, COMPLETE, since=mark)
         assert reached(w) == [3, 4], "what was not flown is not reached"
+
+
+@both
+async def test_conf_072_repeated_set_current_starts_the_file_once(flavour: str) -> None:
+    """MAVSDK repeats MISSION_SET_CURRENT every 0.5 s: neither a start under way nor a flown item begins again."""
+    async with world(flavour=flavour, web=True) as w:
+        await on_the_way(w, 1)
+        chosen = dialect.MAVLink_mission_set_current_message(1, 1, 2 + first(w))
+        mark, before = w.client.mark(), len(w.commands("common.Mavlink.Start"))
+        w.client.send(chosen)
+        w.client.send(chosen)  # while the drone pauses the first file
+        await state(w, ACTIVE, seq=2, since=mark)
+        for _ in range(3):  # while it flies the second one; each is answered before the next regular message
+            mark = w.client.mark()
+            w.client.send(chosen)
+            await state(w, ACTIVE, seq=2, since=mark, timeout=0.2)
+        await state(w, COMPLETE, since=mark)
+        assert len(w.commands("common.Mavlink.Start")) == before + 1
 
 
 @both

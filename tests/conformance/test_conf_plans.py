@@ -506,6 +506,21 @@ async def test_conf_069_home_is_item_0_to_ardupilots_clients_alone() -> None:
         assert [content(item)[6] for item in await download(copter, MISSION)] == [i.content[6] for i in plan[:3]]
 
 
+async def test_conf_069_heading_north_survives_an_ardupilot_client() -> None:
+    """0 is north to PX4's clients and no heading to ArduPilot's, for whom north is 360."""
+    north = Item(dialect.MAV_CMD_NAV_WAYPOINT, *PLACE, z=20.0, p4=0.0, frame=3)
+    async with world(flavour="ardupilot", also="px4") as w:
+        copter, px4 = w.client, await w.connect(port=5761)
+        assert (await upload(px4, [north], MISSION)).type == ACCEPTED
+        identity = whole(await count(px4, MISSION)).opaque_id
+        home, seen = await download(copter, MISSION)
+        assert seen.param4 == 360.0
+        again = [Item(m.command, m.x / 1e7, m.y / 1e7, m.z, p4=m.param4, frame=m.frame) for m in (home, seen)]
+        assert (await upload(copter, again, MISSION)).type == ACCEPTED
+        assert [m.param4 for m in await download(px4, MISSION)] == [0.0]
+        assert whole(await count(px4, MISSION)).opaque_id == identity
+
+
 async def test_conf_069_home_can_be_read_without_a_mission() -> None:
     """dronekit reads it as item 0 and waits for ever without it; ArduCopter always has it."""
     async with world(flavour="ardupilot") as w:

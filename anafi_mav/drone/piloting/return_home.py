@@ -6,6 +6,7 @@ A return may have begun by itself, or become one of the drone's own while it was
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 
 from anafi_mav.arsdk.messages import rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, FlyingStateChanged
@@ -30,8 +31,16 @@ class ReturnHome:
     """
 
     def __init__(
-        self, commander: Commander, flight: Element[PilotingState], home: Home, sticks: StickStream, moves: Moves
+        self,
+        commander: Commander,
+        flight: Element[PilotingState],
+        home: Home,
+        sticks: StickStream,
+        moves: Moves,
+        end_movement: Callable[[str], None],
     ) -> None:
+        """Store `end_movement`, which cancels what the drone flies; its argument is the reason."""
+        self._end_movement = end_movement
         self._commander = commander
         self._flight = flight
         self._home = home
@@ -64,6 +73,7 @@ class ReturnHome:
 
         self._commander.abort_pending("the drone is to return home")
         self._sticks.release()  # raises while the pilot at a Skycontroller flies: nothing waits for an answer then
+        self._end_movement("the drone is to return home")
         move = Move(self._commander.expect((rth.State,), judge))
         self._moves.returning = move
         try:

@@ -13,7 +13,22 @@ from decimal import Decimal
 from anafi_mav import mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.formats.lists import fence_items, points_of, rally_items, zones_of
-from anafi_mav.plans.plan import GLOBAL, MAX_ITEMS, WAYPOINT, Item, Loss, Params, Plan, Point, counted, shifted
+from anafi_mav.plans.plan import (
+    GLOBAL,
+    HEADED,
+    MAX_ITEMS,
+    NORTH,
+    WAYPOINT,
+    Item,
+    Loss,
+    Params,
+    Plan,
+    Point,
+    counted,
+    shifted,
+    with_heading,
+    without_zero_heading,
+)
 
 HEADER = "QGC WPL 110"
 
@@ -88,13 +103,31 @@ def read(text: str, source: str) -> Plan:
     if items and all(item.command in _RALLY for item in items):
         return Plan(rally=points_of(items, source))
     if not items or items[0].command != WAYPOINT:
-        return Plan(tuple(items))
+        return Plan(tuple(_without_zeros(items)))
     first, *rest = items
     latitude, longitude, height = first.params[4:]
     home = None
     if latitude is not None and longitude is not None and (latitude, longitude) != (0.0, 0.0):
         home = Point(latitude, longitude, height or 0.0)
-    return Plan(tuple(shifted(item, -1) for item in rest), home)
+    return Plan(tuple(shifted(item, -1) for item in _without_zeros(rest)), home)
+
+
+def _without_zeros(items: list[Item]) -> list[Item]:
+    """Read headings of 0 as not set, unless an item has another heading.
+
+    Mission Planner and an ArduPilot's MAVProxy write 0 in every line. With such headings the drone would fly a survey
+    sideways, its nose to the north.
+    """
+    if not {item.params[3] for item in items if item.command in HEADED} <= {0.0, NORTH}:
+        return items
+    return [without_zero_heading(item) for item in items]
+
+
+def _with_north(items: tuple[Item, ...]) -> list[Item]:
+    """Write headings of 0 as 360 where they would be read as not set."""
+    if {item.params[3] for item in items if item.command in HEADED} != {0.0}:
+        return [*items]
+    return [with_heading(item, NORTH) if item.command in HEADED else item for item in items]
 
 
 def write(plan: Plan) -> tuple[bytes, list[Loss]]:
@@ -103,7 +136,7 @@ def write(plan: Plan) -> tuple[bytes, list[Loss]]:
     if plan.items or not (plan.zones or plan.rally):
         home = plan.home or Point(0.0, 0.0)
         first = Item(WAYPOINT, GLOBAL, (0.0, 0.0, 0.0, 0.0, home.latitude, home.longitude, home.height))
-        data = text_of(HEADER, [first, *(shifted(item, 1) for item in plan.items)])
+        data = text_of(HEADER, [first, *(shifted(item, 1) for item in _with_north(plan.items))])
         if plan.zones or plan.breach_return:
             losses.append(Loss(f"the fence of {counted(len(plan.zones), 'zone')}: a file of its own would hold it"))
         if plan.rally:

@@ -298,7 +298,10 @@ class FlightPlanWriter:
     # -- lines
 
     def fly(self, to: Point, heading: float | None, radius: float | None) -> None:
-        """Fly to a point; `heading` deg from north, None: as the drone is set to look."""
+        """Fly to a point; `heading` deg from north, None: as the drone is set to look.
+
+        MAVSDK's headings are in [-180, 180). The drone's reader is not documented to take a negative one.
+        """
         if self.muted:
             return
         if not self._lines:
@@ -307,7 +310,7 @@ class FlightPlanWriter:
         moves = math.hypot(north, east) >= SAME_PLACE
         self.flown += math.hypot(north, east, to.height - self.place.height) > max(radius or 0.0, ACCEPTANCE)
         bearing = wrap_360(math.atan2(east, north) * DEG_PER_RAD) if moves else self.heading
-        wanted = heading
+        wanted = None if heading is None else wrap_360(heading)
         if self.settings.roi is not None:
             wanted = None
         elif self.settings.beside is not None and moves:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 
@@ -57,8 +58,8 @@ def _height(message: events.AltitudeChanged) -> Sample:
     return (message.altitude,)
 
 
-def _track(kind: type[events.Message], sample: Callable[[Any], Sample | None], *, angles: bool = False) -> EventTrack:
-    return EventTrack(SIZES[kind], lambda data: sample(unpack(data)), angles=angles, spacing=SPACING)
+def _track(kind: type[events.Message], sample: Callable[[Any], Sample | None], *, turn: float = math.inf) -> EventTrack:
+    return EventTrack(SIZES[kind], lambda data: sample(unpack(data)), turn=turn, spacing=SPACING)
 
 
 class EventSamples(PoseSource):
@@ -75,8 +76,8 @@ class EventSamples(PoseSource):
 
     def __init__(self) -> None:
         super().__init__(SPACING)
-        self.headings = heading = _track(events.AttitudeChanged, _heading, angles=True)
-        self.gimbals = gimbal = _track(events.GimbalAttitudeChanged, _gimbal, angles=True)
+        self.headings = heading = _track(events.AttitudeChanged, _heading, turn=math.tau)
+        self.gimbals = gimbal = _track(events.GimbalAttitudeChanged, _gimbal, turn=math.tau)
         self.velocities = velocity = _track(events.SpeedChanged, _velocity)
         self.heights = height = _track(events.AltitudeChanged, _height)
         self._tracks: Mapping[type[events.Message], EventTrack] = {

@@ -26,6 +26,9 @@ SPACING = 0.05
 """s between two samples of events that are kept. An ANAFI reports five times a second; between samples at this distance
 the way of a drone or gimbal is straight."""
 
+DEGREES = 360.0
+"""Degrees of a full turn."""
+
 NEAR = 0.2
 """s from a picture within which the pictures of the video are the source: six of them."""
 
@@ -47,17 +50,18 @@ class CameraPose(msgspec.Struct, frozen=True):
 
 
 class SampleTrack:
-    """Values of one kind over time; between two angles (rad) the shorter way is interpolated.
+    """Values of one kind over time.
 
     The samples are packed numbers in a ring: as objects, 256 of each kind, those of a drone took 0.2 MB.
     """
 
-    def __init__(self, width: int, *, angles: bool = False, spacing: float = 0.0) -> None:
+    def __init__(self, width: int, *, turn: float = math.inf, spacing: float = 0.0) -> None:
         """Create it empty.
 
-        `width`: values of a sample, `spacing`: s between two samples that are kept.
+        `width`: values of a sample, `spacing`: s between two samples that are kept. `turn`: a full turn in the unit of
+        the values, if they are angles: between two of them the shorter way is interpolated.
         """
-        self._angles = angles
+        self._turn = turn
         self._spacing = spacing
         self._row = struct.Struct(f"{1 + width}d")
         """Time and values of a sample."""
@@ -114,9 +118,7 @@ class SampleTrack:
             after = sample
         if before is not None and after is not None and after[0] - before[0] <= 2.0 * FURTHEST:
             share = (at - before[0]) / (after[0] - before[0])
-            steps = [two - one for one, two in zip(before[1], after[1], strict=True)]
-            if self._angles:
-                steps = [wrap_pi(step) for step in steps]
+            steps = [math.remainder(two - one, self._turn) for one, two in zip(before[1], after[1], strict=True)]
             return tuple(one + share * step for one, step in zip(before[1], steps, strict=True))
         nearest = min((s for s in (before, after) if s is not None), key=lambda s: abs(s[0] - at), default=None)
         return nearest[1] if nearest is not None and abs(nearest[0] - at) <= FURTHEST else None
@@ -126,13 +128,13 @@ class EventTrack(SampleTrack):
     """Samples that are the bytes of events, read when a moment is looked up: photos are rare."""
 
     def __init__(
-        self, size: int, read: Callable[[bytes], tuple[float, ...] | None], *, angles: bool = False, spacing: float
+        self, size: int, read: Callable[[bytes], tuple[float, ...] | None], *, turn: float = math.inf, spacing: float
     ) -> None:
         """Create it empty.
 
         `size`: bytes that are kept of an event, `read`: returns its values; None: they are unknown.
         """
-        super().__init__(0, angles=angles, spacing=spacing)
+        super().__init__(0, turn=turn, spacing=spacing)
         self._row = struct.Struct(f"d{size}s")
         self._read = read
 
@@ -153,15 +155,15 @@ class PoseSource:
 
     def __init__(self, spacing: float = 0.0) -> None:
         """`spacing`: s between two samples of a kind that are kept."""
-        self.places = SampleTrack(2, spacing=spacing)
+        self.places = SampleTrack(2, turn=DEGREES, spacing=spacing)
         """Latitude, longitude, deg."""
         self.velocities = SampleTrack(2, spacing=spacing)
         """North, east, m/s."""
         self.heights = SampleTrack(1, spacing=spacing)
         """m above take-off."""
-        self.gimbals = SampleTrack(3, angles=True, spacing=spacing)
+        self.gimbals = SampleTrack(3, turn=math.tau, spacing=spacing)
         """Roll and pitch of the camera to the horizon, its yaw to `headings`, rad."""
-        self.headings = SampleTrack(1, angles=True, spacing=spacing)
+        self.headings = SampleTrack(1, turn=math.tau, spacing=spacing)
         """Yaw of the drone, rad; 0 in a source whose camera's yaw is that to true north."""
 
     def clear(self) -> None:
@@ -174,7 +176,7 @@ class PoseSource:
         found = self.places.value(at)
         if found is None:
             return None
-        latitude, longitude = found[0], found[1]
+        latitude, longitude = found[0], math.remainder(found[1], DEGREES)
         late = at - self.places.newest
         velocity = self.velocities.value(at)
         if late <= 0.0 or velocity is None:

@@ -16,7 +16,7 @@ import msgspec
 from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.plans.formats.parrot import Version
-from anafi_mav.plans.plan import Item, Loss
+from anafi_mav.plans.plan import HEADED, NORTH, Item, Loss
 from anafi_mav.plans.translation.translate import FaultKind, TranslationReport, examine
 from anafi_mav.services.flavours import PX4, Flavour
 from anafi_mav.services.plan.mission_items import from_wire
@@ -24,18 +24,6 @@ from anafi_mav.services.plan.plan_transfer import PlanKind
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.fence.plan_items import PlanFault, PlanItem
 from anafi_mav.vehicle.mission.texts import FIRST_LABEL
-
-_HEADED = frozenset(
-    {
-        dialect.MAV_CMD_NAV_WAYPOINT,
-        dialect.MAV_CMD_NAV_LOITER_UNLIM,
-        dialect.MAV_CMD_NAV_LOITER_TIME,
-        dialect.MAV_CMD_NAV_LAND,
-        dialect.MAV_CMD_NAV_TAKEOFF,
-    }
-)
-"""Items whose param4 is a heading, which ArduPilot's clients leave at 0 without meaning north."""
-
 
 _RESULTS = {
     FaultKind.COMMAND: dialect.MAV_MISSION_UNSUPPORTED,
@@ -156,8 +144,16 @@ class MissionKind(PlanKind):
 
 
 def _without_zero(item: PlanItem) -> PlanItem:
-    return _with_param(item, 4, math.nan) if item.command in _HEADED and item.params[3] == 0.0 else item
+    """Undo `_with_zero`."""
+    heading = item.params[3]
+    if item.command not in HEADED or heading not in (0.0, NORTH):
+        return item
+    return _with_param(item, 4, math.nan if heading == 0.0 else 0.0)
 
 
 def _with_zero(item: PlanItem) -> PlanItem:
-    return _with_param(item, 4, 0.0) if item.command in _HEADED and math.isnan(item.params[3]) else item
+    """An item whose heading is 0 if it is not set, and not 0 if it is north."""
+    if item.command not in HEADED:
+        return item
+    heading = item.params[3]
+    return _with_param(item, 4, 0.0 if math.isnan(heading) else heading or NORTH)

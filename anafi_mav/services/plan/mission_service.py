@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Coroutine, Hashable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from anafi_mav import texts
@@ -46,6 +47,15 @@ RECORD = "mission"
 """Name of the record in the drone's file."""
 
 
+@dataclass(frozen=True)
+class _Choice:
+    """One MISSION_SET_CURRENT and what became of it."""
+
+    client: Hashable
+    item: int
+    task: asyncio.Task[None]
+
+
 class MissionService(Service):
     """The mission of one system."""
 
@@ -58,6 +68,8 @@ class MissionService(Service):
         self._sent: Mapping[bool, tuple[int, ...]] = {}
         """Value of `_fields` when MISSION_CURRENT last announced a change; empty: the next one is sent in any case."""
         self._sent_item: int | None = None
+        self._choice: _Choice | None = None
+        """The newest MISSION_SET_CURRENT."""
 
     def messages(self) -> Mapping[int, MessageHandler]:
         return {dialect.MAVLINK_MSG_ID_MISSION_SET_CURRENT: self._set_current}
@@ -135,12 +147,18 @@ class MissionService(Service):
         await flight.choose(command.right, _ours(int(item), command.client))
 
     def _set_current(self, inbound: Inbound) -> None:
-        """MISSION_SET_CURRENT: MISSION_CURRENT answers it, or a text."""
+        """MISSION_SET_CURRENT: MISSION_CURRENT answers it, or a text.
+
+        A repetition does not restart one that is under way: MAVSDK sends it every 0.5 s until it is answered.
+        """
         client = client_of(inbound)
+        item = _ours(inbound.message.seq, client)
         self._sent = {}
-        self.host.run_action(
-            client, self._flight.choose(Right(client, Extent.COMMANDED), _ours(inbound.message.seq, client))
-        )
+        choice = self._choice
+        if choice is not None and (choice.client, choice.item) == (client, item) and not choice.task.done():
+            return
+        task = self.host.run_action(client, self._flight.choose(Right(client, Extent.COMMANDED), item))
+        self._choice = _Choice(client, item, task)
 
     # What is told.
 

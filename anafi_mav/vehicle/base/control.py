@@ -61,11 +61,6 @@ Policy: TypeAlias = Callable[[Request], "Refused | None"]
 """Decides who may request a flight task: returns the refusal, or None."""
 
 
-def allow_all(request: Request) -> Refused | None:
-    """Refuse no request."""
-    return None
-
-
 class Conditions(Protocol):
     """The aircraft, as far as requests of flight tasks depend on it."""
 
@@ -99,7 +94,8 @@ class Control:
     """Owner of flight of one vehicle. All methods run on the event loop's thread."""
 
     def __init__(self, aircraft: Conditions) -> None:
-        self.policy: Policy = allow_all
+        self.policies: tuple[Policy, ...] = ()
+        """The first one that refuses a request decides."""
         self.actions = FlightActions()
         self._aircraft = aircraft
         self._situation: Situation[FlightTask] = Situation()
@@ -237,10 +233,14 @@ class Control:
     def require_allowed(self, task: FlightTask, by: By, rules: TaskRules | None = None) -> None:
         """Raise `Refused` for the policy, or for the pilot whom a part of the gateway leaves alone."""
         rules = rules or task.rules
-        if (refusal := self.policy(Request(task, by, rules))) is not None:
+        if (refusal := self.refusal(Request(task, by, rules))) is not None:
             raise refusal
         if self.leaves_to_pilot(by):
             raise Refused(rules.what, texts.PILOT)
+
+    def refusal(self, request: Request) -> Refused | None:
+        """Return the refusal of the first policy that refuses a request; None: it is permitted."""
+        return next((refusal for policy in self.policies if (refusal := policy(request)) is not None), None)
 
     def leaves_to_pilot(self, by: By) -> bool:
         """True when a part of the gateway does not act: the Skycontroller's pilot flies, or can."""

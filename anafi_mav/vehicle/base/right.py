@@ -11,6 +11,8 @@ import enum
 from collections.abc import Hashable
 from dataclasses import dataclass
 
+from anafi_mav.vehicle.base.clients import system_of
+
 
 class Extent(enum.Enum):
     """Landings or returns that a right covers. A forced landing is covered by none."""
@@ -36,10 +38,7 @@ class Right:
     @property
     def system(self) -> int:
         """MAVLink system id of the client, for texts; 0 when it is unknown."""
-        match self.client:
-            case (_, int(system), _):
-                return system
-        return 0
+        return system_of(self.client) or 0
 
     def covered(self, extent: Extent | None) -> Extent | None:
         """Return how far this right covers what a task may end; None: not at all."""

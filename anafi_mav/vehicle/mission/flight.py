@@ -24,7 +24,7 @@ from anafi_mav.plans.translation.translate import FlightPlanFile
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.flight_task import Needs, PlainTask, TaskRules
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.refusal import DroneRefused, Refused, not_ready, reason_of, text_of
+from anafi_mav.vehicle.base.refusal import DroneRefused, Refused, reason_of, text_of
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
@@ -131,8 +131,7 @@ class MissionFlight(PlainTask):
             await self._work(Prepare(attempt), by)
             self._require_same(attempt)
             return
-        if problems := vehicle.prearm_problems():
-            raise not_ready(problems)
+        vehicle.require_ready()
         async with vehicle.control.acquire(self, by=by):
             pass
         self._handle(machine.await_arm(by.client, self._now))
@@ -140,12 +139,18 @@ class MissionFlight(PlainTask):
             raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
 
     async def choose(self, by: Right, item: int) -> None:
-        """Make an item the current one; a mission that is flown, or about to be, continues there."""
+        """Make an item the current one; a mission that is flown, or about to be, continues there.
+
+        Without effect on the item that is flown: clients repeat the request, and each start stops the drone first.
+        """
         await self.storing.over()
         if not self.there:
             raise Refused(texts.CURRENT_ITEM, texts.NO_MISSION)
         if not 0 <= item < len(self.machine.mission.items):
             raise Refused(texts.CURRENT_ITEM, texts.NO_SUCH_ITEM.fill(number=item + FIRST_LABEL), lasting=True)
+        if self.machine.is_at(item):
+            self.outlet.mission_changed()  # the answer to a message
+            return
         if self.machine.flying or self.machine.state in (State.PREPARING, State.TAKING_OVER, State.STARTING):
             await self.engage(by, item)
         else:

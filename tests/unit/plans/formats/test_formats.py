@@ -260,6 +260,29 @@ def test_a_file_without_home() -> None:
     assert plan.items[1].params[3] is None
 
 
+@pytest.mark.parametrize(
+    ("written", "read"),
+    [
+        (["0", "0.000000", "0"], [None, None, None]),  # by Mission Planner
+        (["0", "nan", "0"], [0.0, None, 0.0]),  # by MAVProxy, from a PX4
+        (["0", "90", "0"], [0.0, 90.0, 0.0]),
+        (["0", "360", "0"], [None, 0.0, None]),
+    ],
+)
+def test_heading_of_zero_is_not_set_in_a_file_without_headings(written: list[str], read: list[float | None]) -> None:
+    lines = [f"{n}\t0\t3\t16\t0\t0\t0\t{heading}\t48.1\t2.1\t9\t1" for n, heading in enumerate(written, 1)]
+    delay = "4\t0\t2\t93\t5\t0\t0\t0\t0\t0\t0\t1"
+    home = "0\t1\t0\t16\t0\t0\t0\t0\t48.0\t2.0\t35\t1"
+    plan = waypoints.read("\n".join(["QGC WPL 110", home, *lines, delay]), "x")
+    assert [item.params[3] for item in plan.items] == [*read, 0.0]
+
+
+def test_plan_with_headings_north_keeps_them_through_the_waypoint_format() -> None:
+    plan = Plan((waypoint(0, 0, 20.0, 0.0, 0.0, 0.0, 0.0), waypoint(1, 0, 20.0, 0.0, 0.0, 0.0, 0.0)), Point(LAT, LON))
+    data, losses = waypoints.write(plan)
+    assert (waypoints.read(data.decode(), "x"), losses) == (plan, [])
+
+
 # Parrot's.
 
 

@@ -90,6 +90,14 @@ def test_a_flight_of_version_1() -> None:
     assert examine(items, 1).approximations == ()
 
 
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize(("heading", "written"), [(-90.0, "270.0"), (360.0, "0.0"), (400.0, "40.0")])
+def test_heading_is_written_as_the_drone_takes_it(version: Version, heading: float, written: str) -> None:
+    items = [take_off(15.0, heading=heading), waypoint(1, 0, 20.0, 0.0, 0.0, 0.0, heading)]
+    found = lines(translate(items, version, GROUND))
+    assert [line.split()[5] for line in found if line.split()[1] == "16"] == [written, written]
+
+
 def test_a_flight_of_version_2() -> None:
     items = [
         take_off(15.0),

@@ -55,10 +55,21 @@ def test_cleared_track_has_no_samples_of_before() -> None:
 
 
 def test_angle_is_interpolated_across_south() -> None:
-    track = SampleTrack(1, angles=True)
+    track = SampleTrack(1, turn=math.tau)
     track.add(1.0, math.radians(175.0))
     track.add(2.0, math.radians(-175.0))
     assert track.value(1.5) == pytest.approx((math.pi,))
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "between"),
+    [(179.9999, -179.9997, -179.9999), (-179.9999, 179.9997, 179.9999), (2.0, 2.0002, 2.0001)],
+)
+def test_place_is_interpolated_across_the_180th_meridian(first: float, second: float, between: float) -> None:
+    poses = PoseTrack()
+    poses.events.places.add(1.0, -16.0, first)
+    poses.events.places.add(2.0, -16.0002, second)
+    assert poses.pose(1.5).place == pytest.approx((-16.0001, between), abs=1e-9)
 
 
 def test_position_continues_at_the_reported_velocity() -> None:
