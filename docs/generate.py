@@ -739,7 +739,7 @@ def states() -> str:
     from anafi_mav.services.ftp import ftp
     from anafi_mav.services.plan import plan_transfer
     from anafi_mav.sim.autopilot import machine
-    from anafi_mav.vehicle import flight_policy, follow, manual_flight, operator_control, takeoff_machine
+    from anafi_mav.vehicle import flight_policy, operator_control, takeoff_machine
     from anafi_mav.vehicle.base import control_machine
     from anafi_mav.vehicle.fence import fence_watch
     from anafi_mav.vehicle.mission import machine as mission_machine
@@ -752,8 +752,6 @@ def states() -> str:
         ("The flight of a mission", mission_machine),
         ("The fence: zones, floor and ceiling each", fence_watch),
         ("Setpoints of a program", stream),
-        ("Sticks of a ground station", manual_flight),
-        ("Following a target", follow),
         ("The switch between the Skycontroller's pilot and programs", flight_policy),
         ("The operator among several stations", operator_control),
         ("A session of MAVLink FTP", ftp),

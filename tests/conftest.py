@@ -28,7 +28,14 @@ clock.install()
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
-pytest_plugins = ["support.heap", "support.olympe_server", "support.order", "support.repeats", "support.fuzz_seed"]
+pytest_plugins = [
+    "support.heap",
+    "support.order",
+    "support.collection",
+    "support.olympe_server",
+    "support.repeats",
+    "support.fuzz_seed",
+]
 
 # Gateway, simulator and client share one event loop here: when it stalls, so does the Skycontroller that would be given
 # its axes back. Tests of the watchdog run the gateway as a process of its own.

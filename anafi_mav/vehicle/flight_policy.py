@@ -7,8 +7,6 @@ take the aircraft from each other, as `drone.controller` arbitrates.
 
 The second policy is that of `operator_control`: with an operator, the flight tasks of stations without its role are
 refused. It comes after the pilot's, and it never concerns what the gateway does by itself.
-
-A policy is a function of a request that returns a refusal or None; `first_refusal` joins several.
 """
 
 from __future__ import annotations
@@ -16,7 +14,7 @@ from __future__ import annotations
 import enum
 
 from anafi_mav import texts
-from anafi_mav.vehicle.base.control import Policy, Request
+from anafi_mav.vehicle.base.control import Request
 from anafi_mav.vehicle.base.refusal import NotInControl, Refused
 from anafi_mav.vehicle.base.requester import Source
 from anafi_mav.vehicle.base.right import Right
@@ -91,12 +89,3 @@ def operator_refusal_of(control: OperatorControl, request: Request) -> Refused |
     need = Need.FLY if request.rules.needs_operator else Need.COMMAND
     reason = control.objection(request.by.system, need)
     return None if reason is None else NotInControl(request.rules.what, reason)
-
-
-def first_refusal(*policies: Policy) -> Policy:
-    """Join policies: the first one that refuses a request decides."""
-
-    def refuse(request: Request) -> Refused | None:
-        return next((refusal for policy in policies if (refusal := policy(request)) is not None), None)
-
-    return refuse

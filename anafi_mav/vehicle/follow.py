@@ -77,41 +77,6 @@ class FollowSettings:
     """m/s at most around the target when its course changes (FLW_TGT_MAX_VEL)."""
 
 
-class State(enum.Enum):
-    """State of following."""
-
-    OFF = "another mode is active"
-    WAITING = "hovers until a target appears"
-    FOLLOWING = "a target is followed"
-
-
-class Event(enum.Enum):
-    """Event that changes the state."""
-
-    ENGAGE = "mode Follow is requested"
-    TARGET = "the target reports its position"
-    SILENCE = "no position of the target for too long"
-    END = "another flight task is active"
-
-
-TRANSITIONS: dict[State, dict[Event, State]] = {
-    State.OFF: {Event.ENGAGE: State.WAITING, Event.TARGET: State.OFF, Event.END: State.OFF},
-    State.WAITING: {
-        Event.ENGAGE: State.WAITING,
-        Event.TARGET: State.FOLLOWING,
-        Event.SILENCE: State.OFF,
-        Event.END: State.OFF,
-    },
-    State.FOLLOWING: {
-        Event.ENGAGE: State.WAITING,
-        Event.TARGET: State.FOLLOWING,
-        Event.SILENCE: State.OFF,
-        Event.END: State.OFF,
-    },
-}
-"""The missing pair cannot happen: there is no waiting for a target in another mode."""
-
-
 @dataclass(frozen=True)
 class Sighting:
     """Content of one FOLLOW_TARGET."""

@@ -7,7 +7,6 @@ mode Hold.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 
@@ -15,7 +14,6 @@ from anafi_mav import geo, texts
 from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import PilotingCommand, events
 from anafi_mav.drone.values import Values
-from anafi_mav.errors import LinkLost
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import LOWEST, amsl_to_ato, check_estimate, check_height, check_on_earth, check_place
@@ -27,34 +25,19 @@ from anafi_mav.vehicle.base.requester import By
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import ValueSubscriptions
 from anafi_mav.vehicle.base.velocity_loop import MotionEstimate, VelocityController
-from anafi_mav.vehicle.follow import (
-    PATIENCE,
-    REACH,
-    SILENCE,
-    TRANSITIONS,
-    AltitudeMode,
-    Event,
-    FollowSettings,
-    Sighting,
-    State,
-    TargetFollower,
-)
+from anafi_mav.vehicle.follow import PATIENCE, REACH, SILENCE, AltitudeMode, FollowSettings, Sighting, TargetFollower
 
 
 @dataclass(frozen=True)
 class Following:
-    """One use of mode Follow, from its request on."""
+    """One use of mode Follow, from its request to its end."""
 
     follower: TargetFollower
     controller: VelocityController
-    state: State = State.OFF
     leader: Hashable = None
-    """Sender of the target that is followed."""
+    """Sender of the target that is followed; None: the drone hovers until a target appears."""
     kept_height: float | None = None
     """m above take-off, kept while the target asks for a height that is too low."""
-
-    def after(self, event: Event) -> Following:
-        return replace(self, state=TRANSITIONS[self.state][event])
 
 
 class FollowFlight(PlainTask):
@@ -78,15 +61,12 @@ class FollowFlight(PlainTask):
         self._motion = motion
         self._clock = clock
         self._silence = Alarm(self._expired)
-        self._following = self._new()
-
-    def _new(self) -> Following:
-        return Following(TargetFollower(self.settings), VelocityController(self._motion()))
+        self._following: Following | None = None
 
     @property
     def engaged(self) -> bool:
         """True when the drone follows, or waits for its target."""
-        return self._following.state is not State.OFF
+        return self._following is not None
 
     async def engage(self, by: By) -> None:
         """Begin mode Follow; return when the drone hovers and waits for its target.
@@ -96,7 +76,7 @@ class FollowFlight(PlainTask):
         if not self._vehicle.in_air:
             raise Refused(texts.FOLLOW, texts.TAKE_OFF_FIRST)
         async with self._vehicle.control.acquire(self, by=by):
-            self._following = self._new().after(Event.ENGAGE)
+            self._following = Following(TargetFollower(self.settings), VelocityController(self._motion()))
             self._silence.set(self._clock.monotonic() + PATIENCE)
 
     def receive(self, sender: Hashable, seen: Sighting) -> OperatorText | None:
@@ -105,10 +85,10 @@ class FollowFlight(PlainTask):
         The first sender in mode Follow is followed until the mode ends. In another mode a target asks for nothing: its
         message names no drone.
         """
-        before = self._following
-        if before.state is State.OFF:
+        following = self._following
+        if following is None:
             return None
-        if before.state is State.FOLLOWING and sender != before.leader:
+        if following.leader not in (None, sender):
             return texts.OTHER_TARGET
         if reason := self._objection(seen):
             return reason
@@ -117,10 +97,10 @@ class FollowFlight(PlainTask):
             return texts.POSITION_UNKNOWN
         now = self._clock.monotonic()
         north, east = geo.offset(*reference, seen.latitude, seen.longitude)
-        before.follower.see(north, east, seen.altitude, seen.velocity, now)
-        self._following = replace(before.after(Event.TARGET), leader=sender)
+        following.follower.see(north, east, seen.altitude, seen.velocity, now)
+        self._following = replace(following, leader=sender)
         self._silence.set(now + SILENCE)
-        return self._fly(now)
+        return self._fly(self._following, now)
 
     def _objection(self, seen: Sighting) -> OperatorText | None:
         here = self._vehicle.place
@@ -135,11 +115,10 @@ class FollowFlight(PlainTask):
 
     def end(self) -> list[asyncio.Task[None]]:
         """End this flight task: something else flies the drone now."""
-        if self.engaged:
-            self._following = self._following.after(Event.END)
+        if self._following is not None:
+            self._following = None
             self._silence.cancel()
-            with contextlib.suppress(LinkLost):
-                self._vehicle.drone.piloting.pilot(None)
+            self._vehicle.centre_sticks()
         return []
 
     def value_subscriptions(self) -> ValueSubscriptions:
@@ -147,10 +126,13 @@ class FollowFlight(PlainTask):
         return {self._on_speed: (events.SpeedChanged,)}
 
     def _on_speed(self, values: Values, now: float) -> None:
-        if self._following.state is State.FOLLOWING and (reason := self._fly(now)) is not None:
-            self.drop(self._following.leader, reason)
+        following = self._following
+        if following is None or following.leader is None:
+            return
+        if (reason := self._fly(following, now)) is not None:
+            self.drop(following.leader, reason)
 
-    def _fly(self, now: float) -> OperatorText | None:
+    def _fly(self, following: Following, now: float) -> OperatorText | None:
         """Fly to where the target wants the drone; return why it hovers instead, or None."""
         vehicle = self._vehicle
         limits = vehicle.drone.piloting.limits
@@ -160,19 +142,19 @@ class FollowFlight(PlainTask):
         sticks = PilotingCommand()
         try:
             motion = self._motion()
-            wanted = self._following.follower.aim(motion.north, motion.east, self._height(), now)
+            wanted = following.follower.aim(motion.north, motion.east, self._height(following), now)
             if wanted is not None and vehicle.place is not None and motion.reference is not None:
                 place = GeoPoint(
                     *geo.destination(*motion.reference, wanted.x.position or 0.0, wanted.y.position or 0.0)
                 )
                 check_place(vehicle, place)
-                sticks = self._following.controller.sticks(wanted, limits, now) or sticks
+                sticks = following.controller.sticks(wanted, limits, now) or sticks
         except Refused as refusal:
             reason = refusal.reason
         vehicle.drone.piloting.pilot(sticks)
         return reason
 
-    def _height(self) -> float:
+    def _height(self, following: Following) -> float:
         """Return the height to fly at (m, above take-off).
 
         Raises `Refused` when it is unknown or not allowed.
@@ -187,13 +169,13 @@ class FollowFlight(PlainTask):
                 raise Refused(texts.FOLLOW, texts.GROUND_HEIGHT_UNKNOWN)
             height += state.altitude - state.height
         elif settings.altitude_mode is AltitudeMode.TARGET:
-            altitude = self._following.follower.altitude
+            altitude = following.follower.altitude
             if altitude is None:
                 raise Refused(texts.FOLLOW, texts.TARGET_NO_ALTITUDE)
             height += amsl_to_ato(self._vehicle, altitude)
-        is_low, kept = height < LOWEST, self._following.kept_height
+        is_low, kept = height < LOWEST, following.kept_height
         kept = state.altitude if kept is None else kept
-        self._following = replace(self._following, kept_height=kept if is_low else None)
+        self._following = replace(following, kept_height=kept if is_low else None)
         if is_low:
             if kept is None:
                 raise Refused(texts.FOLLOW, texts.HEIGHT_UNKNOWN)
@@ -205,10 +187,10 @@ class FollowFlight(PlainTask):
         return height
 
     def _expired(self) -> None:
-        if not self.engaged:
+        if (ended := self._following) is None:
             return
-        was, self._following = self._following.state, self._following.after(Event.SILENCE)
+        self._following = None
         self._vehicle.drone.piloting.hover()
         self._vehicle.control.release(self)
-        why = texts.TARGET_LOST if was is State.FOLLOWING else texts.NO_TARGET
+        why = texts.NO_TARGET if ended.leader is None else texts.TARGET_LOST
         self._vehicle.text(Severity.WARNING, texts.TASK_ENDED.fill(what=texts.FOLLOW, reason=why))

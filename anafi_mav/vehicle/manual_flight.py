@@ -11,15 +11,12 @@ The sticks are centred `SILENCE` after the last message of the client that flies
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import enum
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 
 from anafi_mav import texts
 from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import PilotingCommand
-from anafi_mav.errors import LinkLost
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.clients import system_of
@@ -32,47 +29,6 @@ from anafi_mav.vehicle.offboard.silence import SILENCE
 
 GESTURE = 0.95
 """Share of the way from which a stick is at its end: throttle down and yaw right arm an ArduPilot and a PX4."""
-
-
-class State(enum.Enum):
-    """State of the sticks."""
-
-    IDLE = "sticks centred or not received"
-    HELD = "a client holds deflected sticks"
-    OVERRIDING = "a joystick takes the drone over: no sticks count until that has ended"
-
-
-class Event(enum.Enum):
-    """Event that changes the state of the sticks."""
-
-    CENTRED = "the holding client's sticks are centred, or another client's are"
-    DEFLECTED = "a client deflects its sticks"
-    SILENCE = "no stick input of the holding client for too long"
-    END = "another flight task is active"
-    OVERRIDE = "a client's joystick begins to take the drone over"
-    OVERRIDDEN = "it has taken the drone over, another action has replaced it, or the link was lost"
-
-
-TRANSITIONS: dict[State, dict[Event, State]] = {
-    State.IDLE: {
-        Event.CENTRED: State.IDLE,
-        Event.DEFLECTED: State.HELD,
-        Event.END: State.IDLE,
-        Event.OVERRIDE: State.OVERRIDING,
-    },
-    State.HELD: {
-        Event.CENTRED: State.IDLE,
-        Event.DEFLECTED: State.HELD,
-        Event.SILENCE: State.IDLE,
-        Event.END: State.IDLE,
-        Event.OVERRIDE: State.OVERRIDING,
-    },
-    State.OVERRIDING: {
-        Event.END: State.OVERRIDING,
-        Event.OVERRIDDEN: State.IDLE,
-    },
-}
-"""The pairs that are missing cannot happen: the silence of centred sticks is not noticed."""
 
 
 @dataclass(frozen=True)
@@ -88,15 +44,6 @@ class Sticks:
     @property
     def centred(self) -> bool:
         return not any((self.forward, self.right, self.turn, self.climb))
-
-
-@dataclass(frozen=True)
-class StickInput:
-    """The sticks that count."""
-
-    state: State = State.IDLE
-    client: Hashable = None
-    """Client that holds them."""
 
 
 class ManualFlight(PlainTask):
@@ -129,18 +76,15 @@ class ManualFlight(PlainTask):
         self._overridable = overridable
         self._vehicle = vehicle
         self._clock = clock
-        self._input = StickInput()
+        self.holder: Hashable = None
+        """The client that holds deflected sticks; None: no client does."""
+        self._overriding: asyncio.Task[None] | None = None
+        """The newest action by which a joystick takes the drone over: no sticks count until it has ended."""
         self._silence = Alarm(self._expired)
 
     @property
-    def state(self) -> State:
-        """The state of the sticks."""
-        return self._input.state
-
-    @property
-    def holder(self) -> Hashable:
-        """The client that holds deflected sticks; None: no client does."""
-        return self._input.client
+    def _is_overriding(self) -> bool:
+        return self._overriding is not None and not self._overriding.done()
 
     def receive(self, sender: Hashable, sticks: Sticks, *, overrides: bool = False) -> OperatorText | None:
         """Take a client's stick positions; return why they do not fly the drone, or None.
@@ -149,24 +93,23 @@ class ManualFlight(PlainTask):
         """
         vehicle = self._vehicle
         if overrides and self._takes_over(sender, sticks):
-            self._let_go(Event.OVERRIDE)
-            action = vehicle.control.run(sender, self._override(sender, sticks))
-            action.add_done_callback(lambda action: self._let_go(Event.OVERRIDDEN))
-        if self.state is State.OVERRIDING:
+            self._centre()
+            self._overriding = vehicle.control.run(sender, self._override(sender, sticks))
+        if self._is_overriding:
             return None
         sticks = replace(sticks, climb=self.override.climb(sender, sticks.climb))
-        if self.state is State.HELD and sender != self._input.client:
+        if self.holder not in (None, sender):
             return None if sticks.centred else texts.OTHER_STICKS
         if sticks.centred:
-            self._let_go(Event.CENTRED)
+            self._centre()
             return None
         if (reason := self._objection(sticks)) is not None:
-            self._let_go(Event.END)
+            self._centre()
             return reason
         limits = vehicle.drone.piloting.limits
         if limits is None:
             return texts.TILT_UNKNOWN
-        self._input = StickInput(TRANSITIONS[self.state][Event.DEFLECTED], sender)
+        self.holder = sender
         self._silence.set(self._clock.monotonic() + SILENCE)
         vehicle.drone.piloting.pilot(
             PilotingCommand(
@@ -181,7 +124,7 @@ class ManualFlight(PlainTask):
     def _takes_over(self, sender: Hashable, sticks: Sticks) -> bool:
         """True at the moment at which this client's joystick takes the drone over."""
         largest = max(abs(sticks.forward), abs(sticks.right), abs(sticks.turn))
-        if not self.override.moved(sender, largest, self._clock.monotonic()) or self.state is State.OVERRIDING:
+        if not self.override.moved(sender, largest, self._clock.monotonic()) or self._is_overriding:
             return False
         if self._vehicle.drone.controller.pilot_acquired_control or self._refused() is not None:
             return False
@@ -195,8 +138,8 @@ class ManualFlight(PlainTask):
 
     def silent(self, sender: Hashable) -> None:
         """Centre the sticks when this client holds them: it has released all its channels."""
-        if sender == self._input.client:
-            self._let_go(Event.CENTRED)
+        if sender == self.holder:
+            self._centre()
 
     def _objection(self, sticks: Sticks) -> OperatorText | None:
         """Return why these sticks may not fly the drone; None in the air and in mode Position."""
@@ -212,22 +155,20 @@ class ManualFlight(PlainTask):
 
     def end(self) -> list[asyncio.Task[None]]:
         """End this flight task: something else flies the drone now."""
-        self._let_go(Event.END)
+        self._centre()
         return []
 
     def link_down(self) -> None:
         """Forget where the joysticks were; control has ended the flight by them."""
         self.override.forget()
 
-    def _let_go(self, event: Event) -> None:
-        """Centre the sticks if a client held them."""
-        held = self.state is State.HELD
-        self._input = StickInput(TRANSITIONS[self.state][event])
-        if held:
+    def _centre(self) -> None:
+        """Centre the sticks if a client holds them."""
+        if self.holder is not None:
+            self.holder = None
             self._silence.cancel()
-            with contextlib.suppress(LinkLost):
-                self._vehicle.drone.piloting.pilot(None)
+            self._vehicle.centre_sticks()
 
     def _expired(self) -> None:
-        self._let_go(Event.SILENCE)
+        self._centre()
         self._vehicle.text(Severity.WARNING, texts.STICKS_SILENT)

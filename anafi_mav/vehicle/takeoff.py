@@ -23,7 +23,7 @@ from anafi_mav.vehicle.base.control import Control
 from anafi_mav.vehicle.base.flight_task import DISARM, HAND_LAUNCH, FlightTask, PlainTask, TaskRules
 from anafi_mav.vehicle.base.flying import AIRBORNE
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.refusal import Refused, Rejected, Unfinished, not_ready, reason_of
+from anafi_mav.vehicle.base.refusal import Refused, Rejected, Unfinished, reason_of
 from anafi_mav.vehicle.base.requester import By
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
@@ -137,8 +137,7 @@ class Takeoff(PlainTask):
         vehicle, client = self._vehicle, by.client
         if vehicle.armed and not vehicle.on_ground:
             return
-        if problems := vehicle.prearm_problems():
-            raise not_ready(problems)
+        vehicle.require_ready()
         if vehicle.settings.hand_launch:
             async with vehicle.control.acquire(HAND_LAUNCH, by=by):
                 await vehicle.drone.piloting.hand_launch()
@@ -204,8 +203,7 @@ class Takeoff(PlainTask):
         check_height(vehicle, height)
         if not vehicle.on_ground:
             raise Refused(texts.TAKEOFF, self._airborne)
-        if problems := vehicle.prearm_problems():
-            raise not_ready(problems)
+        vehicle.require_ready()
         if not self.armed:
             async with vehicle.control.acquire(self, by=by):  # what lifts off while it waits is replaced now
                 waiting = WaitingTakeoff(height, by.client, _after(ARM_WAIT))
@@ -217,8 +215,7 @@ class Takeoff(PlainTask):
 
     async def launch(self) -> None:
         """Take off to the drone's own height, for setpoints; returns when the drone confirmed it."""
-        if problems := self._vehicle.prearm_problems():
-            raise not_ready(problems)
+        self._vehicle.require_ready()
         await self._lift_off()
 
     async def abort(self, by: By) -> None:

@@ -37,7 +37,7 @@ from anafi_mav.drone.events import (
 from anafi_mav.errors import CommandRejected
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.aborted_return import AbortedReturn
-from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.aircraft import Aircraft, CommandedSpeeds
 from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.control_machine import DroneAct, State
 from anafi_mav.vehicle.base.flight_task import LAND, MOTOR_CUT, FlightTask, Hover
@@ -53,7 +53,7 @@ from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.controller_inputs import ControllerInputs
 from anafi_mav.vehicle.fence.rally import RallyPoints
-from anafi_mav.vehicle.flight_policy import first_refusal, operator_refusal_of
+from anafi_mav.vehicle.flight_policy import operator_refusal_of
 from anafi_mav.vehicle.follow_flight import FollowFlight
 from anafi_mav.vehicle.guided_flight import GuidedFlight
 from anafi_mav.vehicle.hold_rule import APART, HoldRule
@@ -110,14 +110,6 @@ _ALWAYS_ENTERABLE = frozenset(
         FlightMode.OFFBOARD,
     }
 )
-
-_ENTERABLE = {
-    (False, False): _ALWAYS_ENTERABLE,
-    (False, True): _ALWAYS_ENTERABLE | {FlightMode.MISSION},
-    (True, False): _ALWAYS_ENTERABLE | {FlightMode.FOLLOW},
-    (True, True): _ALWAYS_ENTERABLE | {FlightMode.FOLLOW, FlightMode.MISSION},
-}
-"""By whether the drone's place is known, and whether a mission is stored."""
 
 
 class Landed(enum.Enum):
@@ -199,8 +191,9 @@ class Vehicle(Aircraft):
         self.pilot_switch = PilotSwitch(self, drone.controller, lambda: self.control.perform(self.stop_for_pilot()))
         self.operators = OperatorControl()
         """The operator among the stations, if one has requested control."""
-        self.control.policy = first_refusal(
-            self.pilot_switch.refusal, lambda request: operator_refusal_of(self.operators, request)
+        self.control.policies = (
+            self.pilot_switch.refusal,
+            lambda request: operator_refusal_of(self.operators, request),
         )
         self.controller_inputs = ControllerInputs(drone.controller)
         self.follow = FollowFlight(self, lambda: self.offboard.motion, clock)
@@ -322,7 +315,9 @@ class Vehicle(Aircraft):
 
         Hold, Land and Return are always among them: whether the drone can, it says itself.
         """
-        return _ENTERABLE[self.place is not None, self.mission.there]
+        follow = {FlightMode.FOLLOW} if self.place is not None else frozenset()
+        mission = {FlightMode.MISSION} if self.mission.there else frozenset()
+        return _ALWAYS_ENTERABLE | follow | mission
 
     # What it can be told to do. Each returns when the drone confirmed, or raises.
 
@@ -668,6 +663,7 @@ class Vehicle(Aircraft):
         takeoff = self.drone.home.state.takeoff_location
         self._note_landing(before)
         if state in ON_GROUND and before is not None:
+            self.commanded_speeds = CommandedSpeeds()
             self.return_end.on_ground()
             self.takeoff.came_down()
             self.control.on_ground()
@@ -742,7 +738,7 @@ class Vehicle(Aircraft):
         """
         self.height.recall(kept)
         if self.on_ground:  # maybe another aircraft, or carried elsewhere
-            self.flight_facts = FlightFacts()
+            self.flight_facts, self.commanded_speeds = FlightFacts(), CommandedSpeeds()
         self.on_flying_state()
         self.on_location()  # the one that it has reported counts for as long as a new one
         if self.flying_state is not None and not self.on_ground:

@@ -42,7 +42,11 @@ Call = tuple[str, str, str, str]
 
 RANKS = {"arsdk": 1, "mavlink": 1, "plans": 1, "config": 1, "drone": 2, "vehicle": 3, "services": 4}
 FLOOR, ROOM, SYSTEM, GATEWAY, CLI = 4, 5, 6, 7, 8
-SIMULATOR = "sim/"
+PARTNERS = ("sim/", "tests/")
+"""Simulated drone and MAVLink client: what they call of the package is no part of a walk."""
+
+LOOP = ROOT / "tests/support/virtual_time.py"
+"""Below it are the functions that the package runs in threads."""
 
 DISPATCHERS = ("drone/drone.py", "services/system.py")
 """They deliver the drone's events."""
@@ -133,7 +137,7 @@ class Tracer:
     def __init__(self) -> None:
         self.iterations: list[Iteration] = []
         self._stack: list[tuple[FrameType, str, str, bool, str]] = []
-        """(frame, file within the package or "", nearest file of the package, part of the drone's side, observer)."""
+        """(frame, file of package or tests or "", nearest file of the package, part of the drone's side, observer)."""
         self._observing: tuple[FrameType, Token[str]] | None = None
         """The frame with which the present observer began."""
         self._seen: set[FrameType] = set()
@@ -157,7 +161,9 @@ class Tracer:
     def _file(self, code: CodeType) -> str:
         if code not in self._files:
             path = Path(code.co_filename)
-            self._files[code] = path.relative_to(PACKAGE).as_posix() if path.is_relative_to(PACKAGE) else ""
+            is_of_client = path.is_relative_to(ROOT / "tests") and path != LOOP
+            root = PACKAGE if path.is_relative_to(PACKAGE) else ROOT if is_of_client else None
+            self._files[code] = "" if root is None else path.relative_to(root).as_posix()
         return self._files[code]
 
     def _profile(self, frame: FrameType, event: str, argument: object) -> None:
@@ -174,7 +180,7 @@ class Tracer:
         file = self._file(code)
         _, _, caller, foreign, observer = self._stack[-1] if self._stack else (None, "", "", False, "")
         observer = observer or OBSERVER.get()
-        foreign = foreign or file.startswith(SIMULATOR) or _of_the_drone(frame, file)
+        foreign = foreign or file.startswith(PARTNERS) or _of_the_drone(frame, file)
         if file and not foreign and code.co_name not in ANONYMOUS:
             if not observer and caller in DISPATCHERS and self._delivers(file):
                 observer = f"{file}:{code.co_qualname if sys.version_info >= (3, 11) else code.co_name}"

@@ -5,19 +5,23 @@ from __future__ import annotations
 import asyncio
 import math
 import time
+from typing import Any
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.clock import everybodys
-from support.fault_scenarios import ACCEPTED, REJECTED, RTL, deaf, goto, heard
+from support.fault_scenarios import ACCEPTED, REJECTED, RTL, SET_MODE, deaf, goto, heard, return_by_itself, watched
 from support.mav import Client
 from support.missions import said
 from support.params import write
+from support.setpoints import COPTER_GUIDED, VELOCITY_ONLY, local, motion, streaming
 from support.world import LAND, RETURN, World, world
 
 from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.rth import RthAutoTriggerMode
 from anafi_mav.sim.autopilot import power
+from anafi_mav.sim.autopilot.homing import ReturnPhase
 
 AT_CONNECTION = {
     "common.Common.CurrentDateTime",
@@ -82,6 +86,38 @@ async def test_low_battery_return_is_announced_shown_and_flown() -> None:
         await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN, since=mark, timeout=20.0)
         await w.drone.wait_log(lambda e: math.hypot(w.drone.pose.north, w.drone.pose.east) < 2.0, 40.0)
         assert [entry.name for entry in w.drone.log if entry.name == "rth.return_to_home"] == []
+
+
+INPUTS: dict[str, tuple[tuple[float, ...], Any]] = {
+    "ardupilot": ((1, COPTER_GUIDED), local(VELOCITY_ONLY, v=(3.0, 0.0, 0.0))),
+    "px4": ((1, 3, 0), dialect.MAVLink_manual_control_message(1, 400, 0, 500, 0, 0)),
+}
+"""By flavour: a mode that is no flight task, and what flies northwards in it."""
+
+
+@pytest.mark.parametrize("skycontroller", [None, 3])
+@pytest.mark.parametrize("flavour", INPUTS)
+async def test_stream_flies_no_further_after_a_return_that_no_client_commanded(
+    flavour: str, skycontroller: int | None
+) -> None:
+    """The battery, or the pilot's button, has led the drone home: a stream does not fly it off again."""
+    mode, message = INPUTS[flavour]
+    async with world(speed=4.0, flavour=flavour, skycontroller=skycontroller) as w:
+        await w.take_off(8.0)
+        assert (await w.client.command(SET_MODE, *mode)).result == ACCEPTED
+        async with streaming(w.client, message):
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 15.0, 30.0)
+            if w.drone.skycontroller is None:
+                return_by_itself(w)
+            else:
+                w.drone.skycontroller.press(0)
+            await w.drone.wait_log(lambda e: w.drone.firmware.homing.flying, 10.0)
+            await w.drone.wait_log(lambda e: w.drone.firmware.homing.phase is ReturnPhase.IDLE, 120.0)
+            home = asyncio.get_running_loop().time()
+            await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.idle)
+            await watched(5.0)
+            assert motion(w, home) == []
+            assert math.hypot(w.drone.pose.north, w.drone.pose.east) < 2.0
 
 
 async def test_critical_battery_lands_and_refuses_a_goto() -> None:

@@ -6,6 +6,7 @@ Judged by the commands that the simulated drone received and by where it flew.
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
@@ -23,6 +24,7 @@ from support.fault_scenarios import (
     watched,
 )
 from support.mav import NAN
+from support.missions import put, way
 from support.params import write
 from support.plans import ACCEPTED as TAKEN
 from support.plans import FENCE, circle, upload
@@ -322,3 +324,30 @@ async def test_unavailable_return_leaves_the_landing_alone() -> None:
         await watched(0.5)
         assert w.drone.flying_state.name == "LANDING"
         assert [e for e in heard(w, "PCMD") if e.args["gaz"]] == []
+
+
+async def begin_goto(w: World) -> None:
+    assert await goto(w, 200.0, 10.0) == ACCEPTED
+
+
+async def begin_mission(w: World) -> None:
+    await put(w, [way(200.0, 0.0, 10.0)])
+    assert (await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)).result == ACCEPTED
+
+
+async def begin_move_of_other_controller(w: World) -> None:
+    somebody_else(w, ardrone3.MoveTo(*geo.destination(*HOME[:2], 200.0, 0.0), 10.0, 0, 0.0))
+
+
+@pytest.mark.parametrize("begin", [begin_goto, begin_mission, begin_move_of_other_controller])
+async def test_return_begins_although_firmware_lets_it_wait_for_a_move(
+    begin: Callable[[World], Awaitable[None]],
+) -> None:
+    """Parrot promises a return to a drone that hovers: the move to a place far away ends first, not at that place."""
+    async with world(quirks=("return-waits-for-moves",), web=True) as w:
+        await w.take_off(10.0)
+        await begin(w)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 10.0, 30.0)
+        assert (await w.client.command(RTL)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: w.drone.firmware.homing.flying, 10.0)
+        assert w.drone.pose.north < 60.0

@@ -269,6 +269,23 @@ async def test_return_to_set_home_lands_only_in_same_flight(when: str) -> None:
         assert math.hypot(w.drone.pose.north - 8.0, w.drone.pose.east) < 1.0
 
 
+@pytest.mark.parametrize("z", [0.0, HOME[2] - 30.0, HOME[2] + 4.0])
+async def test_return_to_set_home_ends_in_the_air_whatever_height_a_client_sends(z: float) -> None:
+    """A client without the height of a place sends 0; the drone may count the end of a return from it."""
+    async with world(speed=FAST, quirks=("return-ends-above-home",)) as w:
+        await write(w.client, "ANF_RTL_END", 1, INT32)
+        place = geo.destination(*HOME[:2], 8.0, 0.0)
+        await away(w)
+        mark = w.client.mark()
+        assert (await w.client.command(SET_HOME, 0, frame=0, x=place[0], y=place[1], z=z)).result == ACCEPTED
+        if z < HOME[2]:
+            await said(w.client, f"^Home height raised to take-off: was {z - HOME[2]:.0f} m$", mark)
+        mark = await go_home(w)
+        await said(w.client, r"^Return ended, hovering at 1\d m", mark)
+        assert w.drone.pose.up == pytest.approx(10.0 + max(0.0, z - HOME[2]), abs=0.5)
+        assert w.drone.pose.north == pytest.approx(8.0, abs=1.0)
+
+
 async def test_return_not_reported_as_finished_hovers_with_a_text() -> None:
     """Quirk rth-finished-missing: nothing is landed, everybody reads it, and Hold still ends it."""
     async with world(speed=FAST) as w:

@@ -10,7 +10,6 @@ from anafi_mav.arsdk.messages.common import MavlinkFilePlayingStateChanged, Mavl
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.requester import Source
 from anafi_mav.vehicle.link_loss import LossAction
-from anafi_mav.vehicle.manual_flight import Event
 from support.world import World
 
 
@@ -46,6 +45,6 @@ CALLERS: dict[str, Callable[[Any], Awaitable[None]]] = {
     "mission break": lambda system: _call(system.vehicle.mission._on_playing, OTHER_PLAN, 0.0),
     "setpoints silent": lambda system: _call(system.vehicle.offboard._expired),
     "target silent": lambda system: _call(system.vehicle.follow._expired),
-    "sticks silent": lambda system: _call(system.vehicle.manual._let_go, Event.END),
+    "sticks silent": lambda system: _call(system.vehicle.manual._expired),
     "gateway end": lambda system: system.let_go(),
 }

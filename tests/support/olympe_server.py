@@ -2,6 +2,8 @@
 
 That is `interop/olympe_fork.py`. Without workers each script is a process of its own: the tests' clock does not leave
 out any time while the process that runs the tests has a child.
+
+Each script gets a UDP port of its own from the system, because Olympe's default port is reserved.
 """
 
 from __future__ import annotations
@@ -29,9 +31,16 @@ ANSWER = 64
 """Bytes of an answer at most."""
 
 
+CONTROLLER_PORT = 9988
+"""UDP port of Parrot's controllers (libarsdk's arsdk_net.h); one that is in use is replaced by any free one."""
+
+
 def pytest_configure(config: pytest.Config) -> None:
-    """Start the program before the workers."""
-    if hasattr(config, "workerinput") or not config.getoption("numprocesses", None):
+    """Reserve Olympe's port, and start the program before the workers."""
+    if hasattr(config, "workerinput"):
+        return
+    config.add_cleanup(_reserve_port().close)
+    if not config.getoption("numprocesses", None):
         return
     if importlib.util.find_spec("olympe") is None or not hasattr(os, "pidfd_open"):
         return
@@ -51,6 +60,20 @@ def pytest_configure(config: pytest.Config) -> None:
         folder.cleanup()
 
     config.add_cleanup(end)
+
+
+def _reserve_port() -> socket.socket:
+    """Keep Olympe's port from every script.
+
+    A drone sends for up to 8 s to a controller that has left, and libarsdk takes a datagram from any source: the next
+    controller with that port would read the frames of a drone that is not its own. Other runs of the tests may hold
+    the port, too.
+    """
+    held = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    held.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    with suppress(OSError):  # an Olympe outside of the tests has it
+        held.bind(("", CONTROLLER_PORT))
+    return held
 
 
 def _log(path: str) -> Path:

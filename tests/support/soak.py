@@ -818,7 +818,7 @@ def pilots(w: World) -> list[str]:
         "follow": vehicle.follow.engaged,
         "mission": vehicle.mission.flying,
         "orbit": orbit.circle is not None,
-        "sticks": vehicle.manual.state.name == "HELD",
+        "sticks": vehicle.manual.holder is not None,
     }
     return [name for name, flies in tasks.items() if flies]
 

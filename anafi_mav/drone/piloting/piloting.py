@@ -61,7 +61,7 @@ class Piloting(PilotingSettings):
         self._sticks = StickStream(commander, self, home, lambda: self.pilot_has_source())
         self._motors = Motors(commander, self, self._sticks, takeoff_blockers)
         self._guided = GuidedMoves(commander, self, home, self._sticks, self._moves)
-        self._returns = ReturnHome(commander, self, home, self._sticks, self._moves)
+        self._returns = ReturnHome(commander, self, home, self._sticks, self._moves, self._end_movement)
         self.is_modern: Callable[[], bool] = lambda: False
         """True for an Ai; set by `Drone`."""
         self._landing_end = LandingEnd(commander, self, self._sticks, self._motors, lambda: self.is_modern())
@@ -263,17 +263,18 @@ class Piloting(PilotingSettings):
     async def return_home(self, timeout: float = ANSWER_TIMEOUT) -> Move | None:
         """Fly home; returns when the return is running or pending.
 
-        None: the drone was returning already.
+        What the drone flies by itself is cancelled first, as by `hover`: a return waits until the drone hovers (rth.xml
+        146-0-11), and a moveTo would be flown to its end before. None: the drone was returning already.
         """
         return await self._returns.return_home(timeout)
 
-    async def cancel_return_home(self, timeout: float = ANSWER_TIMEOUT, *, even_its_own: bool = False) -> None:
-        """Stop a return that a user commanded, also one that has not begun yet.
+    async def cancel_return_home(self, timeout: float = ANSWER_TIMEOUT, *, even_its_own: bool = False) -> bool:
+        """Stop a return that a user commanded, also one not begun yet; return False without one.
 
         It may have been commanded through this program or not. One that the drone began by itself is stopped only
         with `even_its_own`, else `CommandRejected` is raised.
         """
-        await self._returns.cancel_return_home(timeout, even_its_own=even_its_own)
+        return await self._returns.cancel_return_home(timeout, even_its_own=even_its_own)
 
     async def set_min_altitude(self, metres: float) -> float:
         """See `Home.set_min_altitude`."""
@@ -317,9 +318,16 @@ class Piloting(PilotingSettings):
         the drone began by itself continue. Raises `LinkLost` without a link.
         """
         self._commander.require_link()
-        state = self.state
         self._commander.abort_pending("stopped by hover")
-        cancelled = self._guided.stop("stopped by hover")
+        self._end_movement("stopped by hover")
+        if self._returns.drop("stopped by hover"):
+            self._returns.abort()
+        self._sticks.centre()
+
+    def _end_movement(self, why: str) -> None:
+        """Cancel what the drone flies by itself, as far as known; a landing or return goes on."""
+        state = self.state
+        cancelled = self._guided.stop(why)
         if not self._home.state.returning_by_itself:
             if state.move_to == MoveToStatus.RUNNING and not cancelled:
                 self._commander.send_stop(ardrone3.CancelMoveTo())
@@ -332,9 +340,6 @@ class Piloting(PilotingSettings):
         self._stop_animation()
         if state.plan == PlayingState.PLAYING or self._commander.sent.is_executed(Slot.PLAN):
             self._commander.send_stop(common.Pause())
-        if self._returns.drop("stopped by hover"):
-            self._returns.abort()
-        self._sticks.centre()
 
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """Hover, and return when the drone has confirmed the end of everything that was running."""

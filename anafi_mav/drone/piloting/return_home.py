@@ -6,6 +6,7 @@ A return may have begun by itself, or become one of the drone's own while it was
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 
 from anafi_mav.arsdk.messages import rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, FlyingStateChanged
@@ -30,8 +31,16 @@ class ReturnHome:
     """
 
     def __init__(
-        self, commander: Commander, flight: Element[PilotingState], home: Home, sticks: StickStream, moves: Moves
+        self,
+        commander: Commander,
+        flight: Element[PilotingState],
+        home: Home,
+        sticks: StickStream,
+        moves: Moves,
+        end_movement: Callable[[str], None],
     ) -> None:
+        """Store `end_movement`, which cancels what the drone flies; its argument is the reason."""
+        self._end_movement = end_movement
         self._commander = commander
         self._flight = flight
         self._home = home
@@ -64,6 +73,7 @@ class ReturnHome:
 
         self._commander.abort_pending("the drone is to return home")
         self._sticks.release()  # raises while the pilot at a Skycontroller flies: nothing waits for an answer then
+        self._end_movement("the drone is to return home")
         move = Move(self._commander.expect((rth.State,), judge))
         self._moves.returning = move
         try:
@@ -94,14 +104,14 @@ class ReturnHome:
             hover.close()
         return not move.answer.future.done()
 
-    async def cancel_return_home(self, timeout: float, *, even_its_own: bool = False) -> None:
+    async def cancel_return_home(self, timeout: float, *, even_its_own: bool = False) -> bool:
         self._commander.require_link()
         home = self._home.state
         if home.returning_by_itself and not even_its_own:
             raise CommandRejected(BY_ITSELF)
         asked = self.drop("the return was cancelled")
         if not home.returning and not asked and not self._moves.aborting:
-            return
+            return False
         answer = self._commander.expect((rth.State,), _ends_return)
         began = loop_time()
         try:
@@ -112,6 +122,7 @@ class ReturnHome:
         await self._commander.stops_delivered(rth.Abort.NAME, timeout - (loop_time() - began))
         if self._home.state.returning:
             raise CommandTimeout(rth.Abort.NAME, timeout)
+        return True
 
     def abort(self, even_its_own: bool = False) -> asyncio.Future[None]:
         """End a return.

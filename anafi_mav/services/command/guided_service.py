@@ -1,6 +1,6 @@
 """Guided flight by single commands: speed, height, heading, pause, home.
 
-What goes to a place is `actions.reposition`; what circles is `orbit_service`. A handler returns when the drone
+What goes to a place is `flight_service`; what circles is `orbit_service`. A handler returns when the drone
 confirmed. Regions of interest are in `services.gimbal`. Conformance A4, B1, B2, D1 and items 78-83, 143.
 """
 
@@ -20,7 +20,7 @@ from anafi_mav.services.command_targets import UnsupportedFrame, height, height_
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
-from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST, check_height, check_on_earth
+from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST, check_height, check_on_earth, home_height
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
@@ -154,8 +154,9 @@ class GuidedService(Service):
         A move that is under way changes its speed at once. A mission, a return and a landing are flown at a speed of
         the drone's own, so it is refused there (ArduCopter: FAILED in modes without a speed).
 
-        Unset and -1 change nothing, -2 restores the drone's own speed. The drone itself limits a value above its
-        maximum. An ANAFI measures no airspeed: both horizontal types are over ground.
+        Unset and -1 change nothing, -2 restores the speed of the parameter (ANF_CRUISE_SPEED, ANF_CLIMB_SPEED), and so
+        does the landing. The drone itself limits a value above its maximum. An ANAFI measures no airspeed: both
+        horizontal types are over ground.
         """
         kind, speed, throttle = command.params[:3]
         if not (math.isnan(throttle) or throttle in (0.0, KEEP, DEFAULT)):
@@ -169,13 +170,13 @@ class GuidedService(Service):
         if speed != DEFAULT and not SLOWEST <= speed <= FASTEST:
             raise Refused(texts.SPEED, texts.PARAM2_SPEED.fill(slowest=SLOWEST, fastest=FASTEST), lasting=True)
         wanted = None if speed == DEFAULT else speed
-        vehicle, settings = self.host.vehicle, self.host.vehicle.settings
+        vehicle = self.host.vehicle
         if vehicle.mode in _OWN_SPEED:
             raise Refused(texts.SPEED, texts.FIXED_IN_MODE.fill(mode=vehicle.mode.value))
         if kind in (_AIRSPEED, _GROUNDSPEED):
-            vehicle.settings = replace(settings, cruise_speed=wanted)
+            vehicle.commanded_speeds = replace(vehicle.commanded_speeds, cruise=wanted)
         else:
-            vehicle.settings = replace(settings, climb_speed=wanted)
+            vehicle.commanded_speeds = replace(vehicle.commanded_speeds, climb=wanted)
         if (goto := vehicle.guided.goto) is not None:
             await vehicle.guided.go(goto, by=command.right)
 
@@ -269,7 +270,8 @@ class GuidedService(Service):
             before = home.state.preferred_type
             try:
                 await home.set_preferred_type(RthHomeType.CUSTOM)
-                given = await home.set_custom_location(where.latitude, where.longitude, ato)
+                at = home_height(vehicle, ato)
+                given = await home.set_custom_location(where.latitude, where.longitude, at)
             except BaseException:
                 # The custom home of some other day must not stay: a return that replaces this waits until it is gone.
                 if before is not None and before != RthHomeType.CUSTOM:

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from anafi_mav.drone import events
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.command.actions import change_mode
+from anafi_mav.services.command.flight_service import change_mode
 from anafi_mav.services.commands import Action, Altitude, Command, effect_of_mode
 from anafi_mav.services.flavours import STANDARD_MODES, Flavour, flavour_of, mode_of_standard
 from anafi_mav.services.service import Answer, Host, Request, Service

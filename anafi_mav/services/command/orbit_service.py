@@ -7,7 +7,6 @@ held from here, and whatever ends the gateway ends them. Conformance A4, B1 and 
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -17,7 +16,6 @@ from anafi_mav import geo, texts, units
 from anafi_mav.drone import events
 from anafi_mav.drone.piloting.moves import Move, MoveEnd
 from anafi_mav.drone.values import Values
-from anafi_mav.errors import LinkLost
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.command_targets import height, place
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
@@ -114,8 +112,7 @@ class OrbitService(Service, PlainTask):
         if orbit is None:
             return []
         orbit.is_over = True
-        with contextlib.suppress(LinkLost):
-            self.host.drone.piloting.pilot(None)
+        self.host.vehicle.centre_sticks()
         if orbit.approach is None or orbit.approach is asyncio.current_task():
             return []
         orbit.approach.cancel()
@@ -145,7 +142,7 @@ class OrbitService(Service, PlainTask):
         check_place(vehicle, start)
         for before, point in pairwise(outline(circle)):
             check_place(vehicle, point, start=before)
-        orbit = _Orbit(Lap(self._held_back(circle)), vehicle.settings.cruise_speed)
+        orbit = _Orbit(Lap(self._held_back(circle)), vehicle.cruise_speed)
         circle = orbit.lap.circle
         bearing = _bearing(circle.centre, start)
         off = abs(geo.distance(*circle.centre.point, *here.point) - circle.radius)
@@ -247,7 +244,7 @@ class OrbitService(Service, PlainTask):
         if orbit is None or orbit.controller is None or not vehicle.control.keeps(self):
             return
         lap = orbit.lap
-        if (cruise := vehicle.settings.cruise_speed) != orbit.cruise:
+        if (cruise := vehicle.cruise_speed) != orbit.cruise:
             orbit.cruise = cruise
             lap.circle = self._held_back(replace(lap.circle, speed=cruise or DEFAULT_SPEED))
         limits = vehicle.drone.piloting.limits
@@ -262,8 +259,7 @@ class OrbitService(Service, PlainTask):
 
     def _stop(self, why: OperatorText, severity: Severity) -> None:
         self.host.vehicle.control.release(self)
-        with contextlib.suppress(LinkLost):
-            self.host.drone.piloting.hover()
+        self.host.vehicle.hover()
         self.host.text(severity, texts.TASK_ENDED.fill(what=texts.ORBIT, reason=why))
 
     def _status(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:

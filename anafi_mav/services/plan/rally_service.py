@@ -15,6 +15,7 @@ from anafi_mav.drone import Position
 from anafi_mav.drone.events import RthHomeType
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.services.service import Host, Service
+from anafi_mav.vehicle.base.bounds import home_height
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.rally import RallyPoint, RallyPoints, Return
@@ -130,7 +131,8 @@ class RallyService(Service):
                     self._given = home.state.custom_location
                     await self._remember(home.state.preferred_type.name)
                 await home.set_preferred_type(RthHomeType.CUSTOM)
-                self._given = await home.set_custom_location(point.latitude, point.longitude, point.ato)
+                at = home_height(self.host.vehicle, point.ato)
+                self._given = await home.set_custom_location(point.latitude, point.longitude, at)
             except AnafiMavError as error:
                 self._rejected[point] = now + REJECTED_FOR
                 self._chosen = None

@@ -487,7 +487,8 @@ class Autopilot:
         if self.state not in GUIDED:
             return
         hovering = self.state is FlyingState.HOVERING
-        if self.homing.home is not None and not self.homing.flying:
+        waits = reason is StateReason.USER_REQUEST and Quirk.RETURN_WAITS_FOR_MOVES in self.faults.quirks
+        if self.homing.home is not None and not self.homing.flying and not waits:
             self.flight_plan.stop(hover=True)
             self.guidance.cancel(self.pose)
             self._free()

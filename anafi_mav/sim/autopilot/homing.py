@@ -284,7 +284,8 @@ class Homing:
             self._go(north, east, self._height, face=_far(pose, north, east))
         elif self.phase is ReturnPhase.CRUISE:
             self.phase = ReturnPhase.DESCEND
-            self._go(north, east, min(self._settings.number("rth_hovering_altitude"), self._height))
+            ground = home.altitude if Quirk.RETURN_ENDS_ABOVE_HOME in self._faults.quirks else 0.0
+            self._go(north, east, min(ground + self._settings.number("rth_hovering_altitude"), self._height))
         else:
             self._stop_body()
             if Quirk.RTH_FINISHED_MISSING in self._faults.quirks:

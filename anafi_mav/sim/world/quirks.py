@@ -50,9 +50,18 @@ class Quirk(enum.Enum):
         "the flag of the last PCMD counts until the next PCMD: with flag 1 the drone never hovers, and a return or "
         "point of interest waits for ever",
     )
+    RETURN_WAITS_FOR_MOVES = (
+        "return-waits-for-moves",
+        "a return that a user requests ends no move, plan or point of interest: it begins when the drone hovers after "
+        "it",
+    )
     RAMPING_IGNORES_LANDING = (
         "ramping-ignores-landing",
         "Landing and UserTakeOff(0) do nothing while the motors ramp up",
+    )
+    RETURN_ENDS_ABOVE_HOME = (
+        "return-ends-above-home",
+        "the height at the end of a return counts from that of the home, not from the take-off",
     )
     NO_FLIGHT_ID = ("no-flight-id", "FlightId is never reported")
     GPS_LOCATION_STOPS = ("gps-location-stops", "GpsLocationChanged is no longer sent although the drone reports a fix")

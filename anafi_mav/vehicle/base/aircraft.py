@@ -9,14 +9,17 @@ of them needs to know the others.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 from anafi_mav import texts
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import FlyingState, PilotingStyleStyle
+from anafi_mav.errors import LinkLost
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.control import Control
 from anafi_mav.vehicle.base.flight_task import Needs
@@ -25,6 +28,7 @@ from anafi_mav.vehicle.base.geo_point import GeoPoint, point_of
 from anafi_mav.vehicle.base.height import HeightReference
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.move_heading import MoveHeading
+from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import By
 from anafi_mav.vehicle.base.roll_sign import RollCheck, RollSign
 from anafi_mav.vehicle.base.severity import Severity
@@ -52,7 +56,7 @@ class FlightSettings:
     hand_launch: bool = False
     """Arming starts the motors and waits for the drone to be thrown (Parrot's UserTakeOff)."""
     cruise_speed: float | None = None
-    """m/s over ground that moves keep to; None: the drone's own (MAV_CMD_DO_CHANGE_SPEED)."""
+    """m/s over ground that moves keep to; None: the drone's own."""
     climb_speed: float | None = None
     """m/s up and down that moves keep to; None: the drone's own."""
     move_heading: MoveHeading = MoveHeading.KEEP
@@ -62,6 +66,19 @@ class FlightSettings:
 
     dronekit's documents send one a second; ArduCopter's GUID_TIMEOUT is 3 s.
     """
+
+
+@dataclass(frozen=True)
+class CommandedSpeeds:
+    """Speeds that a client has commanded for a flight; None: those of `FlightSettings`.
+
+    By MAV_CMD_DO_CHANGE_SPEED.
+    """
+
+    cruise: float | None = None
+    """m/s over ground."""
+    climb: float | None = None
+    """m/s up and down."""
 
 
 class Aircraft(ABC):
@@ -80,6 +97,8 @@ class Aircraft(ABC):
         self.roll = RollCheck()
         """Verifies the sign of the roll that the drone reports, for the loops over velocity."""
         self.settings = FlightSettings()
+        self.commanded_speeds = CommandedSpeeds()
+        """For the present flight, on the ground for the next one."""
         self.fence = FenceWatch()
         self.home_choice = asyncio.Lock()
         """Lock held while the drone's home is chosen.
@@ -98,6 +117,18 @@ class Aircraft(ABC):
     def flying_state(self) -> FlyingState | None:
         """Parrot's flying state; None until reported."""
         return self.drone.piloting.settled.flying
+
+    @property
+    def cruise_speed(self) -> float | None:
+        """Ground speed (m/s) that moves keep to; None: the drone's own."""
+        commanded = self.commanded_speeds.cruise
+        return self.settings.cruise_speed if commanded is None else commanded
+
+    @property
+    def climb_speed(self) -> float | None:
+        """Vertical speed (m/s) that moves keep to; None: the drone's own."""
+        commanded = self.commanded_speeds.climb
+        return self.settings.climb_speed if commanded is None else commanded
 
     @property
     def on_ground(self) -> bool:
@@ -202,9 +233,13 @@ class Aircraft(ABC):
 
     def lacking(self, needs: Needs) -> OperatorText | None:
         """Return the first condition that is not met, as the reason of a refusal; None: all are."""
-        if Needs.NO_DESCENT in needs and (descent := self.descent) is not None:
+        has_descent, rows = _rows_of(needs)
+        if has_descent and (descent := self.descent) is not None:
             return descent
-        return next((reason for need, is_unmet, reason in _UNMET if need in needs and is_unmet(self)), None)
+        for is_unmet, reason in rows:
+            if is_unmet(self):
+                return reason
+        return None
 
     def prearm_problems(self) -> list[OperatorText]:
         """Return the reasons why the drone would not take off, in sentences; empty without any."""
@@ -218,6 +253,11 @@ class Aircraft(ABC):
             problems.append(problem)
         return problems
 
+    def require_ready(self) -> None:
+        """Raise `Refused` with the reasons why the drone would not take off."""
+        if problems := self.prearm_problems():
+            raise Refused(texts.ARMING, texts.joined(problems), form=texts.PREARM)
+
     @property
     def fence_problem(self) -> OperatorText | None:
         """The reason why the fence keeps the drone on the ground, in a sentence; None without one."""
@@ -228,7 +268,19 @@ class Aircraft(ABC):
                 return error.reason
         return None
 
-    # What everybody who flies it needs. Each verb returns when the drone confirmed, or raises.
+    # What everybody who flies it needs.
+
+    def centre_sticks(self) -> None:
+        """Centre the sticks; without a link none are held."""
+        with contextlib.suppress(LinkLost):
+            self.drone.piloting.pilot(None)
+
+    def hover(self) -> None:
+        """End every motion of ours; without a link the drone does that by itself."""
+        with contextlib.suppress(LinkLost):
+            self.drone.piloting.hover()
+
+    # Each verb returns when the drone confirmed, or raises.
 
     @abstractmethod
     async def hold(self, mode: FlightMode, by: By) -> None:
@@ -251,3 +303,12 @@ _UNMET: tuple[tuple[Needs, Callable[[Aircraft], bool], OperatorText], ...] = (
     (Needs.ROLL_SIGN, lambda aircraft: aircraft.roll.sign is RollSign.INVERTED, texts.ROLL_INVERTED),
 )
 """When a need is not met, and the reason of a refusal then, in the order in which they are checked."""
+
+
+@cache
+def _rows_of(needs: Needs) -> tuple[bool, Sequence[tuple[Callable[[Aircraft], bool], OperatorText]]]:
+    """Return True when a descent counts, and the rows of the other needs.
+
+    Stored, because each setpoint of a stream is checked.
+    """
+    return Needs.NO_DESCENT in needs, [(is_unmet, reason) for need, is_unmet, reason in _UNMET if need in needs]

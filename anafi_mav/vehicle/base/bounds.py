@@ -14,6 +14,7 @@ from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.geo_point import GeoPoint, point_of
 from anafi_mav.vehicle.base.height import ESTIMATE_FLOOR
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.fence_watch import OutsideFence
 
 SLOWEST, FASTEST = 0.1, 100.0
@@ -91,6 +92,19 @@ def check_estimate(vehicle: Aircraft, ato: float) -> None:
     """
     if vehicle.height.estimated and ato < ESTIMATE_FLOOR:
         raise Refused(texts.HEIGHT, texts.NEAR_ESTIMATE.fill(height=ato, lowest=ESTIMATE_FLOOR))
+
+
+def home_height(vehicle: Aircraft, ato: float) -> float:
+    """Return the height (m above take-off) of a custom home: at least that of the take-off.
+
+    The end of a return is a height above the ground at home (rth.xml 146-0-24), and a drone may calculate it from this
+    one. Clients that do not know the height send 0 above sea level, which is far below the ground inland. Above a home
+    that is raised the return ends too high, and a landing leads down from there. A text reports it.
+    """
+    if ato >= 0.0:
+        return ato
+    vehicle.text(Severity.WARNING, texts.HOME_RAISED.fill(height=ato))
+    return 0.0
 
 
 def check_on_earth(place: GeoPoint, what: OperatorText) -> None:

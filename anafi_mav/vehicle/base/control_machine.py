@@ -18,8 +18,10 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 TaskT = TypeVar("TaskT")
 
@@ -65,8 +67,7 @@ ADOPTED = 0
 """Number of an adoption: that of no attempt, so that the end of an attempt does not end what was adopted since."""
 
 
-@dataclass(frozen=True)
-class Attempt(Generic[TaskT]):
+class Attempt(Struct, Generic[TaskT], frozen=True):
     """One request of a task."""
 
     task: TaskT | None
@@ -81,8 +82,7 @@ class Attempt(Generic[TaskT]):
     """Nothing replaces it before it has ended: the motors are being cut."""
 
 
-@dataclass(frozen=True)
-class Situation(Generic[TaskT]):
+class Situation(Struct, Generic[TaskT], frozen=True):
     """The whole state of the control."""
 
     below: TaskT | None = None
@@ -134,8 +134,7 @@ class Situation(Generic[TaskT]):
         return None, self.below if pending.keeps_below or pending.below == self.below else None
 
 
-@dataclass(frozen=True)
-class Input(Generic[TaskT]):
+class Input(Struct, Generic[TaskT], frozen=True):
     """Subject of an event."""
 
     attempt: Attempt[TaskT] | None = None
@@ -147,8 +146,7 @@ class Input(Generic[TaskT]):
     act: DroneAct | None = None
 
 
-@dataclass(frozen=True)
-class Step(Generic[TaskT]):
+class Step(Struct, Generic[TaskT], frozen=True):
     """The next situation, and the effects of the event."""
 
     situation: Situation[TaskT]
@@ -161,19 +159,6 @@ class Step(Generic[TaskT]):
 REST = (State.IDLE, State.ACTIVE, State.PAUSED, State.DRONE_ACTS)
 """States without a request."""
 _HOVERS = (State.IDLE, State.ACTIVE, State.PAUSED)
-_PENDING: dict[Event, tuple[State, ...]] = {
-    Event.REQUEST: (State.RELEASING,),
-    Event.FAIL: REST,
-    Event.ADOPT: (State.RELEASING, State.ACQUIRING),
-    Event.SUCCEED: (State.RELEASING, State.ACQUIRING),
-    Event.FINISH: (State.RELEASING, State.ACQUIRING),
-    Event.LOSE: (State.RELEASING, State.ACQUIRING),
-    Event.RESUME: (State.RELEASING, State.ACQUIRING),
-    Event.DESCEND: (State.RELEASING, State.ACQUIRING),
-    Event.HOVER: (State.RELEASING, State.ACQUIRING),
-    Event.GROUND: (State.RELEASING, State.ACQUIRING),
-    Event.LINK_DOWN: (State.IDLE,),
-}
 _ANYWHERE: dict[Event, tuple[State, ...]] = {
     Event.REQUEST: (State.RELEASING,),
     Event.ADOPT: (State.ACTIVE, State.PAUSED, State.IDLE),
@@ -182,17 +167,31 @@ _ANYWHERE: dict[Event, tuple[State, ...]] = {
     Event.LINK_DOWN: (State.IDLE,),
 }
 
+
+def _requested(state: State) -> dict[Event, tuple[State, ...]]:
+    """Return the events of both states of a request, most of which leave it as it is."""
+    untouched = (
+        Event.ADOPT,
+        Event.SUCCEED,
+        Event.FINISH,
+        Event.LOSE,
+        Event.RESUME,
+        Event.DESCEND,
+        Event.HOVER,
+        Event.GROUND,
+    )
+    return {
+        Event.REQUEST: (State.RELEASING,),
+        Event.FAIL: REST,
+        **dict.fromkeys(untouched, (state,)),
+        Event.LINK_DOWN: (State.IDLE,),
+    }
+
+
 TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
     State.IDLE: {**_ANYWHERE, Event.SUCCEED: (State.IDLE,), Event.FINISH: (State.IDLE,)},
-    State.RELEASING: {
-        **{event: tuple(s for s in to if s is not State.ACQUIRING) for event, to in _PENDING.items()},
-        Event.RELEASED: (State.ACQUIRING,),
-    },
-    State.ACQUIRING: {
-        **{event: tuple(s for s in to if s is not State.RELEASING) for event, to in _PENDING.items()},
-        Event.REQUEST: (State.RELEASING,),
-        Event.GRANT: _HOVERS,
-    },
+    State.RELEASING: {**_requested(State.RELEASING), Event.RELEASED: (State.ACQUIRING,)},
+    State.ACQUIRING: {**_requested(State.ACQUIRING), Event.GRANT: _HOVERS},
     State.ACTIVE: {
         **_ANYWHERE,
         Event.SUCCEED: (State.ACTIVE,),
@@ -291,7 +290,8 @@ def _resume(now: Situation[TaskT], about: Input[TaskT]) -> Step[TaskT]:
 
 
 def _descend(now: Situation[TaskT], about: Input[TaskT]) -> Step[TaskT]:
-    after = replace(now, act=about.act or now.act or DroneAct.LANDING, task=None, successor=None)
+    # The hovering mode ends too: a stream that was flown in it would fly the drone away from home, or off again.
+    after = replace(now, act=about.act or now.act or DroneAct.LANDING, task=None, below=None, successor=None)
     return Step(after, _those(now.task, now.below, now.successor))
 
 

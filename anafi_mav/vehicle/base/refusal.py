@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from anafi_mav import texts
 from anafi_mav.errors import AnafiMavError, CommandRejected
 from anafi_mav.texts import OperatorText, Template
@@ -64,11 +62,6 @@ class DroneRefused(CommandRejected):
 
     def __init__(self, text: OperatorText) -> None:
         super().__init__(text)
-
-
-def not_ready(problems: Sequence[OperatorText]) -> Refused:
-    """Return the refusal of a take-off that has these problems."""
-    return Refused(texts.ARMING, texts.joined(problems), form=texts.PREARM)
 
 
 def reason_of(error: AnafiMavError) -> OperatorText:

@@ -9,7 +9,10 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Hashable
-from dataclasses import dataclass
+
+from msgspec import Struct
+
+from anafi_mav.vehicle.base.clients import system_of
 
 
 class Extent(enum.Enum):
@@ -21,8 +24,7 @@ class Extent(enum.Enum):
     """The right of a command or a mode message."""
 
 
-@dataclass(frozen=True)
-class Right:
+class Right(Struct, frozen=True):
     """One client's right, given by one message of it."""
 
     client: Hashable
@@ -36,10 +38,7 @@ class Right:
     @property
     def system(self) -> int:
         """MAVLink system id of the client, for texts; 0 when it is unknown."""
-        match self.client:
-            case (_, int(system), _):
-                return system
-        return 0
+        return system_of(self.client) or 0
 
     def covered(self, extent: Extent | None) -> Extent | None:
         """Return how far this right covers what a task may end; None: not at all."""

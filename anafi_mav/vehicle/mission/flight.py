@@ -24,7 +24,7 @@ from anafi_mav.plans.translation.translate import FlightPlanFile
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.flight_task import Needs, PlainTask, TaskRules
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.refusal import DroneRefused, Refused, not_ready, reason_of, text_of
+from anafi_mav.vehicle.base.refusal import DroneRefused, Refused, reason_of, text_of
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
@@ -131,8 +131,7 @@ class MissionFlight(PlainTask):
             await self._work(Prepare(attempt), by)
             self._require_same(attempt)
             return
-        if problems := vehicle.prearm_problems():
-            raise not_ready(problems)
+        vehicle.require_ready()
         async with vehicle.control.acquire(self, by=by):
             pass
         self._handle(machine.await_arm(by.client, self._now))

@@ -119,6 +119,17 @@ _ANY_REST = (S.NO_MISSION, *_REST)
 _NEXT = (S.FLYING_ITEM, S.COMPLETE, S.PAUSED)
 """After a file or an item: the next one, the end, or a stop before what the drone cannot fly alone."""
 
+
+def _common(state: State) -> dict[Event, tuple[State, ...]]:
+    """Return the events that each state with a mission has, most of them with these results."""
+    return {
+        E.UPLOADED: (S.READY,),
+        E.CLEARED: (S.NO_MISSION,),
+        E.UPLOADED_AGAIN: (state,),
+        E.PREPARED: (S.TAKING_OVER,),
+    }
+
+
 TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
     S.NO_MISSION: {
         E.UPLOADED: (S.READY,),
@@ -127,25 +138,19 @@ TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
         E.LINK_DOWN: (S.NO_MISSION,),
     },
     S.READY: {
-        E.UPLOADED: (S.READY,),
-        E.CLEARED: (S.NO_MISSION,),
-        E.UPLOADED_AGAIN: (S.READY,),
+        **_common(S.READY),
         E.CHOSEN: (S.READY,),
         E.ENGAGED: (S.AWAIT_ARM,),
-        E.PREPARED: (S.TAKING_OVER,),
         E.RESUMED: (S.FLYING_FILE,),
         E.OTHER_PLAYING: (S.READY,),
         E.LINK_DOWN: (S.READY,),
         E.LINK_UP: (S.READY, S.FLYING_FILE, S.PAUSED, S.COMPLETE),
     },
     S.AWAIT_ARM: {
-        E.UPLOADED: (S.READY,),
-        E.CLEARED: (S.NO_MISSION,),
-        E.UPLOADED_AGAIN: (S.AWAIT_ARM,),
+        **_common(S.AWAIT_ARM),
         E.CHOSEN: (S.AWAIT_ARM,),
         E.ENGAGED: (S.AWAIT_ARM,),
         E.ARMED: (S.PREPARING,),
-        E.PREPARED: (S.TAKING_OVER,),
         E.RESUMED: (S.FLYING_FILE,),
         E.OTHER_PLAYING: (S.AWAIT_ARM,),
         E.CONTROL_LOST: _REST,
@@ -153,39 +158,28 @@ TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
         E.LINK_DOWN: _REST,
     },
     S.PREPARING: {
+        **_common(S.PREPARING),
         E.UPLOADED: (S.PREPARING, S.READY),
-        E.CLEARED: (S.NO_MISSION,),
-        E.UPLOADED_AGAIN: (S.PREPARING,),
-        E.PREPARED: (S.TAKING_OVER,),
         E.FAILED: _REST,
         E.OTHER_PLAYING: (S.PREPARING,),
         E.CONTROL_LOST: _REST,
         E.LINK_DOWN: _REST,
     },
     S.TAKING_OVER: {
-        E.UPLOADED: (S.READY,),
-        E.CLEARED: (S.NO_MISSION,),
-        E.UPLOADED_AGAIN: (S.TAKING_OVER,),
-        E.PREPARED: (S.TAKING_OVER,),
+        **_common(S.TAKING_OVER),
         E.GRANTED: (S.STARTING, S.FLYING_ITEM),
         E.FAILED: _REST,
         E.LINK_DOWN: _REST,
     },
     S.STARTING: {
-        E.UPLOADED: (S.READY,),
-        E.CLEARED: (S.NO_MISSION,),
-        E.UPLOADED_AGAIN: (S.STARTING,),
-        E.PREPARED: (S.TAKING_OVER,),
+        **_common(S.STARTING),
         E.FAILED: _REST,
         E.PLAYING: (S.FLYING_FILE,),
         E.CONTROL_LOST: _REST,
         E.LINK_DOWN: _REST,
     },
     S.FLYING_FILE: {
-        E.UPLOADED: (S.READY,),
-        E.CLEARED: (S.NO_MISSION,),
-        E.UPLOADED_AGAIN: (S.FLYING_FILE,),
-        E.PREPARED: (S.TAKING_OVER,),
+        **_common(S.FLYING_FILE),
         E.CONFIRMED: (S.FLYING_FILE,),
         E.FAILED: (S.PAUSED,),
         E.OTHER_PLAYING: (S.PAUSED,),
@@ -196,9 +190,7 @@ TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
         E.LINK_DOWN: (S.PAUSED,),
     },
     S.FLYING_ITEM: {
-        E.UPLOADED: (S.READY,),
-        E.CLEARED: (S.NO_MISSION,),
-        E.UPLOADED_AGAIN: (S.FLYING_ITEM,),
+        **_common(S.FLYING_ITEM),
         E.PREPARED: (S.STARTING, S.FLYING_ITEM, S.TAKING_OVER),
         E.FAILED: (S.PAUSED,),
         E.OTHER_PLAYING: (S.PAUSED,),
@@ -207,10 +199,7 @@ TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
         E.LINK_DOWN: (S.PAUSED,),
     },
     S.ENDING: {
-        E.UPLOADED: (S.READY,),
-        E.CLEARED: (S.NO_MISSION,),
-        E.UPLOADED_AGAIN: (S.ENDING,),
-        E.PREPARED: (S.TAKING_OVER,),
+        **_common(S.ENDING),
         E.RESUMED: (S.FLYING_FILE,),
         E.OTHER_PLAYING: (S.PAUSED,),
         E.EXECUTED: (S.ENDING, *_NEXT),
@@ -221,12 +210,10 @@ TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
         E.LINK_DOWN: (S.PAUSED,),
     },
     S.PAUSED: {
-        E.UPLOADED: (S.READY,),
-        E.CLEARED: (S.NO_MISSION,),
+        **_common(S.PAUSED),
         E.UPLOADED_AGAIN: (S.READY,),
         E.CHOSEN: (S.PAUSED,),
         E.ENGAGED: (S.AWAIT_ARM,),
-        E.PREPARED: (S.TAKING_OVER,),
         E.RESUMED: (S.FLYING_FILE,),
         E.OTHER_PLAYING: (S.PAUSED,),
         E.EXECUTED: (S.PAUSED, S.COMPLETE),
@@ -234,12 +221,10 @@ TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
         E.LINK_UP: (S.FLYING_FILE, S.PAUSED, S.COMPLETE),
     },
     S.COMPLETE: {
-        E.UPLOADED: (S.READY,),
-        E.CLEARED: (S.NO_MISSION,),
+        **_common(S.COMPLETE),
         E.UPLOADED_AGAIN: (S.READY,),
         E.CHOSEN: (S.READY,),
         E.ENGAGED: (S.AWAIT_ARM,),
-        E.PREPARED: (S.TAKING_OVER,),
         E.OTHER_PLAYING: (S.COMPLETE,),
         E.LINK_DOWN: (S.COMPLETE,),
     },

@@ -9,7 +9,6 @@ flown before it hovers.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import math
 from collections.abc import Callable, Hashable
 from typing import NamedTuple
@@ -22,7 +21,7 @@ from anafi_mav.drone import Limits, PilotingCommand, events
 from anafi_mav.drone.events import FlyingState, Message
 from anafi_mav.drone.piloting.state import MOTORS_OFF
 from anafi_mav.drone.values import Values
-from anafi_mav.errors import AnafiMavError, LinkLost
+from anafi_mav.errors import AnafiMavError
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import TooLow
@@ -249,7 +248,7 @@ class OffboardFlight(PlainTask):
         if not self._takeoff.is_armed_by(sender):
             return texts.NOT_ARMED_BY_CLIENT
         by = Right(sender, Extent.COMMANDED)
-        refusal = control.policy(Request(self, by, self.rules))
+        refusal = control.refusal(Request(self, by, self.rules))
         if (reason := self._grounded if refusal is None else refusal.reason) is not None:
             return reason
         self._stream = stream.climb(sender, now)
@@ -448,8 +447,7 @@ class OffboardFlight(PlainTask):
         if ended.state is State.SINGLE and self._moves.under_way:
             self._report_replaced(ended.pilot)
         ending = self._moves.stop()
-        with contextlib.suppress(LinkLost):
-            self._vehicle.drone.piloting.pilot(None)
+        self._vehicle.centre_sticks()
         return ending
 
     def _forget_choice(self) -> None:

@@ -7,7 +7,6 @@ time never arrives; one that changes faster than `MOVE_EVERY` is followed in ste
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -94,8 +93,8 @@ class OffboardMoves:
 
         Returns the reason for which the drone has not flown to this goal, which may be tried again; None without one.
         """
-        before, failure, settings = self._attempt, None, self._vehicle.settings
-        wanted = _Wanted(goal, yaw, (settings.cruise_speed, settings.climb_speed))
+        before, failure, vehicle = self._attempt, None, self._vehicle
+        wanted = _Wanted(goal, yaw, (vehicle.cruise_speed, vehicle.climb_speed))
         if before is not None and before.wanted.is_same(wanted):
             failure = before.failure
             if not asked or now < before.retry_at:
@@ -115,8 +114,7 @@ class OffboardMoves:
         """
         if self._attempt is not None and self._vehicle.drone.piloting.sticks_blocked is None:
             # Before the waiting ends: a relative move whose waiting is given up would be ended a second time.
-            with contextlib.suppress(LinkLost):
-                self._vehicle.drone.piloting.hover()
+            self._vehicle.hover()
         return self.forget()
 
     def forget(self) -> list[asyncio.Task[None]]:
@@ -217,5 +215,4 @@ class OffboardMoves:
         self._drop(why)
         # One that was refused leaves an older one alone, which nobody asks for any more.
         if self._vehicle.drone.piloting.sticks_blocked is None:
-            with contextlib.suppress(LinkLost):
-                self._vehicle.drone.piloting.hover()
+            self._vehicle.hover()

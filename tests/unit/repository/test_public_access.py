@@ -36,7 +36,7 @@ PRODUCT = {
     ),
     "conformance/test_extending.py": {"_CODECS": "an invented message is removed, so that no other test finds it"},
     "support/callers.py": dict.fromkeys(
-        ("_act", "_return_or_hold", "_on_playing", "_expired", "_let_go"),
+        ("_act", "_return_or_hold", "_on_playing", "_expired"),
         "what acts without a client is called where its timer or task calls it: each would need a flight of its own",
     ),
 }

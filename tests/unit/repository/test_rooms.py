@@ -419,17 +419,17 @@ def test_imports_inside_a_room_run_along_the_table() -> None:
 
 def test_wrong_edge_inside_a_room_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(globals(), "PACKAGE", tmp_path)
-    for name in ("services/plan/wrong.py", "services/command/actions.py", "services/commands.py"):
+    for name in ("services/plan/wrong.py", "services/command/flight_service.py", "services/commands.py"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("", encoding="utf-8")
     module = tmp_path / "services" / "plan" / "wrong.py"
     module.write_text("from anafi_mav.services.commands import Command", encoding="utf-8")
     assert folder_edges(module) == []
     for statement in (
-        "from anafi_mav.services.command.actions import reposition",
-        "from anafi_mav.services.command import actions",
-        "import anafi_mav.services.command.actions",
-        "from ..command import actions",
+        "from anafi_mav.services.command.flight_service import FORCE",
+        "from anafi_mav.services.command import flight_service",
+        "import anafi_mav.services.command.flight_service",
+        "from ..command import flight_service",
     ):
         module.write_text(statement, encoding="utf-8")
         assert len(folder_edges(module)) == 1, statement

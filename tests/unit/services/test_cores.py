@@ -9,7 +9,7 @@ import pytest
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services import commands
-from anafi_mav.services.command.actions import flight_actions
+from anafi_mav.services.command.flight_service import FlightService
 from anafi_mav.services.command.guided_service import GuidedService
 from anafi_mav.services.command.modes_service import ModesService
 from anafi_mav.services.flavours import ARDUPILOT, PX4
@@ -237,7 +237,7 @@ def test_a_silence_on_the_ground_ends_the_latch() -> None:
 def named(id: int) -> commands.Definition:
     """The row by which a system knows this MAV_CMD. Nothing is flown: no handler is called."""
     nothing: Any = None
-    tables = (flight_actions(nothing), ModesService(nothing).actions(), GuidedService(nothing).actions())
+    tables = (FlightService(nothing).actions(), ModesService(nothing).actions(), GuidedService(nothing).actions())
     return next(table[id] for table in tables if id in table)
 
 

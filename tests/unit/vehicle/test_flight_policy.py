@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import itertools
+from typing import Any
 
 import pytest
 
 from anafi_mav import texts
 from anafi_mav.services.command.orbit_service import OrbitService
-from anafi_mav.vehicle.base.control import Request, allow_all
+from anafi_mav.vehicle.base.control import Control, Request
 from anafi_mav.vehicle.base.flight_task import DISARM, HAND_LAUNCH, LAND, MAINTENANCE, MOTOR_CUT, FlightTask, Hover
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import By, Source
 from anafi_mav.vehicle.base.right import Extent, Right
-from anafi_mav.vehicle.flight_policy import BY_NUMBER, NUMBERS, TRANSITIONS, Event, State, first_refusal, refusal_of
+from anafi_mav.vehicle.flight_policy import BY_NUMBER, NUMBERS, TRANSITIONS, Event, State, refusal_of
 from anafi_mav.vehicle.follow_flight import FollowFlight
 from anafi_mav.vehicle.manual_flight import ManualFlight
 from anafi_mav.vehicle.mission.flight import MissionFlight
@@ -85,6 +86,10 @@ def test_gateway_is_refused_for_changed_settings(source: Source) -> None:
 def test_first_policy_that_refuses_decides() -> None:
     first, second = (Refused(texts.GOTO, reason) for reason in (texts.PILOT_SWITCH, texts.PILOT))
     asked = request(HAND_LAUNCH)
-    assert first_refusal()(asked) is None
-    assert first_refusal(allow_all, lambda request: first, lambda request: second)(asked) is first
-    assert first_refusal(allow_all, lambda request: second)(asked) is second
+    nothing: Any = None
+    control = Control(nothing)
+    assert control.refusal(asked) is None
+    control.policies = (lambda request: None, lambda request: first, lambda request: second)
+    assert control.refusal(asked) is first
+    control.policies = (lambda request: None, lambda request: second)
+    assert control.refusal(asked) is second

@@ -9,16 +9,9 @@ import pytest
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.setpoint.target_messages import sighting
-from anafi_mav.vehicle.follow import FORESIGHT, TRANSITIONS, Event, FollowSettings, Sighting, State, TargetFollower
+from anafi_mav.vehicle.follow import FORESIGHT, FollowSettings, Sighting, TargetFollower
 
 NAN = math.nan
-
-
-def test_every_follow_state_has_its_events() -> None:
-    for state in State:
-        for event in Event:
-            impossible = (state, event) == (State.OFF, Event.SILENCE)
-            assert impossible is (event not in TRANSITIONS[state])
 
 
 def following(angle: float = 180.0, *, speed: float = 2.0, seconds: int = 30, **settings: Any) -> TargetFollower:

@@ -135,9 +135,9 @@ async def test_lost_link_ends_every_wait_and_is_reported(drone: Drone, device: S
     waits = [
         asyncio.ensure_future(wait)
         for wait in (
+            drone.piloting.return_home(),
             drone.piloting.move_by(1.0, 0.0, 0.0, 0.0),
             drone.piloting.move_to(48.0, 2.0, 10.0),
-            drone.piloting.return_home(),
             drone.piloting.land(),
             drone.piloting.set_max_tilt(20.0),
             drone.expect(ardrone3.AltitudeChanged),
@@ -710,14 +710,14 @@ async def test_return_home_takes_the_hands_off_the_sticks(drone: Drone, device: 
 
 
 async def test_cancel_return_home(drone: Drone, device: ScriptedDevice) -> None:
-    await drone.piloting.cancel_return_home()
+    assert not await drone.piloting.cancel_return_home()
     assert device.got(rth.Abort) == []
     await reported(drone, device, rth.State(RthState.IN_PROGRESS, StateReason.CONNECTION_LOST))
     with pytest.raises(CommandRejected, match="by itself"):
         await drone.piloting.cancel_return_home()
     assert device.got(rth.Abort) == []
     device.script[rth.Abort] = lambda _: [rth.State(RthState.AVAILABLE, StateReason.STOPPED)]
-    await drone.piloting.cancel_return_home(even_its_own=True)
+    assert await drone.piloting.cancel_return_home(even_its_own=True)
     assert len(device.got(rth.Abort)) == 1
 
 
@@ -821,10 +821,10 @@ async def test_hover_cancels_the_verbs_of_this_controller(drone: Drone, device: 
     await flying(drone, device)
     device.script[ardrone3.MoveTo] = lambda command: [running(command)]
     device.script[rth.ReturnToHome] = lambda _: [rth.State(RthState.IN_PROGRESS, StateReason.USER_REQUEST)]
-    journey = await drone.piloting.move_to(48.0, 2.0, 15.0)
-    relative = asyncio.ensure_future(drone.piloting.move_by(1.0, 0.0, 0.0, 0.0))
     home = await drone.piloting.return_home()
     assert home is not None
+    relative = asyncio.ensure_future(drone.piloting.move_by(1.0, 0.0, 0.0, 0.0))
+    journey = await drone.piloting.move_to(48.0, 2.0, 15.0)
     await reported(drone, device, ardrone3.PilotedPOIV2(48.0, 2.0, 0.0, PoiMode.LOCKED_GIMBAL, PoiStatus.RUNNING))
     assert len(drone.moves_started) == 3
     device.received.clear()
@@ -893,13 +893,36 @@ async def test_setpoint_replaces_the_active_automatic_flight(
     assert (len(device.got(follow_me.Stop)), len(device.got(animation.Cancel))) == (stops, 1)
 
 
+async def test_return_cancels_what_the_drone_flies_before_it_is_sent(drone: Drone, device: ScriptedDevice) -> None:
+    await flying(drone, device)
+    device.script[ardrone3.MoveTo] = lambda command: [running(command)]
+    device.script[rth.ReturnToHome] = lambda _: [rth.State(RthState.PENDING, StateReason.USER_REQUEST)]
+    await drone.piloting.move_to(48.0, 2.0, 15.0)
+    relative = asyncio.ensure_future(drone.piloting.move_by(1.0, 0.0, 0.0, 0.0))
+    await device.until(ardrone3.MoveBy)
+    await reported(drone, device, ardrone3.PilotedPOIV2(48.0, 2.0, 0.0, PoiMode.LOCKED_GIMBAL, PoiStatus.RUNNING))
+    device.received.clear()
+    home = await drone.piloting.return_home()
+    assert drone.moves_started == (home,)
+    sent = [message for _, message in device.received if not isinstance(message, ardrone3.PCMD)]
+    assert sent == [
+        ardrone3.CancelMoveTo(),
+        ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0),
+        ardrone3.StopPilotedPOI(),
+        rth.ReturnToHome(),
+    ]
+    with pytest.raises(CommandRejected, match="return home"):
+        await relative
+
+
 async def test_hover_rejects_a_waiting_verb(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     waits = [
-        asyncio.ensure_future(drone.piloting.move_to(48.0, 2.0, 15.0)),
         asyncio.ensure_future(drone.piloting.return_home()),
+        asyncio.ensure_future(drone.piloting.move_to(48.0, 2.0, 15.0)),
     ]
     await device.until(rth.ReturnToHome)
+    await device.until(ardrone3.MoveTo)
     drone.piloting.hover()
     for wait in waits:
         with pytest.raises(CommandRejected, match="stopped by hover"):

@@ -84,6 +84,8 @@ def require_consistent(before: Situation[str], event: Event, about: Input[str], 
         assert now.task is None  # a failed request makes no task active
     if event in (Event.GROUND, Event.LINK_DOWN):
         assert (now.task, now.below, now.is_paused) == (None, None, False)
+    if event is Event.DESCEND:
+        assert (now.task, now.below) == (None, None)  # nothing flies on when the drone hovers again
     if now.pending is None and now.task is None and now.below is None:
         assert now.shown == (None, None)  # Hold
 
