@@ -196,6 +196,13 @@ def _payload_packer(kind: type[dialect.MAVLink_message]) -> Callable[[Any], byte
     def pack_scalars(message: Any) -> bytes:
         return packer(*values(message))
 
+    def pack_array(message: Any) -> bytes:
+        fields = values(message)
+        array = fields[first]
+        if len(array) != lengths[first]:
+            raise ValueError(f"{names[first]} has {len(array)} elements, not {lengths[first]}")
+        return packer(*fields[:first], *array, *fields[first + 1 :])
+
     def pack_arrays(message: Any) -> bytes:
         flat: list[Any] = []
         for name, length in zip(names, lengths, strict=True):
@@ -208,8 +215,10 @@ def _payload_packer(kind: type[dialect.MAVLink_message]) -> Callable[[Any], byte
                 flat += value
         return packer(*flat)
 
-    if any(length is not None for length in lengths):
-        _packers[kind] = pack_arrays
+    arrays = [place for place, length in enumerate(lengths) if length is not None]
+    first = arrays[0] if arrays else 0
+    if arrays:
+        _packers[kind] = pack_array if len(arrays) == 1 and len(names) > 1 else pack_arrays
     else:
         _packers[kind] = pack_one if len(names) == 1 else pack_scalars
     return _packers[kind]

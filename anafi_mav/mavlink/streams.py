@@ -20,6 +20,10 @@ _NEVER = float("inf")
 MAX_AUDIENCES = 4
 """Lists of channels that are asked about in turn: all, those with events, those with pictures, and one that changes."""
 
+TOGETHER = 0.1
+"""s between two moments at which messages become due. Intervals are multiples of it by default: the same update then
+makes several messages due, which are made of one pose and leave together."""
+
 MAX_GROUPS = 256
 """Groups of messages that are asked about together, and of which it is remembered when one is due next."""
 
@@ -36,19 +40,26 @@ class _Stream:
         self.users = 1
         """Channels that share it: they have the same interval, no pace, and got the last message together."""
 
-    def leave(self, now: float, *, is_repeated: bool) -> None:
+    def leave(self, now: float, phase: float, *, is_repeated: bool) -> None:
         """Count the message, which is due, as sent.
 
         Times are kept on a grid, not from message to message, so that jitter of the source costs no rate: an
-        interval equal to the source's passes all but perhaps one of its messages.
+        interval equal to the source's passes all but perhaps one of its messages. `phase`: a moment of the grid that
+        all messages share.
         """
         interval = self.interval
         assert interval is not None
         if self.pace is not None:
             interval *= self.pace.slowdown
         late = now - self.next
-        # After a silence the grid begins again; half an interval early, so that the next update may jitter.
-        self.next = self.next + interval if late <= interval else now + (interval if is_repeated else interval / 2)
+        if late <= interval:
+            self.next += interval
+        elif is_repeated:
+            self.next = now + interval
+        else:
+            # After a silence the grid begins again; half an interval early, so that the next update may jitter.
+            earliest = now + interval / 2
+            self.next = earliest if interval < TOGETHER else earliest + (phase - earliest) % TOGETHER
 
     def part(self, users: int) -> _Stream:
         """Return the stream of some of its channels, which share it no longer."""
@@ -116,6 +127,8 @@ class Streams(Generic[ChannelT]):
         self._defaults = dict(defaults)
         self._has = has
         self._channels: WeakKeyDictionary[ChannelT, dict[int, _Stream]] = WeakKeyDictionary()
+        self._phase: float | None = None
+        """A moment (s) of the grid that all messages share; None before the first one."""
         self._audiences: list[_Audience[ChannelT]] = []
 
     def interval(self, channel: ChannelT, id: int) -> float | None:
@@ -155,6 +168,8 @@ class Streams(Generic[ChannelT]):
         group = audience.groups.get(ids) or self._new_group(audience, ids)
         if now < group.until:
             return []
+        if self._phase is None:
+            self._phase = now + TOGETHER / 2
         found: list[tuple[int, Sequence[ChannelT]]] = []
         soonest = _NEVER
         for id, lane in group.lanes:
@@ -164,7 +179,7 @@ class Streams(Generic[ChannelT]):
                 for stream, channels in lane.streams:
                     if now >= stream.next:
                         has_first = has_first or stream.next == -_NEVER
-                        stream.leave(now, is_repeated=is_repeated)
+                        stream.leave(now, self._phase, is_repeated=is_repeated)
                         due = [*due, *channels] if due else channels
                     if stream.next < until:
                         until = stream.next

@@ -43,8 +43,9 @@ LATE_PROGRESS_AFTER = 2.5
 
 MAVSDK 4.1 takes one of a DO_SET_MODE for the end of start_mission, pause_mission and arm, which fail then and crash
 when the real end comes (mission_raw_impl.cpp start_mission; action_impl.cpp waits for the end, but for the mode that it
-sets before arming). It takes one of a gimbal command for its failure (gimbal_impl.cpp receive_command_result). It
-gives up 2 s after it has sent them, the others later."""
+sets before arming). It takes one of a gimbal command for its failure (gimbal_impl.cpp receive_command_result). Its
+set_home, reset_settings and format_storage return with one, and the real end then aborts the whole client program
+("std::future_error", measured with 4.1.0). It gives up 2 s after it has sent them, the others later."""
 
 _UNSET_INT = (2**31 - 1, -(2**31))
 """x and y of a COMMAND_INT that stand for "not set": the specified INT32_MAX, and what a cast NaN becomes (R8)."""

@@ -182,17 +182,16 @@ class GuidedFlight:
 
     async def move(self, goto: Goto) -> None:
         """Let the drone begin the move of the active task; no await before the moveTo."""
-        vehicle, settings = self._vehicle, self._vehicle.settings
-        keeps = goto.yaw is None and settings.move_heading is MoveHeading.KEEP
-        here = None if keeps else vehicle.place
-        orientation, heading = oriented(settings.move_heading, here, goto.place, goto.yaw)
+        vehicle, rule = self._vehicle, self._vehicle.settings.move_heading
+        keeps = goto.yaw is None and rule is MoveHeading.KEEP
+        orientation, heading = oriented(rule, None if keeps else vehicle.place, goto.place, goto.yaw)
         await vehicle.drone.piloting.move_to(
             goto.place.latitude,
             goto.place.longitude,
             goto.ato,
             heading_deg=heading,
-            horizontal_speed=settings.cruise_speed if goto.speed is None else goto.speed,
-            vertical_speed=settings.climb_speed,
+            horizontal_speed=vehicle.cruise_speed if goto.speed is None else goto.speed,
+            vertical_speed=vehicle.climb_speed,
             orientation=orientation,
         )
         if (move := vehicle.drone.piloting.move) is not None:

@@ -120,8 +120,8 @@ def test_due_on_recomputes_each_channel_after_a_change() -> None:
     assert due_on(streams, channels, 0.2) == []
     channels = [one, other]
     assert due_on(streams, channels, 0.21) == [other]
-    assert due_on(streams, channels, 0.26) == [other]  # the grid begins half an interval early
-    assert due_on(streams, channels, 0.27) == [one]
+    assert due_on(streams, channels, 0.34) == []
+    assert due_on(streams, channels, 0.36) == [one, other]  # at 0.35: the shared grid has moments 0.05, 0.15, ...
     streams.set(other, ATTITUDE, None)
     assert due_on(streams, channels, 9.0) == [one]
     streams.reset(other, ATTITUDE)
@@ -176,9 +176,9 @@ def test_channels_with_equal_intervals_get_each_message_together() -> None:
     channels = [one, other, third]
     streams.set(third, ATTITUDE, 0.3)
     assert streams.due_on(channels, (ATTITUDE,), 0.2) == [(ATTITUDE, [other, third])]
-    assert streams.due_on(channels, (ATTITUDE,), 0.5) == [(ATTITUDE, [one, other, third])]
+    assert streams.due_on(channels, (ATTITUDE,), 0.6) == [(ATTITUDE, [one, other, third])]  # since 0.55 and 0.35
     assert streams.due_on(channels, (ATTITUDE,), 0.7) == [(ATTITUDE, [third])]
-    assert streams.due_on(channels, (ATTITUDE,), 1.5) == [(ATTITUDE, [one, other, third])]
+    assert streams.due_on(channels, (ATTITUDE,), 1.6) == [(ATTITUDE, [one, other, third])]
 
 
 def test_messages_for_the_same_channels_have_one_list_of_them() -> None:
@@ -197,15 +197,39 @@ def test_messages_for_the_same_channels_have_one_list_of_them() -> None:
 def test_channel_with_an_interval_of_its_own_leaves_the_others_theirs() -> None:
     streams, one, other = Streams[Key]({ATTITUDE: 1.0}), Key(), Key()
     channels = [one, other]
-    streams.due_on(channels, (ATTITUDE,), 0.0)  # the next is due at 0.5
+    streams.due_on(channels, (ATTITUDE,), 0.0)  # the next is due at 0.55
     streams.set(one, ATTITUDE, None)
-    assert streams.due_on(channels, (ATTITUDE,), 0.4) == []
-    assert streams.due_on(channels, (ATTITUDE,), 0.5) == [(ATTITUDE, [other])]
+    assert streams.due_on(channels, (ATTITUDE,), 0.5) == []
+    assert streams.due_on(channels, (ATTITUDE,), 0.56) == [(ATTITUDE, [other])]
     streams.reset(one, ATTITUDE)
     assert streams.due_on(channels, (ATTITUDE,), 0.6) == [(ATTITUDE, [one])]
     streams.channel_closed(one)
     assert streams.due_on([other], (ATTITUDE,), 1.0) == []
-    assert streams.due_on([other], (ATTITUDE,), 1.5) == [(ATTITUDE, [other])]
+    assert streams.due_on([other], (ATTITUDE,), 1.56) == [(ATTITUDE, [other])]
+
+
+def test_messages_of_different_beginnings_become_due_with_the_same_update() -> None:
+    """A client's message that begins between two others joins their grid: 0.05, 0.15, 0.25, ... s."""
+    streams, one = Streams[Key]({ATTITUDE: 0.1, SYS_STATUS: 0.2}), Key()
+    channels = [one]
+    streams.set(one, UNKNOWN, None)
+    assert streams.due_on(channels, (ATTITUDE,), 0.0) == [(ATTITUDE, [one])]
+    assert streams.due_on(channels, (SYS_STATUS,), 1 / 30) == [(SYS_STATUS, [one])]
+    streams.set(one, UNKNOWN, 0.4)
+    left = {
+        k: [id for id, _ in streams.due_on(channels, (ATTITUDE, SYS_STATUS, UNKNOWN), k / 30)]
+        for k in range(2, 24)  # updates thirty times a second
+    }
+    assert {k: ids for k, ids in left.items() if ids} == {
+        2: [ATTITUDE, UNKNOWN],
+        5: [ATTITUDE, SYS_STATUS],
+        8: [ATTITUDE],
+        11: [ATTITUDE, SYS_STATUS, UNKNOWN],
+        14: [ATTITUDE],
+        17: [ATTITUDE, SYS_STATUS],
+        20: [ATTITUDE],
+        23: [ATTITUDE, SYS_STATUS, UNKNOWN],
+    }
 
 
 def test_repeated_messages_of_one_beginning_stay_in_step() -> None:
