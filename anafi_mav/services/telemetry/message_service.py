@@ -290,7 +290,11 @@ class MessageService(Service):
 
     def _stamp(self, id: int, at: float, pose: VehiclePose = UNKNOWN_POSE) -> Times:
         """The time for a message of this kind; an event that was handled late does not put it back."""
-        at = self._stamped[id] = max(at, self._stamped.get(id, at))
+        last = self._stamped.get(id)
+        if last is not None and last > at:
+            at = last
+        else:
+            self._stamped[id] = at
         moment, times = self._moment
         if at != moment or pose is not times.pose:
             times = self.host.times(at, pose)
