@@ -27,7 +27,7 @@ from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.services.telemetry import data_streams
 from anafi_mav.services.telemetry.pose_sources import PoseSources
 from anafi_mav.services.telemetry.update_tracker import UpdateTracker
-from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueInterest, ValueSubscriptions
 
 logger = logging.getLogger(__name__)
 
@@ -170,7 +170,7 @@ class MessageService(Service):
         return dict.fromkeys(self._events, self._on_update)
 
     def value_subscriptions(self) -> ValueSubscriptions:
-        return {self._on_values: self._values}
+        return {self._on_values: ValueInterest(self._values)}
 
     def _on_values(self, values: Values, now: float) -> None:
         if self._tracker.mark_all(values, now):
