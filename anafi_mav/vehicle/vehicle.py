@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 
 from anafi_mav import texts
@@ -37,7 +37,7 @@ from anafi_mav.drone.events import (
 from anafi_mav.errors import CommandRejected
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.aborted_return import AbortedReturn
-from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.aircraft import Aircraft, CommandedSpeeds
 from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.control_machine import DroneAct, State
 from anafi_mav.vehicle.base.flight_task import LAND, MOTOR_CUT, FlightTask, Hover
@@ -182,7 +182,7 @@ class Vehicle(Aircraft):
         self._initiators = Initiators()
         self.holds = HoldRule()
         """Which Holds of clients count against a return of the drone's own."""
-        self.return_end = ReturnEnd(self, self._land_after_return)
+        self.return_end = ReturnEnd(self, self._command_landing)
         self.mission = MissionFlight(self, clock)
         self.takeoff = Takeoff(self, self.mission.armed)
         self.guided = GuidedFlight(self)
@@ -203,6 +203,9 @@ class Vehicle(Aircraft):
     @property
     def armed(self) -> bool:
         return self.takeoff.armed or (self.flying_state is not None and not self.on_ground)
+
+    def is_armed_by(self, client: Hashable) -> bool:
+        return self.takeoff.is_armed_by(client)
 
     @property
     def origin(self) -> GeoPoint | None:
@@ -335,15 +338,14 @@ class Vehicle(Aircraft):
 
     async def land(self, by: By) -> None:
         """Land here. On the ground there is nothing to do."""
-        self._initiators.land_commanded(self._clock.monotonic())
         rules = replace(LAND.rules, keeps_below=self.on_ground)  # on the ground there is no mode to leave
         async with self.control.acquire(LAND, by=by, rules=rules):
-            await self.drone.piloting.land()
+            await self._command_landing()
         if self.flying_state not in LANDING:
             self.control.release(LAND)
 
-    async def _land_after_return(self) -> None:
-        """Land at the end of a return that a client commanded; the landing is that client's too."""
+    async def _command_landing(self) -> None:
+        """Land for a client, also at the end of its return: it is that client's landing."""
         self._initiators.land_commanded(self._clock.monotonic())
         await self.drone.piloting.land()
 
@@ -663,6 +665,7 @@ class Vehicle(Aircraft):
         takeoff = self.drone.home.state.takeoff_location
         self._note_landing(before)
         if state in ON_GROUND and before is not None:
+            self.commanded_speeds = CommandedSpeeds()
             self.return_end.on_ground()
             self.takeoff.came_down()
             self.control.on_ground()
@@ -737,7 +740,7 @@ class Vehicle(Aircraft):
         """
         self.height.recall(kept)
         if self.on_ground:  # maybe another aircraft, or carried elsewhere
-            self.flight_facts = FlightFacts()
+            self.flight_facts, self.commanded_speeds = FlightFacts(), CommandedSpeeds()
         self.on_flying_state()
         self.on_location()  # the one that it has reported counts for as long as a new one
         if self.flying_state is not None and not self.on_ground:

@@ -11,7 +11,7 @@ from support.fault_scenarios import CANCELLED, IN_PROGRESS
 from support.flavours import both
 from support.missions import put, start, takeoff, way
 from support.params import write
-from support.world import HOME, World, world
+from support.world import ARMED, HOME, World, world
 
 from anafi_mav import geo, units
 from anafi_mav.mavlink import dialect as newer
@@ -140,6 +140,34 @@ async def test_conf_082_a_speed_counts_for_later_moves_too(flavour: str) -> None
         await go_north(w)
         (move,) = sent(w, "move.extended_move_to")
         assert (move["max_horizontal_speed"], move["max_vertical_speed"]) == (4.0, 1.5)
+
+
+@both
+async def test_conf_082_commanded_speed_ends_with_the_landing(flavour: str) -> None:
+    """The next flight, of another program perhaps, has the speeds of the parameters."""
+    async with world(flavour=flavour) as w:
+        await write(w.client, "ANF_CRUISE_SPEED", 2.0, flavour=flavour)
+        await w.take_off(5.0)
+        assert (await w.client.command(SPEED, 1, 12.0, -1, 0)).result == ACCEPTED
+        assert (await w.client.command(SPEED, 2, 3.0, -1, 0)).result == ACCEPTED
+        await go_north(w)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 5.0, 20.0)
+        assert (await w.client.command(dialect.MAV_CMD_NAV_LAND)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, timeout=30.0)
+        mark = w.client.mark()
+        w.client.send(dialect.MAVLink_param_request_read_message(1, 1, b"ANF_CRUISE_SPEED", -1))
+        told = await w.client.wait("PARAM_VALUE", lambda m: m.param_id == "ANF_CRUISE_SPEED", since=mark)
+        assert told.param_value == 2.0
+        if flavour == "ardupilot":
+            assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, w.modes.hold)).result == ACCEPTED
+        assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == ACCEPTED
+        assert (await w.client.command(dialect.MAV_CMD_NAV_TAKEOFF, x=0.0, y=0.0, z=5.0)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: w.drone.pose.up > 4.7, 30.0)
+        await go_north(w)
+        first, second = sent(w, "move.extended_move_to")
+        assert (first["max_horizontal_speed"], first["max_vertical_speed"]) == (12.0, 3.0)
+        assert second["max_horizontal_speed"] == 2.0
+        assert second["max_vertical_speed"] == w.drone.firmware.settings.number("max_vertical_speed")
 
 
 @both

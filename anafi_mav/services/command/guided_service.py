@@ -17,7 +17,7 @@ from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.command_targets import UnsupportedFrame, height, height_in_frame, place
-from anafi_mav.services.commands import Action, Altitude, Command, Effect
+from anafi_mav.services.commands import Action, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST, check_height, check_on_earth, home_height
@@ -129,7 +129,11 @@ class GuidedService(Service):
                 self._pause_or_continue, location=False, altitude=Altitude.UNUSED, effect=_effect_of_pause
             ),
             dialect.MAV_CMD_DO_SET_HOME: Action(
-                self._set_home, location=True, altitude=Altitude.AMSL, effect=Effect.CHANGE
+                self._set_home,
+                location=True,
+                altitude=Altitude.AMSL,
+                effect=Effect.CHANGE,
+                progress=ProgressPolicy.LATE,
             ),
         }
 
@@ -150,8 +154,9 @@ class GuidedService(Service):
         A move that is under way changes its speed at once. A mission, a return and a landing are flown at a speed of
         the drone's own, so it is refused there (ArduCopter: FAILED in modes without a speed).
 
-        Unset and -1 change nothing, -2 restores the drone's own speed. The drone itself limits a value above its
-        maximum. An ANAFI measures no airspeed: both horizontal types are over ground.
+        Unset and -1 change nothing, -2 restores the speed of the parameter (ANF_CRUISE_SPEED, ANF_CLIMB_SPEED), and so
+        does the landing. The drone itself limits a value above its maximum. An ANAFI measures no airspeed: both
+        horizontal types are over ground.
         """
         kind, speed, throttle = command.params[:3]
         if not (math.isnan(throttle) or throttle in (0.0, KEEP, DEFAULT)):
@@ -165,13 +170,13 @@ class GuidedService(Service):
         if speed != DEFAULT and not SLOWEST <= speed <= FASTEST:
             raise Refused(texts.SPEED, texts.PARAM2_SPEED.fill(slowest=SLOWEST, fastest=FASTEST), lasting=True)
         wanted = None if speed == DEFAULT else speed
-        vehicle, settings = self.host.vehicle, self.host.vehicle.settings
+        vehicle = self.host.vehicle
         if vehicle.mode in _OWN_SPEED:
             raise Refused(texts.SPEED, texts.FIXED_IN_MODE.fill(mode=vehicle.mode.value))
         if kind in (_AIRSPEED, _GROUNDSPEED):
-            vehicle.settings = replace(settings, cruise_speed=wanted)
+            vehicle.commanded_speeds = replace(vehicle.commanded_speeds, cruise=wanted)
         else:
-            vehicle.settings = replace(settings, climb_speed=wanted)
+            vehicle.commanded_speeds = replace(vehicle.commanded_speeds, climb=wanted)
         if (goto := vehicle.guided.goto) is not None:
             await vehicle.guided.go(goto, by=command.right)
 

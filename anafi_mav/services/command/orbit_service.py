@@ -146,7 +146,7 @@ class OrbitService(Service, PlainTask):
         check_place(vehicle, start)
         for before, point in pairwise(outline(circle)):
             check_place(vehicle, point, start=before)
-        orbit = _Orbit(Lap(self._held_back(circle)), vehicle.settings.cruise_speed)
+        orbit = _Orbit(Lap(self._held_back(circle)), vehicle.cruise_speed)
         circle = orbit.lap.circle
         bearing = _bearing(circle.centre, start)
         off = abs(geo.distance(*circle.centre.point, *here.point) - circle.radius)
@@ -249,7 +249,7 @@ class OrbitService(Service, PlainTask):
         if orbit is None or orbit.controller is None or not vehicle.control.keeps(self):
             return
         lap = orbit.lap
-        if (cruise := vehicle.settings.cruise_speed) != orbit.cruise:
+        if (cruise := vehicle.cruise_speed) != orbit.cruise:
             orbit.cruise = cruise
             lap.circle = self._held_back(replace(lap.circle, speed=cruise or DEFAULT_SPEED))
         limits = vehicle.drone.piloting.limits

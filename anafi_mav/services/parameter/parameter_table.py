@@ -478,11 +478,13 @@ def _move_speed(value: float) -> float | None:
 
 async def _set_cruise_speed(host: Host, value: float) -> None:
     _set(host, cruise_speed=_move_speed(value))
+    host.vehicle.commanded_speeds = replace(host.vehicle.commanded_speeds, cruise=None)
     await _go_on(host)
 
 
 async def _set_climb_speed(host: Host, value: float) -> None:
     _set(host, climb_speed=_move_speed(value))
+    host.vehicle.commanded_speeds = replace(host.vehicle.commanded_speeds, climb=None)
     await _go_on(host)
 
 
@@ -513,7 +515,7 @@ CRUISE_SPEED = Parameter(
     step=0.1,
     decimals=1,
     group=GATEWAY,
-    long="0: the drone's default; else 0.1 at least. MAV_CMD_DO_CHANGE_SPEED sets the same value.",
+    long="0: the drone's default; else 0.1 at least. MAV_CMD_DO_CHANGE_SPEED replaces it until the landing.",
     default=0.0,
     source="gateway",
 )
@@ -529,7 +531,7 @@ CLIMB_SPEED = Parameter(
     step=0.1,
     decimals=1,
     group=GATEWAY,
-    long="0: the drone's default; else 0.1 at least. MAV_CMD_DO_CHANGE_SPEED sets the same value.",
+    long="0: the drone's default; else 0.1 at least. MAV_CMD_DO_CHANGE_SPEED replaces it until the landing.",
     default=0.0,
     source="gateway; up to the maximum of ANF_VERT_SPEED",
 )

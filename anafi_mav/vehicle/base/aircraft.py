@@ -11,8 +11,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 from anafi_mav import texts
 from anafi_mav.clock import Clock
@@ -55,7 +56,7 @@ class FlightSettings:
     hand_launch: bool = False
     """Arming starts the motors and waits for the drone to be thrown (Parrot's UserTakeOff)."""
     cruise_speed: float | None = None
-    """m/s over ground that moves keep to; None: the drone's own (MAV_CMD_DO_CHANGE_SPEED)."""
+    """m/s over ground that moves keep to; None: the drone's own."""
     climb_speed: float | None = None
     """m/s up and down that moves keep to; None: the drone's own."""
     move_heading: MoveHeading = MoveHeading.KEEP
@@ -65,6 +66,19 @@ class FlightSettings:
 
     dronekit's documents send one a second; ArduCopter's GUID_TIMEOUT is 3 s.
     """
+
+
+@dataclass(frozen=True)
+class CommandedSpeeds:
+    """Speeds that a client has commanded for a flight; None: those of `FlightSettings`.
+
+    By MAV_CMD_DO_CHANGE_SPEED.
+    """
+
+    cruise: float | None = None
+    """m/s over ground."""
+    climb: float | None = None
+    """m/s up and down."""
 
 
 class Aircraft(ABC):
@@ -83,6 +97,8 @@ class Aircraft(ABC):
         self.roll = RollCheck()
         """Verifies the sign of the roll that the drone reports, for the loops over velocity."""
         self.settings = FlightSettings()
+        self.commanded_speeds = CommandedSpeeds()
+        """For the present flight, on the ground for the next one."""
         self.fence = FenceWatch()
         self.home_choice = asyncio.Lock()
         """Lock held while the drone's home is chosen.
@@ -103,6 +119,18 @@ class Aircraft(ABC):
         return self.drone.piloting.settled.flying
 
     @property
+    def cruise_speed(self) -> float | None:
+        """Ground speed (m/s) that moves keep to; None: the drone's own."""
+        commanded = self.commanded_speeds.cruise
+        return self.settings.cruise_speed if commanded is None else commanded
+
+    @property
+    def climb_speed(self) -> float | None:
+        """Vertical speed (m/s) that moves keep to; None: the drone's own."""
+        commanded = self.commanded_speeds.climb
+        return self.settings.climb_speed if commanded is None else commanded
+
+    @property
     def on_ground(self) -> bool:
         return self.flying_state in ON_GROUND
 
@@ -118,6 +146,10 @@ class Aircraft(ABC):
 
         The drone is off the ground, or arming was accepted and has not expired.
         """
+
+    @abstractmethod
+    def is_armed_by(self, client: Hashable) -> bool:
+        """Return True when this client has armed the vehicle for the flight that begins now."""
 
     @property
     def returning(self) -> bool:
@@ -205,9 +237,13 @@ class Aircraft(ABC):
 
     def lacking(self, needs: Needs) -> OperatorText | None:
         """Return the first condition that is not met, as the reason of a refusal; None: all are."""
-        if Needs.NO_DESCENT in needs and (descent := self.descent) is not None:
+        has_descent, rows = _rows_of(needs)
+        if has_descent and (descent := self.descent) is not None:
             return descent
-        return next((reason for need, is_unmet, reason in _UNMET if need in needs and is_unmet(self)), None)
+        for is_unmet, reason in rows:
+            if is_unmet(self):
+                return reason
+        return None
 
     def prearm_problems(self) -> list[OperatorText]:
         """Return the reasons why the drone would not take off, in sentences; empty without any."""
@@ -271,3 +307,12 @@ _UNMET: tuple[tuple[Needs, Callable[[Aircraft], bool], OperatorText], ...] = (
     (Needs.ROLL_SIGN, lambda aircraft: aircraft.roll.sign is RollSign.INVERTED, texts.ROLL_INVERTED),
 )
 """When a need is not met, and the reason of a refusal then, in the order in which they are checked."""
+
+
+@cache
+def _rows_of(needs: Needs) -> tuple[bool, Sequence[tuple[Callable[[Aircraft], bool], OperatorText]]]:
+    """Return True when a descent counts, and the rows of the other needs.
+
+    Stored, because each setpoint of a stream is checked.
+    """
+    return Needs.NO_DESCENT in needs, [(is_unmet, reason) for need, is_unmet, reason in _UNMET if need in needs]

@@ -93,8 +93,8 @@ class OffboardMoves:
 
         Returns the reason for which the drone has not flown to this goal, which may be tried again; None without one.
         """
-        before, failure, settings = self._attempt, None, self._vehicle.settings
-        wanted = _Wanted(goal, yaw, (settings.cruise_speed, settings.climb_speed))
+        before, failure, vehicle = self._attempt, None, self._vehicle
+        wanted = _Wanted(goal, yaw, (vehicle.cruise_speed, vehicle.climb_speed))
         if before is not None and before.wanted.is_same(wanted):
             failure = before.failure
             if not asked or now < before.retry_at:
