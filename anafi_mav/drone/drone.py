@@ -863,7 +863,7 @@ class Drone:
             self._report(values, now)
 
     def _deferrable(self) -> Mapping[type[Message], Sequence[dict[bytes, PackedMessage]]]:
-        """Return the events of values of which no message is wanted, with the tables in which they wait."""
+        """Return the events of values of which no message is wanted, with the tables they wait in."""
         if message_log.isEnabledFor(logging.DEBUG):
             return {}
         waiting = self._commander.waiting
