@@ -24,7 +24,8 @@ reads none.
 class ValueInterest:
     """Kinds of values that a handler is called for while it `is_on`.
 
-    It is called once for those that arrived together. Most handlers have nothing to do most of the time: those of a flight task while it is not active.
+    It is called once for those that arrived together. Most handlers have nothing to do most of the time: those of a
+    flight task while it is not active.
     """
 
     __slots__ = ("_switched", "is_on", "kinds")
