@@ -205,7 +205,7 @@ class _Supervised:
                     if not self.drone.fading:
                         await self._close()
             except Exception as error:
-                # Whatever it is, the drone must not be out of reach until somebody restarts the gateway.
+                # Whatever it is, the drone must not be out of reach until the gateway is restarted.
                 problem = str(error) or repr(error)
                 if not isinstance(error, AnafiMavError):
                     logger.exception("%s: a mistake of ours", self.config.name)

@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--endpoint", action="append", metavar="URL", help=f"for a ground station ({DEFAULT_ENDPOINT}); repeatable"
     )
-    parser.add_argument("-v", "--verbose", action="store_true", help="tell more")
+    parser.add_argument("-v", "--verbose", action="store_true", help="log more")
 
 
 def run(arguments: argparse.Namespace) -> int:

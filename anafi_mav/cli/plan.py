@@ -26,7 +26,7 @@ ACTIONS = {
     "check": PlanAction("say what would go wrong with a plan on a drone", plan_options.check_arguments, "plan_files"),
     "show": PlanAction("print a plan as a table", plan_options.show_arguments, "plan_files"),
     "convert": PlanAction(
-        "write a plan in another format and tell what that cannot hold", plan_options.convert_arguments, "plan_files"
+        "write a plan in another format and list what that cannot hold", plan_options.convert_arguments, "plan_files"
     ),
     "plot": PlanAction("draw a plan: a map, and its heights", plan_options.plot_arguments, "plan_files"),
     "upload": PlanAction("hand a plan to a vehicle", plan_options.upload_arguments, "plan_link"),
@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the action. Raises `PlanError` for an invalid plan, `ConfigError` for a wrong option."""
-    log.set_up(logging.ERROR)  # how an endpoint fares is told when it matters
+    log.set_up(logging.ERROR)  # the state of an endpoint is printed when it matters
     name = ACTIONS[arguments.action].module
     module = importlib.import_module(f"anafi_mav.cli.{name}")
     if name == "plan_files":  # the others run a loop, which has its own arrangements

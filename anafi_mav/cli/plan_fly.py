@@ -117,7 +117,7 @@ class MissionFollower:
         number, state = message.seq - self._first, message.mission_state
         if state != self._state:
             if state == dialect.MISSION_STATE_PAUSED and self._begun:
-                say(f"paused at {self._name(number)}: it goes on when the vehicle is told so", "yellow")
+                say(f"paused at {self._name(number)}: it resumes when a station commands it", "yellow")
             elif state == dialect.MISSION_STATE_ACTIVE and self._state == dialect.MISSION_STATE_PAUSED:
                 say("goes on")
             self._state = state
@@ -133,6 +133,6 @@ class MissionFollower:
             return
         self._reached.add(number)
         say(f"done: {self._name(number)}")
-        # Who tells no state of the mission is followed to its last item.
+        # A vehicle without a state of the mission is watched to its last item.
         if self._state == dialect.MISSION_STATE_UNKNOWN and number == len(self._plan.items) - 1:
             self._over = True

@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--sim-log", type=Path, metavar="FILE", help="what simulated drones go through, one JSON object a line"
     )
-    parser.add_argument("-v", "--verbose", action="count", default=0, help="tell more; twice: each message")
+    parser.add_argument("-v", "--verbose", action="count", default=0, help="log more; twice: each message")
     parser.add_argument("--log-file", type=Path, metavar="FILE", help="write the log to FILE, too; 60 MB at most")
     parser.add_argument(
         "--log-format", choices=log.FORMATS, default=log.TEXT, help="of the log: lines for people, or JSON objects"
@@ -204,7 +204,7 @@ async def _run(config: Config, sim_log: Path | None) -> list[str]:
 async def _start(
     gateway: Gateway, fleet: dict[str, Any] | None, sim_log: Path | None, stack: contextlib.AsyncExitStack
 ) -> None:
-    await gateway.open()  # first, so that a busy port is told before a simulator has been started
+    await gateway.open()  # first, so that a busy port is reported before a simulator has been started
     stack.push_async_callback(_close, gateway)
     if fleet is not None:
         if sim_log is not None:
@@ -215,7 +215,7 @@ async def _start(
         names = ", ".join(drone["name"] for drone in fleet["drones"])
         death = asyncio.create_task(_tell_death(simulator, names))
         stack.callback(death.cancel)
-        stack.push_async_callback(_close, gateway)  # before the simulator: the last hover has to reach somebody
+        stack.push_async_callback(_close, gateway)  # before the simulator: the last hover has to reach it
     await gateway.start()
     await gateway.ready(READY_LIMIT)
 

@@ -509,7 +509,7 @@ class Drone:
         if type(message) is not ardrone3.PCMD and is_motion(message):  # the sticks know by themselves
             self.piloting.require_free()
         if self.calibration.state.started and _starts_motors(message):
-            raise CommandRejected("the magnetometer is being calibrated: somebody turns the drone by hand")
+            raise CommandRejected("the magnetometer is being calibrated: the drone is turned by hand")
         if type(message) is common.MagnetoCalibration and message.calibrate:
             self._require_standing("calibrated")
         return self.controller.allows(message)

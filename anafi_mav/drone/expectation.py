@@ -193,7 +193,7 @@ class Commander:
         for delivery in self._deliveries.values():
             if not delivery.done():
                 delivery.set_exception(LinkLost(reason))
-                delivery.exception()  # nobody may be waiting; asyncio would complain
+                delivery.exception()  # it may have no waiter; asyncio would complain
         self._deliveries.clear()
         self.sent.abandon(loop_time())
 
@@ -297,7 +297,7 @@ class Commander:
                 self.cancel(token)
         if not delivery.done():
             delivery.set_exception(error)
-            delivery.exception()  # nobody may be waiting; asyncio would complain
+            delivery.exception()  # it may have no waiter; asyncio would complain
 
     def _delivered(self, token: int, arrived: bool) -> None:
         if arrived:

@@ -178,7 +178,7 @@ class FabricGround:
         by_system: defaultdict[int, list[bytes]] = defaultdict(list)
         for received in frames:
             if received.id == dialect.MAVLINK_MSG_ID_SETUP_SIGNING and not received.raw[2] & SIGNED:
-                # A gateway takes it from signed links only. Everybody who may read them on the network has the key.
+                # A gateway takes it from signed links only. All that may read them on the network have the key.
                 self.counters["refused_keys"] += 1
                 logger.warning("%s: key of SETUP_SIGNING not published: use anafi-mav keygen", channel.name)
                 continue

@@ -24,7 +24,7 @@ LARGEST_STEP = 2.0
 """Factor by which the slowdown grows or shrinks in one window: a second drone doubles the bytes."""
 
 MAX_SLOWDOWN = 50.0
-"""A message of 5 Hz leaves every ten seconds: a slower stream tells a station nothing."""
+"""A message of 5 Hz leaves every ten seconds: a slower stream is of no use to a station."""
 
 
 class ByteBudget:

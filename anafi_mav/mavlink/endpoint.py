@@ -80,7 +80,7 @@ SCHEMES: dict[str, Scheme] = {
         "HOST:PORT", "send to HOST:PORT and hear its answers (QGroundControl, MAVSDK)", UdpOut, datagrams=True
     ),
     "udpin": Scheme(
-        "HOST:PORT", "listen on HOST:PORT, answer whoever speaks MAVLink there", UdpIn, listens=True, datagrams=True
+        "HOST:PORT", "listen on HOST:PORT, answer all MAVLink peers there", UdpIn, listens=True, datagrams=True
     ),
     "tcpin": Scheme("HOST:PORT", "serve TCP clients on HOST:PORT (MAVProxy, Mission Planner)", TcpIn, listens=True),
     "tcpout": Scheme("HOST:PORT", "connect to a TCP server, again and again", TcpOut),

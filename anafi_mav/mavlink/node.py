@@ -218,7 +218,7 @@ class Node:
         A closed one only counts it.
 
         `give_way`: a full channel drops this before an answer, because the next one of its kind replaces it. Raises
-        `LocalProtocolError` for a field that does not fit; nothing is then sent to anybody.
+        `LocalProtocolError` for a field that does not fit; nothing is then sent.
         """
         self._router.own_sources.add((sysid, compid))
         packed = pack(message)

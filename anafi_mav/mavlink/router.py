@@ -134,7 +134,7 @@ class Router(Generic[KeyT, HostT]):
         if source in self.own_sources:
             self.counters["own_sources"] += 1
             return Route((), ())
-        # 0 is the address of all, nobody's name.
+        # 0 is the address of all, the name of none.
         is_named = received.message is not None and received.sysid != 0 and received.verdict is not Verdict.ALLOWED
         if is_named and may_learn:
             self._learn(channel, source)

@@ -101,7 +101,7 @@ class ComponentSystem(Protocol):
         """Send one more HEARTBEAT of the autopilot to all."""
 
     def text(self, severity: Severity, text: OperatorText, to: Channel | None = None) -> None:
-        """A STATUSTEXT to everybody, and a line in the log; or to one channel alone."""
+        """A STATUSTEXT to all channels, and a line in the log; or to one channel alone."""
 
     def warn_throttled(self, text: OperatorText) -> None:
         """Send a warning on a frequent event."""

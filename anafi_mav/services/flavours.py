@@ -213,7 +213,7 @@ PX4 = Flavour(
     joystick_overrides=True,
 )
 
-# Numbers of ArduCopter/mode.h. Its Brake is our Hold: it stops, and nobody's setpoints or sticks move the drone.
+# Numbers of ArduCopter/mode.h. Its Brake is our Hold: it stops, and no client's setpoints or sticks move the drone.
 _BRAKE, _LOITER, _POSHOLD, _GUIDED = 17, 5, 16, 4
 _COPTER_NUMBERS = {
     FlightMode.POSITION: _LOITER,

@@ -78,7 +78,7 @@ class PacedSender:
             task.cancel()
 
     def clear(self) -> None:
-        """Nothing more to anybody."""
+        """Send nothing more."""
         for channel in list(self._sources):
             self.closed(channel)
 

@@ -38,7 +38,7 @@ LOOK_EVERY = 0.1
 """s between two looks of the services at what may have changed."""
 
 MessageHandler = Callable[[Inbound], None]
-"""Takes a message that is addressed to our autopilot, or to everybody."""
+"""Takes a message that is addressed to our autopilot, or to all systems."""
 
 Query = Callable[[Inbound, Command], int]
 """Answers a command at once, every time it comes; returns the MAV_RESULT."""
@@ -106,7 +106,7 @@ class Host(Protocol):
         """
 
     def text(self, severity: Severity, text: OperatorText, to: Channel | None = None) -> None:
-        """A STATUSTEXT to everybody, and a line in the log; or to one channel alone.
+        """A STATUSTEXT to all channels, and a line in the log; or to one channel alone.
 
         It is the autopilot's, whatever the component: every station shows those.
         """

@@ -438,7 +438,7 @@ class System:
             self._node.send_batch(batch, to)
 
     def text(self, severity: Severity, text: OperatorText, to: Channel | None = None) -> None:
-        """A STATUSTEXT to everybody, and a line in the log; or to one channel alone."""
+        """A STATUSTEXT to all channels, and a line in the log; or to one channel alone."""
         if to is None:
             logger.log(
                 logging.WARNING if severity <= Severity.WARNING else logging.INFO, "%s: %s", self.drone.name, text
@@ -618,7 +618,7 @@ class System:
             yield service.value_subscriptions()
 
     def _changed(self, *, force: bool = False) -> None:
-        """Mode, armed state or health may have changed: clients wait for it, so tell them at once.
+        """Mode, armed state or health may have changed: clients wait for it, so notify them at once.
 
         The heartbeat is first, but for a disarming: QGroundControl believes a landing of an armed vehicle only
         (Vehicle::_setLanding), so EXTENDED_SYS_STATE and the landing event leave before it.

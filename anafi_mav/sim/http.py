@@ -235,7 +235,7 @@ class WebServer:
             try:
                 queue.put_nowait(text)
             except asyncio.QueueFull:
-                # Who does not read is cut off, and reads everything anew when it comes back.
+                # A reader that is too slow is disconnected, and reads everything again when it is back.
                 del self._listeners[socket]
                 if transport is not None:
                     transport.abort()

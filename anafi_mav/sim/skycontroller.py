@@ -215,7 +215,7 @@ class Skycontroller:
         state = Connection.CONNECTED if self._radio else Connection.SEARCHING
         return drone_manager.ConnectionState(state, drone.serial, drone.model_id, drone.name)
 
-    # -- the link to whoever is connected
+    # -- the link to the controller that is connected
 
     def link_up(self, send: Callable[[Message], object]) -> None:
         """Handle the connection of a client."""

@@ -61,7 +61,7 @@ class _Period:
         if self.next == 0.0:
             self.next = now + self._phase * self._period
             return False
-        # One period on; after a pause the rhythm starts anew instead of catching up.
+        # One period on; after a pause the rhythm starts again instead of catching up.
         self.next += self._period
         if self.next < now:
             self.next = now + self._period

@@ -18,7 +18,7 @@ from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.velocity_loop import Axis, Demand, G, MotionEstimate
 
 SMALLEST = 2.0
-"""m of radius. On a smaller circle GPS cannot tell on which side of it the drone is."""
+"""m of radius. On a smaller circle GPS does not show on which side of it the drone is."""
 
 LARGEST = 5000.0
 """m of radius: more is a number in the wrong field."""

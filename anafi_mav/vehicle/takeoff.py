@@ -45,7 +45,7 @@ TAKEOFF_WAIT = 30.0
 """s that a command waits for the end of a take-off."""
 
 ALTITUDE_WAIT = 3.0
-"""s for the drone to tell its height, which it does five times a second."""
+"""s for the drone to report its height, which it does five times a second."""
 
 LOW = 0.5
 """m above take-off below which a drone that takes off is disarmed by a landing."""

@@ -157,7 +157,7 @@ class FlightFacts:
     landing_ended_at: float = -math.inf
     """When a client last ended a landing (s)."""
     aborted_return: AbortedReturn | None = None
-    """The return of the drone's own that a client has ended, while that has to be repeated to everybody."""
+    """The return of the drone's own that a client has ended, while that has to be repeated to all clients."""
 
 
 class Vehicle(Aircraft):
@@ -322,7 +322,7 @@ class Vehicle(Aircraft):
         mission = {FlightMode.MISSION} if self.mission.there else frozenset()
         return _ALWAYS_ENTERABLE | follow | mission
 
-    # What it can be told to do. Each returns when the drone confirmed, or raises.
+    # Its commands. Each returns when the drone confirmed, or raises.
 
     async def terminate(self, by: By) -> None:
         """Cut the motors, at once: what this replaces is not waited for, and sends nothing any more."""
@@ -597,7 +597,7 @@ class Vehicle(Aircraft):
         return self.holds.answers(by.client, by.at)
 
     async def _answer_announced(self, cancels: bool, by: Right) -> None:
-        """Cancel the announced return, or notify everybody how a second Hold does."""
+        """Cancel the announced return, or notify all clients how a second Hold does."""
         home = self.drone.home
         trigger = home.state.auto_trigger
         if trigger in (None, AutoTriggerReason.NONE) or self.returning:

@@ -495,7 +495,7 @@ def walk(data: bytes) -> Iterator[tuple[int, int, int | bytes]]:
         elif wire_type in (_FIXED32, _FIXED64):
             size = 4 if wire_type == _FIXED32 else 8
         else:
-            raise MalformedProtobuf  # groups are of proto2, the others of nobody
+            raise MalformedProtobuf  # groups are of proto2, the others are undefined
         if size > end - position:
             raise MalformedProtobuf
         yield number, wire_type, data[position : position + size]

@@ -239,7 +239,7 @@ async def _connect(
                 proto_v_max=versions[1],
             )
             reply = await _shake_hands(there, handshake_port or device.port, here, interface, request)
-            # Connected, the socket hears that drone only, and hears at once when nobody listens there.
+            # Connected, the socket hears that drone only, and hears at once when the port there is closed.
             sock.connect((there, reply.c2d_port))
         except BaseException:
             sock.close()

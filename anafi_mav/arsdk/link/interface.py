@@ -1,7 +1,7 @@
 """Sockets that use one network interface only.
 
 Every ANAFI is 192.168.42.1 in its own Wi-Fi, every Skycontroller 192.168.53.1. A host with two radios therefore has
-two routes to the same address, and the kernel takes the first for everybody. A socket bound to an interface
+two routes to the same address, and the kernel takes the first for all sockets. A socket bound to an interface
 (SO_BINDTODEVICE, Linux socket(7)) sends and receives there whatever the routes say, so that two aircraft with one
 address are two. Linux allows it to every user since 5.7. The kernel must not check the way back against its routes:
 net.ipv4.conf.*.rp_filter has to be 0 or 2.

@@ -256,7 +256,7 @@ class Session(asyncio.DatagramProtocol):
         self._flush()
 
     def error_received(self, exc: Exception) -> None:
-        # ICMP "port unreachable" on a connected socket: nobody is there. libarsdk ends the link on it too.
+        # ICMP "port unreachable" on a connected socket: the port is closed. libarsdk ends the link on it too.
         if isinstance(exc, ConnectionRefusedError):
             self.end("the drone's UDP port is closed")
         else:

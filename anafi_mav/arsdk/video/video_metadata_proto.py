@@ -129,7 +129,7 @@ def encode_proto(metadata: FrameMetadata) -> bytes:
 
     Raises `LocalProtocolError` when a number does not fit its field.
 
-    proto3 does not tell a number that is zero from one that is missing.
+    proto3 encodes a number that is zero as one that is missing.
     """
     drone = _Drone(
         quat=_Quaternion(*metadata.drone_quat) if metadata.drone_quat else None,

@@ -212,7 +212,7 @@ class FlightPlan(Commanding[FlightPlanState]):
         self._available()
         told = await self._rest.json("GET", f"{API}/flightplan/{_checked(uid)}")
         if not isinstance(told, dict):
-            raise RemoteProtocolError(f"the drone tells nothing of flight plan {uid}")
+            raise RemoteProtocolError(f"the drone reports nothing of flight plan {uid}")
         return told
 
     async def delete(self, uid: str) -> bool:

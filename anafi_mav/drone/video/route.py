@@ -98,7 +98,7 @@ class _Socket(asyncio.DatagramProtocol):
             self.foreign += 1
 
     def error_received(self, exc: Exception) -> None:
-        # A report that nobody took: the pictures may come all the same, and when they do not that is noticed.
+        # A report without a receiver: the pictures may come all the same, and when they do not that is noticed.
         log.debug("video: UDP error: %s", exc)
 
     def send(self, data: bytes) -> None:

@@ -124,7 +124,7 @@ class CalibrationService(Service):
 
     @staticmethod
     async def _undone(undo: Callable[[], Awaitable[object]]) -> None:
-        with contextlib.suppress(AnafiMavError):  # there is nobody to tell it to, and the drone says how it stands
+        with contextlib.suppress(AnafiMavError):  # no client waits for it, and the drone reports its state
             await undo()
 
     async def _magnetometer(self) -> None:

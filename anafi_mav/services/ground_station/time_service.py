@@ -35,7 +35,7 @@ class TimeService(Service):
 
     def _ping(self, inbound: Inbound) -> None:
         ping = inbound.message
-        if ping.target_system == 0 and ping.target_component == 0:  # otherwise it is somebody's answer
+        if ping.target_system == 0 and ping.target_component == 0:  # otherwise it is an answer
             self.host.send(
                 dialect.MAVLink_ping_message(ping.time_usec, ping.seq, inbound.sysid, inbound.compid), inbound.channel
             )

@@ -101,7 +101,7 @@ class MissionService(Service):
 
     def link_down(self) -> None:
         self._sent_item = None
-        self._flight.link_down()  # before anybody is told that something has ended: the drone may fly on
+        self._flight.link_down()  # before a client is notified that something has ended: the drone may fly on
 
     def subscriptions(self) -> Subscriptions:
         return self._flight.subscriptions()
@@ -132,7 +132,7 @@ class MissionService(Service):
 
     async def _choose(self, command: Command) -> None:
         """MAV_CMD_DO_SET_MISSION_CURRENT: param1 the item or -1; -1 with param2 1 resets."""
-        item, anew = command.params[:2]
+        item, restart = command.params[:2]
         flight = self._flight
         await flight.storing.over()
         self._sent = {}
@@ -141,7 +141,7 @@ class MissionService(Service):
         if math.isinf(item) or (not math.isnan(item) and item != int(item)):
             raise Refused(texts.CURRENT_ITEM, texts.PARAM1_ITEM, lasting=True)
         if math.isnan(item) or item == KEEP:
-            if anew == 1.0:
+            if restart == 1.0:
                 await flight.reset(command.right)
             return
         await flight.choose(command.right, _ours(int(item), command.client))
@@ -160,7 +160,7 @@ class MissionService(Service):
         task = self.host.run_action(client, self._flight.choose(Right(client, Extent.COMMANDED), item))
         self._choice = _Choice(client, item, task)
 
-    # What is told.
+    # MISSION_CURRENT and texts.
 
     def _current(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
         return dialect.MAVLink_mission_current_message(*_fields(vehicle)[times.flavour.zero_home])

@@ -1,7 +1,7 @@
 """How the vehicle is: battery, sensors, estimator, flights, as messages.
 
-Unknown values carry MAVLink's own "unknown". What a message has no "unknown" for, and an ANAFI does not tell, is 0 and
-said so here.
+Unknown values carry MAVLink's own "unknown". A field without an "unknown", which an ANAFI does not report, is 0,
+with a comment here.
 """
 
 from __future__ import annotations

@@ -156,7 +156,7 @@ class Endurance:
             messages.append(ardrone3.ReturnHomeBatteryCapacity(capacity))
         return messages
 
-    # -- what the firmware tells
+    # -- reports of the firmware
 
     def took_off(self) -> None:
         """A new flight: look at once."""

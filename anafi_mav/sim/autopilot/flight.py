@@ -263,7 +263,7 @@ class Autopilot:
             self._update_sensors(self._unseen)
             self._unseen = 0.0
         if self.state is LANDED or self.state is not before:
-            return  # `arrived` is about what the body was told before
+            return  # `arrived` is about the target of before
         if self.state in GUIDED:
             self._fly(arrived, still)
         elif self.state is FlyingState.MOTOR_RAMPING:

@@ -150,7 +150,7 @@ class FlightPlan:
             *(common.ComponentStateListChanged(part, int(ok)) for part, ok in self._parts.items()),
         ]
         if self._model.modern:
-            messages.append(self._recovery)  # what is missing is told by `services`
+            messages.append(self._recovery)  # what is missing is reported by `services`
         return messages
 
     def _playing_report(self) -> Message:

@@ -236,7 +236,7 @@ class Homing:
             self._set(RthState.IN_PROGRESS, reason)
             return True
         self.phase = ReturnPhase.PENDING
-        # Nobody flies on while the battery decides.
+        # No input is flown while the battery decides.
         if hovering or reason is StateReason.LOW_BATTERY:
             self._begin(reason, pose)
         else:

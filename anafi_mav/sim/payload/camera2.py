@@ -235,7 +235,7 @@ class Camera2:
         )
 
     def _apply(self) -> None:
-        """Tell the camera at work what is set."""
+        """Hand the settings to the active camera."""
         config, at_work = self._config, self._camera
         at_work.mode = _MODES[config["camera_mode"]]
         at_work.photo_mode = CameraPhotoMode(int(config["photo_mode"]))

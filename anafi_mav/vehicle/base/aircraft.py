@@ -272,7 +272,7 @@ class Aircraft(ABC):
                 return error.reason
         return None
 
-    # What everybody who flies it needs.
+    # What all flight tasks need.
 
     def centre_sticks(self) -> None:
         """Centre the sticks; without a link none are held."""

@@ -390,7 +390,7 @@ class FenceWatch:
         if self.action is Reaction.NONE:
             return None
         if self._acting is not None:
-            # What is under way serves all boundaries, but one that is crossed meanwhile is told of.
+            # What is under way serves all boundaries, but one that is crossed meanwhile is reported.
             crossed = side.state is State.OUTSIDE and before is not State.OUTSIDE
             return Reaction.WARN if crossed and side is not self._acting else None
         if side.retry_at is not None:

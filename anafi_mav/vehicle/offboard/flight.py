@@ -538,7 +538,7 @@ class OffboardFlight(PlainTask):
                 return self._moves.go(steering.goal, steering.heading.yaw, now, asked=stream.state is not State.SINGLE)
             steering = self._judge_speed(setpoint, limits, steering)
             steering = steering.close_loop(setpoint, limits, now, located=vehicle.place is not None)
-        except Refused as refusal:  # what the drone told when the setpoint arrived is not known any more
+        except Refused as refusal:  # what the drone had reported when the setpoint arrived is not known any more
             self._hold(replace(steering, sticks=PilotingCommand()), now)
             return refusal.reason
         if steering.is_short_of_tilt:

@@ -188,7 +188,7 @@ class OffboardMoves:
         if wanted.yaw is not None and (attitude := piloting.state.attitude) is not None:
             turn = units.wrap_pi(wanted.yaw - attitude.yaw)
         if piloting.move is not None:
-            piloting.hover()  # a moveBy replaces a moveBy, of a moveTo nobody says so
+            piloting.hover()  # a moveBy replaces a moveBy; whether it replaces a moveTo is not documented
         task = asyncio.get_running_loop().create_task(self._relative_move(wanted, front, right, down, turn))
         if self._attempt is not None:
             self._attempt = replace(self._attempt, waits=(*self._attempt.waits, task))
@@ -213,6 +213,6 @@ class OffboardMoves:
         if not self._note(wanted, failure=why, retry_at=retry_at):
             return
         self._drop(why)
-        # One that was refused leaves an older one alone, which nobody asks for any more.
+        # One that was refused leaves an older one alone, which is no longer wanted.
         if self._vehicle.drone.piloting.sticks_blocked is None:
             self._vehicle.hover()
