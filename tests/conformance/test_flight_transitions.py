@@ -115,7 +115,7 @@ async def test_takeoff_waiting_for_arming_ends_a_session_on_ground() -> None:
         assert [e for e in heard(w, "PCMD") if e.args["pitch"]] == []
 
 
-async def test_ground_session_does_not_fly_after_another_clients_takeoff() -> None:
+async def test_ground_session_does_not_fly_after_the_pilots_takeoff() -> None:
     """The pilot at a Skycontroller takes off while a program, not armed, is in Offboard: the flight is the pilot's."""
     async with world(clients=1) as w:
         async with streaming(w.client, NORTH):
@@ -123,7 +123,7 @@ async def test_ground_session_does_not_fly_after_another_clients_takeoff() -> No
             mark = w.client.mark()
             somebody_else(w, ardrone3.TakeOff())
             await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 15.0)
-            await said(w.client, "Offboard ended: takeoff of another client", mark)
+            await said(w.client, "Offboard ended: takeoff by another controller", mark)
             await watched(1.5)
             await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
         assert [e for e in heard(w, "PCMD") if e.args["pitch"]] == []
