@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import re
 import resource
 import signal
@@ -16,7 +15,7 @@ from support.product import product, program
 from support.world import loopback
 
 from anafi_mav.mavlink.key_ring import write_key
-from anafi_mav.state_lock import Holder, read_holder, state_folder
+from anafi_mav.state_lock import read_holder, state_folder
 
 MISSIONS = Path(__file__).parents[3] / "missions"
 
@@ -29,23 +28,13 @@ def fleet(address: str, drone: str, state: str = "") -> str:
     """
 
 
-async def holder_of_connected_drones(timeout: float = 20.0) -> Holder:
-    """Wait until the gateway's file has the serial numbers: its thread for the disk writes them after "ready"."""
-    deadline = asyncio.get_running_loop().time() + timeout
-    while True:
-        holder = read_holder(state_folder(None))
-        if holder is not None and all(drone.serial for drone in holder.drones):
-            return holder
-        assert asyncio.get_running_loop().time() < deadline, holder
-        await asyncio.sleep(0.05)  # another process writes the file
-
-
 async def test_second_gateway_on_a_state_folder_names_the_process(tmp_path: Path) -> None:
     (tmp_path / "one").mkdir()
     (tmp_path / "two").mkdir()
     drone = loopback()
     async with product(tmp_path / "one", fleet(loopback(), drone)) as first:
-        holder = await holder_of_connected_drones()
+        holder = read_holder(state_folder(None))
+        assert holder is not None
         assert holder.pid == first.process.pid
         (held,) = holder.drones
         assert (held.name, held.address) == ("alpha", drone)
