@@ -193,7 +193,7 @@ class Drone:
         self._subscriptions: tuple[tuple[Callback, frozenset[type[Message]]], ...] = ()
         """Each callback with the kinds of messages that it is not called with."""
         self._holders: Mapping[type[Message], Sequence[dict[bytes, PackedMessage]]] = {}
-        """Events of values that no callback is called with, and the elements that keep them."""
+        """Events of values that no callback is called with, and the tables of the elements that keep them."""
         self._on_values: tuple[OnValues, ...] = ()
         self._set_subscriptions(())
 
