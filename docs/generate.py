@@ -608,7 +608,8 @@ The one with the flag STORAGE_USAGE_FLAG_SET is written to: the setting `CAM_STO
 
 MAV_CMD_STORAGE_FORMAT needs the number where there are two storages. It is refused in flight, while recording and
 while photos are taken, and UNSUPPORTED for a storage that the drone cannot format. It cannot be cancelled.
-IN_PROGRESS is sent meanwhile; MAVSDK's `format_storage` takes the first one for the end, so watch the storage.
+IN_PROGRESS is sent after 2.5 s only, because MAVSDK takes it for the end and its program aborts at the real one. A
+format that takes longer is a timeout to it, and "no response" to QGroundControl: watch the storage.
 
 ## Repeated commands
 

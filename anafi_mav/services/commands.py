@@ -11,6 +11,8 @@ import math
 from collections.abc import Awaitable, Callable, Hashable
 from dataclasses import dataclass
 
+from msgspec import Struct
+
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import PX4, Flavour
 from anafi_mav.vehicle.base.modes import FlightMode
@@ -41,8 +43,9 @@ LATE_PROGRESS_AFTER = 2.5
 
 MAVSDK 4.1 takes one of a DO_SET_MODE for the end of start_mission, pause_mission and arm, which fail then and crash
 when the real end comes (mission_raw_impl.cpp start_mission; action_impl.cpp waits for the end, but for the mode that it
-sets before arming). It takes one of a gimbal command for its failure (gimbal_impl.cpp receive_command_result). It
-gives up 2 s after it has sent them, the others later."""
+sets before arming). It takes one of a gimbal command for its failure (gimbal_impl.cpp receive_command_result). Its
+set_home, reset_settings and format_storage return with one, and the real end then aborts the whole client program
+("std::future_error", measured with 4.1.0). It gives up 2 s after it has sent them, the others later."""
 
 _UNSET_INT = (2**31 - 1, -(2**31))
 """x and y of a COMMAND_INT that stand for "not set": the specified INT32_MAX, and what a cast NaN becomes (R8)."""
@@ -211,8 +214,7 @@ QUERY = Definition(location=False, altitude=Altitude.UNUSED, effect=Effect.CHANG
 """A command that is answered at once, and changes nothing."""
 
 
-@dataclass(frozen=True)
-class Command:
+class Command(Struct, frozen=True):
     """One command, from any of its messages. Unset parameters are NaN."""
 
     id: int
@@ -331,8 +333,7 @@ def from_int(
     )
 
 
-@dataclass
-class Execution:
+class Execution(Struct, eq=False):
     """An action under way or just ended."""
 
     client: Hashable
@@ -383,10 +384,9 @@ class CommandHistory:
 
         These may be executed twice: commands that stop something always, except a landing that another client has
         ended (`landing_ended_at` is when a client last ended one); a return and a target while no other client has
-        replaced it;
-        and modes that have ended by themselves (`mode` is the vehicle's). A command that another client has replaced
-        is neither executed against that client nor confirmed: it is answered with CANCELLED. One that was refused had
-        nothing to replace, and keeps its result.
+        replaced it; and modes that have ended by themselves (`mode` is the vehicle's, needed for LAPSING alone). A
+        command that another client has replaced is neither executed against that client nor confirmed: it is answered
+        with CANCELLED. One that was refused had nothing to replace, and keeps its result.
         """
         newest = self._newest.get((client, command.group))
         if newest is None or not newest.command.same_as(command):

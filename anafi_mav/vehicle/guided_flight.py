@@ -17,7 +17,7 @@ from anafi_mav.vehicle.base.bounds import check_height, check_place
 from anafi_mav.vehicle.base.flight_task import Hover, Needs, PlainTask, Preparation, TaskRules
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.move_heading import oriented
+from anafi_mav.vehicle.base.move_heading import MoveHeading, oriented
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import By
 from anafi_mav.vehicle.base.severity import Severity
@@ -152,13 +152,16 @@ class GuidedFlight:
             ato = present
         else:
             check_height(vehicle, ato)
-        kept = self._standing or here if self.goto is None else self.goto.place
-        await self.go(Goto(place or kept, ato, yaw, speed, mode), by=by, checked=place is None)
+        if place is None:
+            place = self._standing or here if self.goto is None else self.goto.place
+        else:
+            check_place(vehicle, place, start=here)
+        await self.go(Goto(place, ato, yaw, speed, mode), by=by, checked=True)
 
     async def go(self, goto: Goto, *, by: By, checked: bool = False) -> None:
         """Fly to a place, or change the move to it. Returns when the drone is on its way.
 
-        `checked`: the place is the drone's own position, which needs no check.
+        `checked`: the place was checked just now, or is the drone's own position, which needs no check.
         """
         vehicle, control = self._vehicle, self._vehicle.control
         if not checked:
@@ -179,8 +182,9 @@ class GuidedFlight:
 
     async def move(self, goto: Goto) -> None:
         """Let the drone begin the move of the active task; no await before the moveTo."""
-        vehicle = self._vehicle
-        orientation, heading = oriented(vehicle.settings.move_heading, vehicle.place, goto.place, goto.yaw)
+        vehicle, rule = self._vehicle, self._vehicle.settings.move_heading
+        keeps = goto.yaw is None and rule is MoveHeading.KEEP
+        orientation, heading = oriented(rule, None if keeps else vehicle.place, goto.place, goto.yaw)
         await vehicle.drone.piloting.move_to(
             goto.place.latitude,
             goto.place.longitude,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 from collections.abc import Callable
 from itertools import pairwise
@@ -408,6 +409,25 @@ async def test_conf_129_format_goes_on_after_a_cancel() -> None:
         )
         assert ack.result == ACCEPTED
         await w.drone.wait_log(lambda e: e.name == "user_storage.format_result")
+
+
+@both
+async def test_conf_011_camera_reset_format_and_home_report_no_early_progress(flavour: str) -> None:
+    """MAVSDK returns with an IN_PROGRESS of these, and the end then aborts its whole program. It waits for 2 s."""
+    async with world(flavour=flavour) as w:
+        sent = (
+            (dialect.MAV_CMD_DO_SET_HOME, (1,), 1),
+            (dialect.MAV_CMD_RESET_CAMERA_SETTINGS, (1,), CAMERA),
+            (FORMAT, (1, 1), CAMERA),
+        )
+        w.drone.faults.mute = True
+        mark = w.client.mark()
+        for _ in range(4):  # as MAVSDK repeats them
+            for command_id, params, component in sent:
+                w.client.send_command(command_id, *params, target=(1, component))
+            await asyncio.sleep(0.5)
+        acks = [(ack.command, ack.result) for _, ack in w.client.since(mark, "COMMAND_ACK")]
+        assert dialect.MAV_RESULT_IN_PROGRESS not in dict(acks).values(), acks
 
 
 @both

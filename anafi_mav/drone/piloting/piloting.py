@@ -268,13 +268,13 @@ class Piloting(PilotingSettings):
         """
         return await self._returns.return_home(timeout)
 
-    async def cancel_return_home(self, timeout: float = ANSWER_TIMEOUT, *, even_its_own: bool = False) -> None:
-        """Stop a return that a user commanded, also one that has not begun yet.
+    async def cancel_return_home(self, timeout: float = ANSWER_TIMEOUT, *, even_its_own: bool = False) -> bool:
+        """Stop a return that a user commanded, also one not begun yet; return False without one.
 
         It may have been commanded through this program or not. One that the drone began by itself is stopped only
         with `even_its_own`, else `CommandRejected` is raised.
         """
-        await self._returns.cancel_return_home(timeout, even_its_own=even_its_own)
+        return await self._returns.cancel_return_home(timeout, even_its_own=even_its_own)
 
     async def set_min_altitude(self, metres: float) -> float:
         """See `Home.set_min_altitude`."""

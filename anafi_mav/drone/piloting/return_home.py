@@ -104,14 +104,14 @@ class ReturnHome:
             hover.close()
         return not move.answer.future.done()
 
-    async def cancel_return_home(self, timeout: float, *, even_its_own: bool = False) -> None:
+    async def cancel_return_home(self, timeout: float, *, even_its_own: bool = False) -> bool:
         self._commander.require_link()
         home = self._home.state
         if home.returning_by_itself and not even_its_own:
             raise CommandRejected(BY_ITSELF)
         asked = self.drop("the return was cancelled")
         if not home.returning and not asked and not self._moves.aborting:
-            return
+            return False
         answer = self._commander.expect((rth.State,), _ends_return)
         began = loop_time()
         try:
@@ -122,6 +122,7 @@ class ReturnHome:
         await self._commander.stops_delivered(rth.Abort.NAME, timeout - (loop_time() - began))
         if self._home.state.returning:
             raise CommandTimeout(rth.Abort.NAME, timeout)
+        return True
 
     def abort(self, even_its_own: bool = False) -> asyncio.Future[None]:
         """End a return.

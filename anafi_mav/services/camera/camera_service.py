@@ -23,7 +23,7 @@ from anafi_mav.services.camera import camera_messages
 from anafi_mav.services.camera.camera_pose import current_pose
 from anafi_mav.services.camera.camera_reset import reset_camera
 from anafi_mav.services.camera.camera_targets import is_at_autopilot, require_camera, require_free, require_idle
-from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect
+from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.service import Answer, Host, Request, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
@@ -149,6 +149,7 @@ class CameraService(Service):
                 location=False,
                 altitude=Altitude.UNUSED,
                 effect=Effect.TARGET,
+                progress=ProgressPolicy.LATE,
                 group=ActionGroup.CAMERA,
             ),
             dialect.MAV_CMD_SET_CAMERA_SOURCE: Action(

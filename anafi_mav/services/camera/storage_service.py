@@ -22,7 +22,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.camera.camera_messages import MEBIBYTE
 from anafi_mav.services.camera.camera_targets import PASSING, media_storage, require_idle, storage_problem
-from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect
+from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.service import Answer, Host, Request, Service
 from anafi_mav.texts import Reason
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
@@ -195,6 +195,7 @@ class StorageService(Service):
                 location=False,
                 altitude=Altitude.UNUSED,
                 effect=Effect.ONCE,
+                progress=ProgressPolicy.LATE,
                 group=ActionGroup.STORAGE,
                 still_holds=lambda: self._is_empty,
             )

@@ -7,11 +7,11 @@ Rules: conformance R5-R10, C2, MAVLink command.md.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 from collections.abc import Callable, Coroutine, Hashable, Mapping
-from dataclasses import replace
 from typing import Any
+
+from msgspec.structs import replace
 
 from anafi_mav import texts
 from anafi_mav.clock import Alarm
@@ -207,14 +207,16 @@ class CommandService(Service):
         self._act(inbound, command)
 
     def _act(self, inbound: Inbound, command: Command) -> None:
-        now, mode = self.host.clock.monotonic(), self.host.vehicle.mode
+        now, effect = self.host.clock.monotonic(), command.effect
         # Before it is known whether it is a retransmission: a program that repeats its Hold is to be noticed.
-        counted = command.effect is not Effect.HOLD or self.host.vehicle.holds.arrive(command.client, now)
+        counted = effect is not Effect.HOLD or self.host.vehicle.holds.arrive(command.client, now)
         command = replace(command, at=now, counted=counted, component=self.host.compid)
         group = command.group
         flies = group is ActionGroup.FLIGHT
         if flies:
-            ended_at = self.host.vehicle.flight_facts.landing_ended_at
+            vehicle = self.host.vehicle
+            mode = vehicle.mode if effect is Effect.LAPSING else None
+            ended_at = vehicle.flight_facts.landing_ended_at
             repeated = self._history.retransmission(command.client, command, now, mode, ended_at)
         else:
             repeated = self.host.payload_history.retransmission(command, now)
@@ -246,9 +248,12 @@ class CommandService(Service):
             progress.set_in(LATE_PROGRESS_AFTER if policy is ProgressPolicy.LATE else PROGRESS_AFTER)
         result, reason = dialect.MAV_RESULT_FAILED, ""
         try:
-            in_order = command.group.in_order
-            async with self.host.payload_history.turn(command.group) if in_order else contextlib.nullcontext():
-                await self._actions[command.id].handler(command)
+            group, handler = command.group, self._actions[command.id].handler
+            if group.in_order:
+                async with self.host.payload_history.turn(group):
+                    await handler(command)
+            else:
+                await handler(command)
             result = dialect.MAV_RESULT_ACCEPTED
         except AnafiMavError as error:
             result, reason = self._explain(error), text_of(error)

@@ -17,7 +17,7 @@ from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.command_targets import UnsupportedFrame, height, height_in_frame, place
-from anafi_mav.services.commands import Action, Altitude, Command, Effect
+from anafi_mav.services.commands import Action, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
 from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST, check_height, check_on_earth, home_height
@@ -129,7 +129,11 @@ class GuidedService(Service):
                 self._pause_or_continue, location=False, altitude=Altitude.UNUSED, effect=_effect_of_pause
             ),
             dialect.MAV_CMD_DO_SET_HOME: Action(
-                self._set_home, location=True, altitude=Altitude.AMSL, effect=Effect.CHANGE
+                self._set_home,
+                location=True,
+                altitude=Altitude.AMSL,
+                effect=Effect.CHANGE,
+                progress=ProgressPolicy.LATE,
             ),
         }
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 import asyncio
 import itertools
 from collections.abc import Hashable
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import ActionGroup, CommandHistory, Execution
@@ -19,8 +20,7 @@ MAX_WAITING = 32
 """Actions of one group that run one after another: a drone that answers none of them takes seconds for each."""
 
 
-@dataclass
-class RunningAction:
+class RunningAction(Struct, eq=False):
     """A running action that changes the vehicle's state."""
 
     client: Hashable

@@ -11,8 +11,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 from anafi_mav import texts
 from anafi_mav.clock import Clock
@@ -236,9 +237,13 @@ class Aircraft(ABC):
 
     def lacking(self, needs: Needs) -> OperatorText | None:
         """Return the first condition that is not met, as the reason of a refusal; None: all are."""
-        if Needs.NO_DESCENT in needs and (descent := self.descent) is not None:
+        has_descent, rows = _rows_of(needs)
+        if has_descent and (descent := self.descent) is not None:
             return descent
-        return next((reason for need, is_unmet, reason in _UNMET if need in needs and is_unmet(self)), None)
+        for is_unmet, reason in rows:
+            if is_unmet(self):
+                return reason
+        return None
 
     def prearm_problems(self) -> list[OperatorText]:
         """Return the reasons why the drone would not take off, in sentences; empty without any."""
@@ -302,3 +307,12 @@ _UNMET: tuple[tuple[Needs, Callable[[Aircraft], bool], OperatorText], ...] = (
     (Needs.ROLL_SIGN, lambda aircraft: aircraft.roll.sign is RollSign.INVERTED, texts.ROLL_INVERTED),
 )
 """When a need is not met, and the reason of a refusal then, in the order in which they are checked."""
+
+
+@cache
+def _rows_of(needs: Needs) -> tuple[bool, Sequence[tuple[Callable[[Aircraft], bool], OperatorText]]]:
+    """Return True when a descent counts, and the rows of the other needs.
+
+    Stored, because each setpoint of a stream is checked.
+    """
+    return Needs.NO_DESCENT in needs, [(is_unmet, reason) for need, is_unmet, reason in _UNMET if need in needs]

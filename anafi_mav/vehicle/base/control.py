@@ -5,8 +5,8 @@
 1. The policy and the task's needs are checked. A request that is refused disturbs nothing.
 2. What flies is ended at once, and all older actions are cancelled. From now on they can send only what stops them.
 3. Their end is awaited: without that an aborted move could cancel the one that follows it.
-4. A return that a client commanded is cancelled, the needs are checked again, and the drone is stopped where the task
-   needs it. Then the task begins.
+4. A return that a client commanded is cancelled, and the drone is stopped where the task needs it. The needs are
+   checked again if that, or the end of what flew, has taken an event-loop iteration. Then the task begins.
 
 A newer request replaces a pending one. No module but this one stores who flies, and the mode is derived from it.
 """
@@ -16,8 +16,10 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Callable, Coroutine, Hashable
 from contextlib import asynccontextmanager
-from dataclasses import dataclass, replace
 from typing import Any, Protocol, TypeAlias
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from anafi_mav import texts
 from anafi_mav.drone import Drone
@@ -35,15 +37,14 @@ from anafi_mav.vehicle.base.control_machine import (
     step,
 )
 from anafi_mav.vehicle.base.flight_actions import FlightAction, FlightActions
-from anafi_mav.vehicle.base.flight_task import STEERING, FlightTask, Needs, Preparation, TaskRules
+from anafi_mav.vehicle.base.flight_task import FlightTask, Needs, Preparation, TaskRules, lasting_needs
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, text_of
 from anafi_mav.vehicle.base.requester import By, Source, client_of
 from anafi_mav.vehicle.base.severity import Severity
 
 
-@dataclass(frozen=True)
-class Request:
+class Request(Struct, frozen=True):
     """A request of a flight task."""
 
     task: FlightTask
@@ -168,7 +169,7 @@ class Control:
         """
         if self._situation.task is not task:
             return False
-        reason = self._aircraft.lacking(task.rules.needs & STEERING)
+        reason = self._aircraft.lacking(lasting_needs(task.rules.needs))
         if reason is None:
             return True
         self.lose(reason)
@@ -205,9 +206,9 @@ class Control:
         hover = task if rules.is_hover else below
         attempt = Attempt(own, number, hover, rules.keeps_below, pauses, rules.is_urgent)
         try:
-            await self._release(attempt, rules.wait)
+            has_waited = await self._release(attempt, rules.wait)
             self.handle(Event.RELEASED, Input(attempt))
-            await self._prepare(Request(task, by, rules))
+            await self._prepare(Request(task, by, rules), has_waited=has_waited)
             grant = Grant(self, attempt)
             yield grant
             grant.begin()
@@ -248,8 +249,8 @@ class Control:
         yields = isinstance(by, Source) and by.yields_to_pilot
         return yields and (controller.pilot_has_source or controller.pilot_acquired_control)
 
-    async def _release(self, attempt: Attempt[FlightTask], limit: float | None) -> None:
-        """End what flies, which can fly the drone no further, and wait for the end."""
+    async def _release(self, attempt: Attempt[FlightTask], limit: float | None) -> bool:
+        """End what flies, which can fly the drone no further; return True after a wait for it."""
         ending = [*self.actions.end_older(), *self.handle(Event.REQUEST, Input(attempt))]
         drone = self._aircraft.drone
         drone.retire(ending)
@@ -258,18 +259,25 @@ class Control:
         elif ending:
             _, late = await asyncio.wait(ending, timeout=limit)
             drone.silence(late)
+            return True
+        return False
 
-    async def _prepare(self, request: Request) -> None:
-        """Stop the drone as the task needs it, and check policy and needs again."""
+    async def _prepare(self, request: Request, *, has_waited: bool) -> None:
+        """Stop the drone as the task needs it, and check policy and needs again after a wait.
+
+        Without one (`has_waited` is that of before) no event has been received since the first check.
+        """
         rules, aircraft, piloting = request.rules, self._aircraft, self._aircraft.drone.piloting
         if rules.start is Preparation.STOP:
             await piloting.stop()
+            has_waited = True
         if Needs.NO_DESCENT in rules.needs:
             # One asked for through another controller, or before the link was lost. Raises when it is the drone's own.
-            await piloting.cancel_return_home()
-        if (reason := aircraft.lacking(rules.needs)) is not None:
-            raise Refused(rules.what, reason)
-        self.require_allowed(request.task, request.by, rules)
+            has_waited |= await piloting.cancel_return_home()
+        if has_waited:
+            if (reason := aircraft.lacking(rules.needs)) is not None:
+                raise Refused(rules.what, reason)
+            self.require_allowed(request.task, request.by, rules)
         if rules.start is Preparation.HOVER:
             piloting.hover()
 

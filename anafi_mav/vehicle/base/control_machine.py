@@ -18,8 +18,10 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 TaskT = TypeVar("TaskT")
 
@@ -65,8 +67,7 @@ ADOPTED = 0
 """Number of an adoption: that of no attempt, so that the end of an attempt does not end what was adopted since."""
 
 
-@dataclass(frozen=True)
-class Attempt(Generic[TaskT]):
+class Attempt(Struct, Generic[TaskT], frozen=True):
     """One request of a task."""
 
     task: TaskT | None
@@ -81,8 +82,7 @@ class Attempt(Generic[TaskT]):
     """Nothing replaces it before it has ended: the motors are being cut."""
 
 
-@dataclass(frozen=True)
-class Situation(Generic[TaskT]):
+class Situation(Struct, Generic[TaskT], frozen=True):
     """The whole state of the control."""
 
     below: TaskT | None = None
@@ -134,8 +134,7 @@ class Situation(Generic[TaskT]):
         return None, self.below if pending.keeps_below or pending.below == self.below else None
 
 
-@dataclass(frozen=True)
-class Input(Generic[TaskT]):
+class Input(Struct, Generic[TaskT], frozen=True):
     """Subject of an event."""
 
     attempt: Attempt[TaskT] | None = None
@@ -147,8 +146,7 @@ class Input(Generic[TaskT]):
     act: DroneAct | None = None
 
 
-@dataclass(frozen=True)
-class Step(Generic[TaskT]):
+class Step(Struct, Generic[TaskT], frozen=True):
     """The next situation, and the effects of the event."""
 
     situation: Situation[TaskT]

@@ -8,11 +8,11 @@ from __future__ import annotations
 import asyncio
 import itertools
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 
-@dataclass
-class FlightAction:
+class FlightAction(Struct, eq=False):
     """A running action: a command, a stream's engagement, a reaction of the gateway."""
 
     client: Hashable

@@ -10,6 +10,7 @@ import asyncio
 import enum
 from collections.abc import Hashable
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Protocol
 
 from anafi_mav import texts
@@ -41,6 +42,12 @@ class Needs(enum.Flag):
 
 STEERING = Needs.NO_PILOT | Needs.PLAIN_STICKS | Needs.ROLL_SIGN
 """Conditions that a task that flies by sticks needs until its end: without one of them control is lost."""
+
+
+@cache
+def lasting_needs(needs: Needs) -> Needs:
+    """Return those of a task's needs that last until its end."""
+    return needs & STEERING
 
 
 class Preparation(enum.Enum):

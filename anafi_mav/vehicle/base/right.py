@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Hashable
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from anafi_mav.vehicle.base.clients import system_of
 
@@ -23,8 +24,7 @@ class Extent(enum.Enum):
     """The right of a command or a mode message."""
 
 
-@dataclass(frozen=True)
-class Right:
+class Right(Struct, frozen=True):
     """One client's right, given by one message of it."""
 
     client: Hashable

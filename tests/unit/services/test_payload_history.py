@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import pytest
+from msgspec.structs import replace
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import MAX_CLIENTS, Action, ActionGroup, Altitude, Command, Effect

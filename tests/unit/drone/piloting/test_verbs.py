@@ -710,14 +710,14 @@ async def test_return_home_takes_the_hands_off_the_sticks(drone: Drone, device: 
 
 
 async def test_cancel_return_home(drone: Drone, device: ScriptedDevice) -> None:
-    await drone.piloting.cancel_return_home()
+    assert not await drone.piloting.cancel_return_home()
     assert device.got(rth.Abort) == []
     await reported(drone, device, rth.State(RthState.IN_PROGRESS, StateReason.CONNECTION_LOST))
     with pytest.raises(CommandRejected, match="by itself"):
         await drone.piloting.cancel_return_home()
     assert device.got(rth.Abort) == []
     device.script[rth.Abort] = lambda _: [rth.State(RthState.AVAILABLE, StateReason.STOPPED)]
-    await drone.piloting.cancel_return_home(even_its_own=True)
+    assert await drone.piloting.cancel_return_home(even_its_own=True)
     assert len(device.got(rth.Abort)) == 1
 
 
