@@ -53,6 +53,8 @@ REFUSALS = {
     "refused_peers": "all places taken",
     "refused_browsers": "HTTP or TLS of a browser, not MAVLink",
     "refused_access": "message beyond the access of the endpoint",
+    "refused_observer": "message of an observer to another endpoint",
+    "refused_systems": "message to a system that the endpoint does not reach",
     "refused_operator": "message while another station is the operator",
     "refused_unsigned": "frame without a signature",
     "refused_signature": "wrong signature",

@@ -192,7 +192,7 @@ class Drone:
         }
         self._subscriptions: tuple[tuple[Callback, frozenset[type[Message]]], ...] = ()
         """Each callback with the kinds of messages that it is not called with."""
-        self._holders: Mapping[type[Message], Sequence[Element[Any]]] = {}
+        self._holders: Mapping[type[Message], Sequence[dict[bytes, PackedMessage]]] = {}
         """Events of values that no callback is called with, and the elements that keep them."""
         self._on_values: tuple[OnValues, ...] = ()
         self._set_subscriptions(())
@@ -506,11 +506,11 @@ class Drone:
 
     def _allows(self, message: Message) -> bool:
         """The gate of every command: see `Commander.gate`."""
-        if is_motion(message) and not isinstance(message, ardrone3.PCMD):  # the sticks know by themselves
+        if type(message) is not ardrone3.PCMD and is_motion(message):  # the sticks know by themselves
             self.piloting.require_free()
         if self.calibration.state.started and _starts_motors(message):
             raise CommandRejected("the magnetometer is being calibrated: somebody turns the drone by hand")
-        if isinstance(message, common.MagnetoCalibration) and message.calibrate:
+        if type(message) is common.MagnetoCalibration and message.calibrate:
             self._require_standing("calibrated")
         return self.controller.allows(message)
 
@@ -727,7 +727,7 @@ class Drone:
     def _set_subscriptions(self, subscriptions: tuple[tuple[Callback, frozenset[type[Message]]], ...]) -> None:
         self._subscriptions = subscriptions
         self._holders = {
-            kind: [self._elements[place] for place, _ in self._routes.get(kind, ())]
+            kind: [self._elements[place].deferred for place, _ in self._routes.get(kind, ())]
             for kind in VALUES
             if all(kind in without for _, without in subscriptions)
         }
@@ -830,42 +830,46 @@ class Drone:
         Events of values wait undecoded in their elements, unless their messages are wanted.
         """
         values: dict[type[Message], PackedMessage] = {}
-        deferrable = self._deferrable()
-        for message in messages:
-            if session.lost.done():
-                return
+        deferrable, lost = self._deferrable(), session.lost
+        for message in messages:  # only what is called from here can end the session
             # Not by isinstance, which takes as long for these classes as a reducer.
             if type(message) is PackedMessage:
                 kind = message.kind
-                elements = deferrable.get(kind)
-                if values and (elements is None or kind in values):
+                tables = deferrable.get(kind)
+                if values and (tables is None or kind in values):
                     self._report(values, now)
                     values = {}
+                    if lost.done():
+                        return
                 values[kind] = message
-                if elements is not None:
-                    for element in elements:
-                        element.defer(message)
+                if tables is not None:
+                    for table in tables:
+                        table[message.key] = message
                     continue
             elif values:
                 self._report(values, now)
                 values = {}
+                if lost.done():
+                    return
             unpacked = wire.unpacked(message)
             try:
                 self._handle(unpacked, now)
             except Exception as error:
                 session.report(error, unpacked)
+            if lost.done():
+                return
             deferrable = self._deferrable()
-        if values and not session.lost.done():
+        if values:
             self._report(values, now)
 
-    def _deferrable(self) -> Mapping[type[Message], Sequence[Element[Any]]]:
-        """Return the events of values of which no message is wanted, with their elements."""
+    def _deferrable(self) -> Mapping[type[Message], Sequence[dict[bytes, PackedMessage]]]:
+        """Return the events of values of which no message is wanted, with the tables they wait in."""
         if message_log.isEnabledFor(logging.DEBUG):
             return {}
         waiting = self._commander.waiting
         if not waiting:
             return self._holders
-        return {kind: elements for kind, elements in self._holders.items() if kind not in waiting}
+        return {kind: tables for kind, tables in self._holders.items() if kind not in waiting}
 
     def _report(self, values: Values, now: float) -> None:
         for callback in self._on_values:

@@ -12,7 +12,7 @@ import enum
 import math
 from collections.abc import Callable, Mapping
 from operator import is_
-from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
+from typing import Any, ClassVar, Final, Generic, TypeAlias, TypeVar
 
 import msgspec
 
@@ -68,30 +68,26 @@ class Element(Generic[StateT]):
     def __init__(self) -> None:
         self.settled: StateT = self.NOTHING
         """The state without the events that wait, for fields that no value changes. Only `state` sets it."""
-        self._deferred: dict[bytes, PackedMessage] = {}
-        """Events of values that are not part of the state yet, by their keys."""
+        self.deferred: Final[dict[bytes, PackedMessage]] = {}
+        """Events of values to reduce when the state is read, by their keys; always the same table."""
 
     def reset(self) -> None:
         """Forget everything the drone reported."""
         self.state = self.NOTHING
 
-    def defer(self, message: PackedMessage) -> None:
-        """Reduce an event of values when the state is read."""
-        self._deferred[message.key] = message
-
     @property
     def state(self) -> StateT:
         """The last state reported by the drone."""
-        if self._deferred:
+        if self.deferred:
             reducers, state = self.REDUCERS, self.settled
-            for message in self._deferred.values():
+            for message in self.deferred.values():
                 state = reducers[message.kind](state, message.unpack())
             self.state = state
         return self.settled
 
     @state.setter
     def state(self, state: StateT) -> None:
-        self._deferred.clear()
+        self.deferred.clear()
         self.settled = state
 
 

@@ -244,7 +244,7 @@ class Channel:
             or self.proof is not None
             or self._held_by
             or not self.is_open
-            or self.is_signed
+            or (self.signing is not None and self.signing.is_on)
         ):
             for packed in batch.messages:
                 self.send_packed(packed, batch.sysid, batch.compid, give_way=True)

@@ -308,6 +308,8 @@ class Node:
             is_false = channel.access is Access.OBSERVE and self._has_name_of_other(channel, received)
             may_forward = permitted and self._may_forward(channel, received, is_false=is_false)
             route = self._router.route(channel, received, now, reached, may_forward=may_forward, may_learn=not is_false)
+            if route.is_refused:
+                channel.counters["refused_systems"] += 1
             if route.forward:
                 self._forward(channel, received, route)
             if not route.hosts or not self._delivers:

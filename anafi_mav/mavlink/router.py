@@ -37,6 +37,8 @@ class Route(msgspec.Struct, Generic[KeyT, HostT], frozen=True):
     """Our hosts that it is for, in the order of their system and component."""
     forward: tuple[KeyT, ...]
     """The channels that it is passed on to."""
+    is_refused: bool = False
+    """True for a message to a system that the channel does not reach."""
 
 
 class Router(Generic[KeyT, HostT]):
@@ -47,8 +49,7 @@ class Router(Generic[KeyT, HostT]):
 
     def __init__(self) -> None:
         self.counters: Counter[str] = Counter()
-        """forwarded (per channel), own_sources (a frame in one of our names came in), rings, sources_ignored,
-        refused_systems (for a system that the channel does not reach)."""
+        """forwarded (per channel), own_sources (a frame in one of our names came in), rings, sources_ignored."""
         self._channels: dict[KeyT, set[tuple[int, int]]] = {}
         self._hosts: dict[int, dict[int, HostT]] = {}
         """Our hosts by system and component, in that order."""
@@ -140,9 +141,9 @@ class Router(Generic[KeyT, HostT]):
         target, component = targets(received.message)
         hosts = () if received.message is None else self.hosts(target, component, reached)
         destinations = self._destinations(target, component, received.id) if may_forward else []
+        is_refused = False
         if reached is not None and target != 0 and target not in reached:
-            self.counters["refused_systems"] += 1
-            destinations = []
+            is_refused, destinations = True, []
         elif received.message is not None and target not in self._hosts:
             hosts = hosts or self._absent_host(target, component)
         forward = tuple([other for other in destinations if other != channel])
@@ -151,7 +152,7 @@ class Router(Generic[KeyT, HostT]):
                 self.counters["rings"] += 1
                 forward = ()
             self.counters["forwarded"] += len(forward)
-        return Route(hosts, forward)
+        return Route(hosts, forward, is_refused)
 
     def _absent_host(self, target: int, component: int) -> tuple[HostT, ...]:
         host = self._absent_hosts.get(target)

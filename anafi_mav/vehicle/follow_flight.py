@@ -23,7 +23,7 @@ from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import By
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import ValueSubscriptions
+from anafi_mav.vehicle.base.subscriptions import ValueInterest, ValueSubscriptions
 from anafi_mav.vehicle.base.velocity_loop import MotionEstimate, VelocityController
 from anafi_mav.vehicle.follow import PATIENCE, REACH, SILENCE, AltitudeMode, FollowSettings, Sighting, TargetFollower
 
@@ -62,6 +62,8 @@ class FollowFlight(PlainTask):
         self._clock = clock
         self._silence = Alarm(self._expired)
         self._following: Following | None = None
+        self._interest = ValueInterest((events.SpeedChanged,), is_on=False)
+        """On while a target is followed or waited for."""
 
     @property
     def engaged(self) -> bool:
@@ -77,6 +79,7 @@ class FollowFlight(PlainTask):
             raise Refused(texts.FOLLOW, texts.TAKE_OFF_FIRST)
         async with self._vehicle.control.acquire(self, by=by):
             self._following = Following(TargetFollower(self.settings), VelocityController(self._motion()))
+            self._interest.switch(True)
             self._silence.set(self._clock.monotonic() + PATIENCE)
 
     def receive(self, sender: Hashable, seen: Sighting) -> OperatorText | None:
@@ -117,13 +120,14 @@ class FollowFlight(PlainTask):
         """End this flight task: something else flies the drone now."""
         if self._following is not None:
             self._following = None
+            self._interest.switch(False)
             self._silence.cancel()
             self._vehicle.centre_sticks()
         return []
 
     def value_subscriptions(self) -> ValueSubscriptions:
         """Return the handler of values that report the drone's motion: the loop closes on it."""
-        return {self._on_speed: (events.SpeedChanged,)}
+        return {self._on_speed: self._interest}
 
     def _on_speed(self, values: Values, now: float) -> None:
         following = self._following
@@ -190,6 +194,7 @@ class FollowFlight(PlainTask):
         if (ended := self._following) is None:
             return
         self._following = None
+        self._interest.switch(False)
         self._vehicle.drone.piloting.hover()
         self._vehicle.control.release(self)
         why = texts.NO_TARGET if ended.leader is None else texts.TARGET_LOST

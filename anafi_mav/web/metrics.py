@@ -91,7 +91,7 @@ def _of_drones(drones: list[tuple[dict[str, object], DroneStatus]]) -> Iterator[
     yield each(
         "drone_in_air",
         "1 while off the ground.",
-        [None if one.flying is None else one.flying != "ON_GROUND" for one in all_drones],
+        [None if one.flying in (None, "UNKNOWN") else one.flying != "ON_GROUND" for one in all_drones],
     )
     yield each(
         "drone_battery_ratio",

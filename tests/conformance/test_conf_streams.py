@@ -10,7 +10,7 @@ from support.flavours import both
 from support.mav import NAN, Client
 from support.world import world
 
-from anafi_mav.drone.events import AttitudeChanged
+from anafi_mav.drone.events import AttitudeChanged, SpeedChanged
 from anafi_mav.mavlink import dialect as newer
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.services.telemetry import telemetry_flight
@@ -227,13 +227,19 @@ async def test_conf_150_high_latency(flavour: str, hold: int) -> None:
         first = await expensive.wait("HIGH_LATENCY2", since=mark, timeout=1.0)
         quiet = expensive.mark()
         began = first.timestamp
+        w.drone.inject(SpeedChanged(0.0, 0.0, -4.0))
         second = await expensive.wait("HIGH_LATENCY2", timeout=6.0)
         assert second.timestamp - began == pytest.approx(5000, abs=300)
         assert {m.get_type() for _, m in expensive.received[quiet:]} == {"HIGH_LATENCY2"}
         assert (second.type, second.custom_mode) == (dialect.MAV_TYPE_QUADROTOR, hold)
         assert second.latitude / 1e7 == pytest.approx(48.8789, abs=1e-4)
         assert (second.altitude, second.battery, second.failure_flags) == (35, w.drone.battery.percent, 0)
-        assert (second.eph, second.epv, second.groundspeed, second.climb_rate) == (10, 20, 0, 0)
+        assert (second.eph, second.epv, second.groundspeed, second.climb_rate) == (
+            10,
+            20,
+            0,
+            40,
+        )  # 4 m/s at most since the first one
         # Commands are answered all the same, the other client misses nothing.
         assert (await expensive.command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)).result == ACCEPTED
         await other.heartbeat(lambda beat: True, timeout=1.5)

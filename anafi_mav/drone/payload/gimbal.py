@@ -112,8 +112,8 @@ class GimbalState(msgspec.Struct, frozen=True):
         known = self.relative_bounds if frame == FrameOfReference.RELATIVE else self.absolute_bounds
         return known.get(axis, (-math.inf, math.inf))
 
-    def is_at_end(self, axis: Axis, direction: float) -> bool:
-        """True when an axis stands at the end of its range in a direction, + or -.
+    def is_at_end(self, axis: Axis, direction: float = 0.0) -> bool:
+        """True when an axis stands at the end of its range in a direction, + or -; 0: in either.
 
         The range of yaw is that from the body, whichever frame it holds.
         """
@@ -123,7 +123,8 @@ class GimbalState(msgspec.Struct, frozen=True):
         frame = FrameOfReference.RELATIVE if axis == Axis.YAW else attitude.frames[axis]
         low, high = self.bounds(axis, frame)
         angle = attitude.angle(axis, frame)
-        return angle >= high - ARRIVED_DEG if direction > 0.0 else angle <= low + ARRIVED_DEG
+        is_high, is_low = angle >= high - ARRIVED_DEG, angle <= low + ARRIVED_DEG
+        return (is_high and direction >= 0.0) or (is_low and direction <= 0.0)
 
 
 UNREPORTED = GimbalState()

@@ -87,13 +87,24 @@ class EventSamples(PoseSource):
             events.AltitudeChanged: height,
         }
 
+        self._next = -math.inf
+        """When the next sample of some kind may be added, but for places (s)."""
+
+    def clear(self) -> None:
+        """Forget all samples."""
+        super().clear()
+        self._next = -math.inf
+
     def add(self, values: Values, now: float) -> None:
         """Add what the drone's events report."""
+        if now < self._next and events.GpsLocationChanged not in values:
+            return
         for kind, packed in values.items():
             if (track := self._tracks.get(kind)) is not None:
                 track.add_event(now, packed.data)
             elif kind is events.GpsLocationChanged:
                 self._add_place(packed.unpack(), now)
+        self._next = min(track.newest for track in self._tracks.values()) + SPACING
 
     def _add_place(self, message: events.GpsLocationChanged, now: float) -> None:
         place = position(message.latitude, message.longitude, message.altitude)

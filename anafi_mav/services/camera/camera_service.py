@@ -27,7 +27,7 @@ from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, 
 from anafi_mav.services.service import Answer, Host, Request, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
-from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueInterest, ValueSubscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
 
 ZOOM_SHOWN = 0.5
@@ -100,7 +100,7 @@ class CameraService(Service):
         return {kind: self._on_zoom for kind in Camera.ZOOM_EVENTS if kind not in VALUES}
 
     def value_subscriptions(self) -> ValueSubscriptions:
-        return {self._on_zoom_value: VALUES.intersection(Camera.ZOOM_EVENTS)}
+        return {self._on_zoom_value: ValueInterest(VALUES.intersection(Camera.ZOOM_EVENTS))}
 
     def _on_zoom(self, message: Any, now: float) -> None:
         self._note_zoom(message.level)

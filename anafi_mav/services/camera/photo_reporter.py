@@ -30,7 +30,7 @@ from anafi_mav.services.camera.shot_tracker import CapturedShot, ShotTracker, na
 from anafi_mav.services.commands import Command
 from anafi_mav.services.service import Answer, Host
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import ValueSubscriptions
+from anafi_mav.vehicle.base.subscriptions import ValueInterest, ValueSubscriptions
 
 logger = logging.getLogger(__name__)
 
@@ -106,7 +106,7 @@ class PhotoReporter:
 
     def value_subscriptions(self) -> ValueSubscriptions:
         """Return the handler of the values that change the camera's pose."""
-        return {self._samples.add: EventSamples.KINDS}
+        return {self._samples.add: ValueInterest(EventSamples.KINDS)}
 
     def receive(self, update: CaptureUpdate, now: float) -> None:
         """Handle an event about a photo of the active camera."""

@@ -28,7 +28,7 @@ from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import ValueSubscriptions
+from anafi_mav.vehicle.base.subscriptions import ValueInterest, ValueSubscriptions
 from anafi_mav.vehicle.base.velocity_loop import VelocityController, tilt_limit
 from anafi_mav.vehicle.circle import (
     DEFAULT_RADIUS,
@@ -79,6 +79,8 @@ class OrbitService(Service, PlainTask):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._newest: _Orbit | None = None
+        self._interest = ValueInterest((events.SpeedChanged, events.AttitudeChanged), is_on=False)
+        """On while the drone circles."""
 
     @property
     def _orbit(self) -> _Orbit | None:
@@ -112,6 +114,7 @@ class OrbitService(Service, PlainTask):
         if orbit is None:
             return []
         orbit.is_over = True
+        self._interest.switch(False)
         self.host.vehicle.centre_sticks()
         if orbit.approach is None or orbit.approach is asyncio.current_task():
             return []
@@ -120,6 +123,7 @@ class OrbitService(Service, PlainTask):
 
     def link_down(self) -> None:
         orbit, self._newest = self._newest, None
+        self._interest.switch(False)
         if orbit is not None and orbit.approach is not None:
             orbit.approach.cancel()
 
@@ -229,12 +233,13 @@ class OrbitService(Service, PlainTask):
 
     def _begin(self, orbit: _Orbit) -> None:
         orbit.controller = VelocityController(self.host.vehicle.offboard.motion)
+        self._interest.switch(True)
         self._fly(self.host.clock.monotonic())
 
     # Flying.
 
     def value_subscriptions(self) -> ValueSubscriptions:
-        return {self._on_motion: (events.SpeedChanged, events.AttitudeChanged)}
+        return {self._on_motion: self._interest}
 
     def _on_motion(self, values: Values, now: float) -> None:
         self._fly(now)

@@ -217,7 +217,7 @@ def failure_flags(gimbal: GimbalState) -> int:
     for error in gimbal.errors or ():
         flags |= _FAILURES.get(error, 0)
     for axis in gimbal.axes or ():
-        if gimbal.is_at_end(axis, 1.0) or gimbal.is_at_end(axis, -1.0):
+        if gimbal.is_at_end(axis):
             flags |= _AT_LIMIT.get(axis, 0)
     if gimbal.calibration == GimbalCalibrationState.IN_PROGRESS:
         flags |= dialect.GIMBAL_DEVICE_ERROR_FLAGS_CALIBRATION_RUNNING

@@ -37,7 +37,7 @@ from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported, reason_of
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import ValueSubscriptions
+from anafi_mav.vehicle.base.subscriptions import ValueInterest, ValueSubscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
 
 HOVERING = (FlightMode.HOLD, FlightMode.GUIDED, FlightMode.POSITION)
@@ -169,7 +169,7 @@ class GimbalService(Service):
         self._heartbeats.receive((inbound.sysid, inbound.compid), inbound.now, kept)
 
     def value_subscriptions(self) -> ValueSubscriptions:
-        return {self._on_attitude: (GimbalAttitudeChanged,)}
+        return {self._on_attitude: ValueInterest((GimbalAttitudeChanged,))}
 
     def _on_attitude(self, values: Values, now: float) -> None:
         if self._motion.watch_attitude(values):

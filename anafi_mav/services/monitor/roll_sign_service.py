@@ -12,10 +12,10 @@ from anafi_mav import texts
 from anafi_mav.drone import events
 from anafi_mav.drone.piloting.state import Attitude, Velocity
 from anafi_mav.drone.values import Values
-from anafi_mav.services.service import Service
+from anafi_mav.services.service import Host, Service
 from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueInterest, ValueSubscriptions
 
 KEY = "roll_sign"
 """Name of the record in the drone's file."""
@@ -42,7 +42,13 @@ def read(kept: Any, firmware: str | None) -> RollSign:
 class RollSignService(Service):
     """Watches how the drone moves until the sign of its roll is known."""
 
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._interest = ValueInterest((events.AttitudeChanged, events.SpeedChanged), is_on=False)
+        """On in the air."""
+
     def link_up(self) -> None:
+        self._interest.switch(self.host.vehicle.in_air)
         check = self.host.vehicle.roll
         check.recall(read(self.host.memory.settings.get(KEY), self.host.drone.identity.firmware))
         if check.sign is RollSign.INVERTED:
@@ -52,7 +58,7 @@ class RollSignService(Service):
         return {events.FlyingStateChanged: self._on_flying_state}
 
     def value_subscriptions(self) -> ValueSubscriptions:
-        return {self._on_motion: (events.AttitudeChanged, events.SpeedChanged)}
+        return {self._on_motion: self._interest}
 
     def _motion(self) -> tuple[Attitude, Velocity] | None:
         """Return attitude and velocity of the drone; None if one is unknown or it does not fly.
@@ -66,10 +72,11 @@ class RollSignService(Service):
         return state.attitude, state.velocity
 
     def _on_flying_state(self, message: events.FlyingStateChanged, now: float) -> None:
+        self._interest.switch(self.host.vehicle.in_air)
         self._motion()
 
     def _on_motion(self, values: Values, now: float) -> None:
-        if not self.host.vehicle.in_air or (motion := self._motion()) is None:
+        if (motion := self._motion()) is None:
             return
         check, (attitude, velocity) = self.host.vehicle.roll, motion
         if events.AttitudeChanged in values:

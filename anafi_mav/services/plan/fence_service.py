@@ -27,7 +27,7 @@ from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, reason_of
 from anafi_mav.vehicle.base.requester import Source
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueInterest, ValueSubscriptions
 from anafi_mav.vehicle.fence.fence_watch import (
     CEILING,
     EVERYTHING,
@@ -96,7 +96,7 @@ class FenceService(Service):
         }
 
     def value_subscriptions(self) -> ValueSubscriptions:
-        return {self._on_speed: (events.SpeedChanged,)}
+        return {self._on_speed: ValueInterest((events.SpeedChanged,))}
 
     def _on_location(self, message: events.GpsLocationChanged, now: float) -> None:
         self._located = self.host.clock.monotonic()

@@ -24,7 +24,7 @@ from anafi_mav.services.service import Host, Query, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.services.telemetry.telemetry_flight import target
 from anafi_mav.services.telemetry.telemetry_status import percent, sensor_bits
-from anafi_mav.vehicle.base.subscriptions import ValueSubscriptions
+from anafi_mav.vehicle.base.subscriptions import ValueInterest, ValueSubscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
 
 EVERY = 5.0
@@ -122,6 +122,8 @@ class HighLatencyService(Service):
         super().__init__(host)
         self._next: dict[Channel, float] = {}
         """When the next HIGH_LATENCY2 is due, for each channel in high-latency mode."""
+        self._interest = ValueInterest((events.SpeedChanged,), is_on=False)
+        """On while a channel is in high-latency mode."""
         self._climb = 0.0
         """Fastest climb or descent since the last message, m/s."""
 
@@ -132,10 +134,10 @@ class HighLatencyService(Service):
         return {dialect.MAVLINK_MSG_ID_HIGH_LATENCY2: MessageStream(self._build, flavoured=True)}
 
     def value_subscriptions(self) -> ValueSubscriptions:
-        return {self._on_speed: (events.SpeedChanged,)}
+        return {self._on_speed: self._interest}
 
     def _on_speed(self, values: Values, now: float) -> None:
-        if self._next and math.isfinite(climb := values[events.SpeedChanged].unpack().speedZ):
+        if math.isfinite(climb := values[events.SpeedChanged].unpack().speedZ):
             self._climb = max(self._climb, abs(climb))
 
     def tick(self, now: float) -> float:
@@ -150,6 +152,7 @@ class HighLatencyService(Service):
 
     def channel_closed(self, channel: Channel) -> None:
         self._next.pop(channel, None)
+        self._interest.switch(bool(self._next))
 
     def _build(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
         return high_latency(vehicle, times, self._climb)
@@ -163,4 +166,5 @@ class HighLatencyService(Service):
             self._next.pop(inbound.channel, None)
         else:
             self._next.setdefault(inbound.channel, self.host.clock.monotonic())
+        self._interest.switch(bool(self._next))
         return dialect.MAV_RESULT_ACCEPTED

@@ -28,7 +28,7 @@ from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.services.telemetry import data_streams
 from anafi_mav.services.telemetry.pose_sources import PoseSources
 from anafi_mav.services.telemetry.update_tracker import UpdateTracker
-from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueInterest, ValueSubscriptions
 
 logger = logging.getLogger(__name__)
 
@@ -171,7 +171,7 @@ class MessageService(Service):
         return dict.fromkeys(self._events, self._on_update)
 
     def value_subscriptions(self) -> ValueSubscriptions:
-        return {self._on_values: self._values}
+        return {self._on_values: ValueInterest(self._values)}
 
     def _on_values(self, values: Values, now: float) -> None:
         if self._tracker.mark_all(values, now):
@@ -291,7 +291,11 @@ class MessageService(Service):
 
     def _stamp(self, id: int, at: float, pose: VehiclePose = UNKNOWN_POSE) -> Times:
         """The time for a message of this kind; an event that was handled late does not put it back."""
-        at = self._stamped[id] = max(at, self._stamped.get(id, at))
+        last = self._stamped.get(id)
+        if last is not None and last > at:
+            at = last
+        else:
+            self._stamped[id] = at
         moment, times = self._moment
         if at != moment or pose is not times.pose:
             times = self.host.times(at, pose)

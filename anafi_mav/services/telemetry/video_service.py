@@ -25,7 +25,7 @@ from anafi_mav.services.pose import picture_pose
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.services.telemetry.height_track import HeightTrack
-from anafi_mav.vehicle.base.subscriptions import ValueSubscriptions
+from anafi_mav.vehicle.base.subscriptions import ValueInterest, ValueSubscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
 
 NAN = math.nan
@@ -148,7 +148,7 @@ class VideoTelemetryService(Service):
         }
 
     def value_subscriptions(self) -> ValueSubscriptions:
-        return {self._on_heights: (events.AltitudeChanged, events.AltitudeAboveGroundChanged)}
+        return {self._on_heights: ValueInterest((events.AltitudeChanged, events.AltitudeAboveGroundChanged))}
 
     def _on_heights(self, values: Values, now: float) -> None:
         """Keep the heights for pictures: they are older than the newest events."""

@@ -20,8 +20,34 @@ The drone's states contain them already. They are decoded when a state is read, 
 reads none.
 """
 
-ValueSubscriptions = Mapping[ValueHandler, Iterable[type[Message]]]
-"""Kinds of values that each handler is called for, once for those that arrived together."""
+
+class ValueInterest:
+    """Kinds of values that a handler is called for while it `is_on`.
+
+    It is called once for those that arrived together. Most handlers have nothing to do most of the time: those of a
+    flight task while it is not active.
+    """
+
+    __slots__ = ("_switched", "is_on", "kinds")
+
+    def __init__(self, kinds: Iterable[type[Message]], *, is_on: bool = True) -> None:
+        self.kinds = frozenset(kinds)
+        self.is_on = is_on
+        self._switched: Callable[[], None] = lambda: None
+
+    def switch(self, is_on: bool) -> None:
+        """Have the handler called from the next values on, or not."""
+        if is_on != self.is_on:
+            self.is_on = is_on
+            self._switched()
+
+    def on_switch(self, call: Callable[[], None]) -> None:
+        """Call a function whenever it is switched on or off, in place of an earlier one."""
+        self._switched = call
+
+
+ValueSubscriptions = Mapping[ValueHandler, ValueInterest]
+"""The interest of each handler."""
 
 MAX_SETS = 64
 """Sets of values that arrive together of which the handlers are remembered; a drone in operation sends a few."""
@@ -40,8 +66,10 @@ class ValueHandlers:
     """Handlers of values, called in the sequence of their tables."""
 
     def __init__(self, tables: Iterable[ValueSubscriptions]) -> None:
-        self._all = [(handler, frozenset(kinds)) for table in tables for handler, kinds in table.items()]
+        self._all = [(handler, interest) for table in tables for handler, interest in table.items()]
         self._of: dict[tuple[type[Message], ...], list[ValueHandler]] = {}
+        for _, interest in self._all:
+            interest.on_switch(self._of.clear)
 
     def call(self, values: Values, now: float) -> None:
         """Call each handler of one of these values."""
@@ -50,6 +78,8 @@ class ValueHandlers:
         if handlers is None:
             if len(self._of) >= MAX_SETS:
                 self._of.clear()
-            handlers = self._of[kinds] = [handler for handler, wanted in self._all if not wanted.isdisjoint(kinds)]
+            handlers = self._of[kinds] = [
+                handler for handler, interest in self._all if interest.is_on and not interest.kinds.isdisjoint(kinds)
+            ]
         for handler in handlers:
             handler(values, now)

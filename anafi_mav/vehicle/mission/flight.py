@@ -27,7 +27,7 @@ from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import DroneRefused, Refused, reason_of, text_of
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueInterest, ValueSubscriptions
 from anafi_mav.vehicle.mission.course import Course
 from anafi_mav.vehicle.mission.effects import (
     Acquire,
@@ -429,7 +429,7 @@ class MissionFlight(PlainTask):
 
     def value_subscriptions(self) -> ValueSubscriptions:
         """Return the handler of the values that prove that the drone is at its last way point."""
-        return {self._on_position: PROOF}
+        return {self._on_position: ValueInterest(PROOF)}
 
     def _on_playing(self, message: events.MavlinkFilePlayingStateChanged, now: float) -> None:
         plan = self._vehicle.drone.flight_plan

@@ -33,7 +33,7 @@ from anafi_mav.vehicle.base.refusal import Refused, reason_of
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
+from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueInterest, ValueSubscriptions
 from anafi_mav.vehicle.base.velocity_loop import (
     CAUTIOUS_TILT,
     WIND,
@@ -464,7 +464,7 @@ class OffboardFlight(PlainTask):
 
     def value_subscriptions(self) -> ValueSubscriptions:
         """Return the handler of the values that report the drone's motion."""
-        return {self._on_motion: MOTION}
+        return {self._on_motion: ValueInterest(MOTION)}
 
     def _on_motion(self, values: Values, now: float) -> None:
         for kind in values:

@@ -15,7 +15,7 @@ from anafi_mav.arsdk.codec.wire import Message, PackedMessage
 from anafi_mav.arsdk.messages import ardrone3, camera, gimbal
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.drone import Drone, Velocity
-from anafi_mav.drone.element import StateWatch
+from anafi_mav.drone.element import Element, StateWatch
 from anafi_mav.drone.expectation import Commander
 from anafi_mav.drone.payload.gimbal import Gimbal
 from anafi_mav.drone.piloting.state import Attitude
@@ -31,6 +31,12 @@ def packed(message: Message) -> PackedMessage:
     (received,) = wire.receive([wire.encode(message)])
     assert isinstance(received, PackedMessage)
     return received
+
+
+def defer(element: Element[Any], message: Message) -> None:
+    """Let an event of values wait in an element, as `Drone` does."""
+    event = packed(message)
+    element.deferred[event.key] = event
 
 
 def noise(kind: type[Message], rng: random.Random) -> PackedMessage:
@@ -57,7 +63,7 @@ async def test_deferred_values_give_the_states_of_values_reduced_at_once() -> No
         for step in range(2000):
             event = noise(rng.choice(kinds), rng)
             state = element.REDUCERS[event.kind](state, event.unpack())
-            element.defer(event)
+            element.deferred[event.key] = event
             if rng.random() < 0.2:
                 assert shown(element.state) == shown(state), f"{type(element).__name__}, step {step}"
         assert shown(element.state) == shown(state)
@@ -87,7 +93,7 @@ def test_newer_value_replaces_that_of_the_same_gimbal_alone() -> None:
     element = Gimbal(Commander())
     for id, pitch in ((0, 10.0), (1, 20.0), (0, 30.0)):
         frames = (gimbal.FrameOfReference.RELATIVE,) * 3
-        element.defer(packed(gimbal.Attitude(id, *frames, 0.0, pitch, 0.0, 0.0, 0.0, 0.0)))
+        defer(element, gimbal.Attitude(id, *frames, 0.0, pitch, 0.0, 0.0, 0.0, 0.0))
     assert [element[id].attitude.relative.pitch for id in (0, 1)] == [30.0, 20.0]  # type: ignore[union-attr]
 
 
@@ -95,14 +101,14 @@ def test_watch_notices_a_deferred_value() -> None:
     gps = Gps()
     watch = StateWatch(gps)
     assert watch.has_changed()
-    gps.defer(packed(ardrone3.GpsLocationChanged(48.0, 2.0, 100.0, 1, 1, 1)))
+    defer(gps, ardrone3.GpsLocationChanged(48.0, 2.0, 100.0, 1, 1, 1))
     assert watch.has_changed()
     assert not watch.has_changed()
 
 
 def test_reset_forgets_deferred_values() -> None:
     gps = Gps()
-    gps.defer(packed(ardrone3.GpsLocationChanged(48.0, 2.0, 100.0, 1, 1, 1)))
+    defer(gps, ardrone3.GpsLocationChanged(48.0, 2.0, 100.0, 1, 1, 1))
     gps.reset()
     assert gps.state == Gps.NOTHING
     assert gps.settled == Gps.NOTHING
@@ -112,7 +118,7 @@ async def test_settled_state_has_events_but_no_waiting_values() -> None:
     piloting = Drone("127.0.42.1").piloting
     landed = ardrone3.FlyingStateChanged(FlyingState.LANDED)
     piloting.state = piloting.REDUCERS[ardrone3.FlyingStateChanged](piloting.state, landed)
-    piloting.defer(packed(ardrone3.SpeedChanged(1.0, 2.0, 3.0)))
+    defer(piloting, ardrone3.SpeedChanged(1.0, 2.0, 3.0))
     assert (piloting.settled.flying, piloting.settled.velocity) == (FlyingState.LANDED, None)
     assert (piloting.state.flying, piloting.state.velocity) == (FlyingState.LANDED, Velocity(1.0, 2.0, 3.0))
     assert piloting.settled.velocity == Velocity(1.0, 2.0, 3.0)
@@ -169,6 +175,20 @@ async def test_values_behind_the_end_of_a_session_are_not_received(drone: Drone,
     await asyncio.sleep(0)  # to the end of the frame
     assert journal.lines == []
     assert drone.piloting.state.attitude is None
+
+
+async def test_value_behind_the_end_of_a_session_by_values_is_not_received(
+    drone: Drone, device: ScriptedDevice
+) -> None:
+    session = drone._session
+    assert session is not None
+    drone.subscribe_values(lambda values, now: session.end("test"))
+    device.say(ATTITUDE, OTHER_ATTITUDE, ZOOM)  # the second attitude has the first one reported
+    await asyncio.wait_for(asyncio.shield(session.lost), 3.0)
+    await asyncio.sleep(0)  # to the end of the frame
+    attitude = drone.piloting.state.attitude
+    assert attitude is not None
+    assert attitude.roll == 0.5
 
 
 async def test_subscriber_gets_each_value_after_those_before_it_are_reported(

@@ -13,7 +13,7 @@ from anafi_mav.drone.events import Message
 from anafi_mav.drone.values import Values
 from anafi_mav.mavlink.node import Node
 from anafi_mav.services.system import System
-from anafi_mav.vehicle.base.subscriptions import ValueHandlers, in_order
+from anafi_mav.vehicle.base.subscriptions import ValueHandlers, ValueInterest, in_order
 
 
 def test_handlers_of_several_tables_keep_table_order() -> None:
@@ -65,8 +65,11 @@ def test_handler_of_values_is_called_once_for_those_that_arrive_together() -> No
 
     handlers = ValueHandlers(
         [
-            {handler("vehicle"): (events.SpeedChanged, events.AttitudeChanged)},
-            {handler("speed"): (events.SpeedChanged,), handler("height"): (events.AltitudeChanged,)},
+            {handler("vehicle"): ValueInterest((events.SpeedChanged, events.AttitudeChanged))},
+            {
+                handler("speed"): ValueInterest((events.SpeedChanged,)),
+                handler("height"): ValueInterest((events.AltitudeChanged,)),
+            },
         ]
     )
     for values in (
@@ -82,14 +85,36 @@ def test_handler_of_values_is_called_once_for_those_that_arrive_together() -> No
     ]
 
 
+def test_handler_of_values_is_called_while_its_interest_is_on() -> None:
+    called: list[str] = []
+    speed, task = ValueInterest((events.SpeedChanged,)), ValueInterest((events.SpeedChanged,), is_on=False)
+
+    def first(values: Values, now: float) -> None:
+        called.append(f"first at {now}")
+        if now == 4.0:
+            task.switch(False)
+
+    handlers = ValueHandlers([{lambda values, now: called.append(f"task at {now}"): task, first: speed}])
+    (packed,) = wire.receive([wire.encode(events.SpeedChanged(0.0, 0.0, 0.0))])
+    assert isinstance(packed, wire.PackedMessage)
+    for now, is_on in ((1.0, False), (2.0, True), (3.0, False), (4.0, True), (5.0, False)):
+        if now != 5.0:  # the handler switched it off
+            task.switch(is_on)
+        handlers.call({packed.kind: packed}, now)
+    assert called == [
+        *("first at 1.0", "task at 2.0", "first at 2.0", "first at 3.0", "task at 4.0", "first at 4.0"),
+        "first at 5.0",
+    ]
+
+
 async def test_values_are_handled_in_the_sequence_of_services() -> None:
     clock = SystemClock()
     system = System(Node(clock=clock), Drone("127.0.42.1"), 1, clock, 0.0, allow_kill=False)
     owners = [
         handler.__qualname__.partition(".")[0]
         for table in system.value_subscriptions()
-        for handler, kinds in table.items()
-        if events.SpeedChanged in kinds
+        for handler, interest in table.items()
+        if events.SpeedChanged in interest.kinds
     ]
     expected = "MessageService OrbitService FenceService RollSignService OffboardFlight FollowFlight HighLatencyService"
     assert owners == [*expected.split(), "EventSamples"]

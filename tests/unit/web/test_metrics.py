@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from msgspec.structs import replace
 from prometheus_client.parser import text_string_to_metric_families
 from support.statuses import CLIENT, STATUS
 
@@ -40,6 +41,13 @@ def test_metrics_of_a_peers_name_survive_quotes_and_line_ends() -> None:
 def test_unknown_values_have_no_sample() -> None:
     drones = {sample.labels["drone"] for sample in FAMILIES["anafi_mav_drone_battery_ratio"].samples}
     assert drones == {"alpha"}
+
+
+def test_drone_with_unknown_flying_state_is_not_in_the_air() -> None:
+    alpha, bravo = STATUS.drones
+    text = exposition(replace(STATUS, drones=(replace(alpha, flying="UNKNOWN"), bravo)))
+    assert "anafi_mav_drone_connected" in text
+    assert "anafi_mav_drone_in_air" not in text
 
 
 def test_counters_of_drones_are_not_counted_twice() -> None:

@@ -164,3 +164,19 @@ def test_events_closer_than_the_spacing_are_left_out() -> None:
         samples.add(reported(events.AltitudeChanged(float(number))), 1.0 + 0.75 * SPACING * number)
     assert samples.heights.value(1.0 + 0.75 * SPACING) == pytest.approx((1.0,))
     assert samples.heights.newest == 1.0 + 1.5 * SPACING
+
+
+def test_events_closer_than_the_spacing_leave_out_no_place_and_no_kind_that_is_due() -> None:
+    samples = EventSamples()
+    heading, speed = events.AttitudeChanged(0.0, 0.0, 0.5), events.SpeedChanged(10.0, 0.0, 0.0)
+    kinds = heading, speed, events.AltitudeChanged(12.5), attitude_of_gimbal(0, 20.0)
+    samples.add(reported(*kinds), 1.0)
+    samples.add(reported(heading, events.GpsLocationChanged(48.0, 2.0, 100.0, 1, 1, 1)), 1.0 + 0.5 * SPACING)
+    assert (samples.headings.newest, samples.places.newest) == (1.0, 1.0 + 0.5 * SPACING)
+    samples.add(reported(speed), 1.0 + 1.5 * SPACING)
+    samples.add(reported(*kinds), 1.0 + 2.0 * SPACING)  # only speed is too near to its last sample
+    newest = samples.headings.newest, samples.velocities.newest, samples.heights.newest, samples.gimbals.newest
+    assert newest == tuple(1.0 + share * SPACING for share in (2.0, 1.5, 2.0, 2.0))
+    samples.clear()
+    samples.add(reported(*kinds), 1.0 + 2.5 * SPACING)
+    assert samples.headings.newest == 1.0 + 2.5 * SPACING
