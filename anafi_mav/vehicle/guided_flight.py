@@ -166,15 +166,15 @@ class GuidedFlight:
         vehicle, control = self._vehicle, self._vehicle.control
         if not checked:
             check_place(vehicle, goto.place, start=vehicle.place)
-        before = self.goto
-        async with control.acquire(goto, by=by, below=Hover(goto.mode)) as grant:
-            grant.begin()
-            try:
+        before, epoch = self.goto, control.epoch
+        try:
+            async with control.acquire(goto, by=by, below=Hover(goto.mode)) as grant:
+                grant.begin()
                 await self.move(goto)
-            except BaseException:
-                if before is not None and self._flies_to(before):
-                    control.adopt(before, below=Hover(before.mode))  # what a change of height or speed changes
-                raise
+        except BaseException:
+            if before is not None and control.epoch != epoch and self._flies_to(before):
+                control.adopt(before, below=Hover(before.mode))  # a failed change of height or speed ends no goto
+            raise
 
     def _flies_to(self, goto: Goto) -> bool:
         move = self._vehicle.drone.piloting.move

@@ -17,6 +17,7 @@ from support.fault_scenarios import (
     deaf,
     goto,
     heard,
+    home_being_undone,
     now_mute,
     until,
     watched,
@@ -50,6 +51,29 @@ async def test_cancelled_goto_is_not_flown() -> None:
         assert await until(w.client, mark, 1) == [(GOTO, CANCELLED)]
         await w.drone.wait_log(lambda e: e.kind == "command" and e.name.endswith("CancelMoveTo"))
         assert heard(w, "moveTo") == []
+
+
+@pytest.mark.parametrize(
+    "change",
+    [(dialect.MAV_CMD_DO_CHANGE_SPEED, 1.0, 5.0), (dialect.MAV_CMD_CONDITION_YAW, 90.0, 0.0, 0.0, 0.0)],
+    ids=["speed", "heading"],
+)
+async def test_change_of_a_goto_that_is_cancelled_in_its_wait_leaves_the_goto(change: tuple[Any, ...]) -> None:
+    """The drone flies on to the place: a height keeps that, and the end of the move is reported."""
+    async with world(speed=1.0) as w:
+        await w.take_off(8.0)
+        assert await goto(w, 90.0, 8.0) == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 2.0, 20.0)
+        await home_being_undone(w)
+        mark = w.client.mark()
+        w.client.send_command(*change)
+        await watched(0.5)
+        call_off(w.client, change[0])
+        assert (change[0], CANCELLED) in await until(w.client, mark, 2)
+        ack = await w.client.command(dialect.MAV_CMD_DO_CHANGE_ALTITUDE, 12.0, 3.0, timeout=12.0)
+        assert ack.result == ACCEPTED
+        target = w.commands("ardrone3.Piloting.moveTo")[-1].args
+        assert geo.offset(*HOME[:2], target["latitude"], target["longitude"])[0] > 89.0
 
 
 @pytest.mark.parametrize("order", [(ARM, 0.0, 21196.0), (MAV_CMD_DO_FLIGHTTERMINATION, 1.0)])

@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fault_scenarios import somebody_else, watched
 from support.flavours import both
 from support.mav import NAN, Client
 from support.plans import ACCEPTED as TAKEN
@@ -274,6 +275,24 @@ async def test_conf_076_breach_after_an_action_that_a_client_has_ended_is_acted_
             await w.client.wait("STATUSTEXT", lambda m: " m beyond " in m.text, since=mark, timeout=15.0)
             await w.client.heartbeat(lambda beat: beat.custom_mode == MODES["px4"].returning)
         assert len(w.commands("rth.return_to_home")) == returns + 1
+
+
+async def test_conf_076_floor_counts_in_a_flight_that_began_without_a_link_once_it_was_reached() -> None:
+    """The drone lands and takes off unseen. The floor must not hold it down on its way up."""
+    async with world(speed=1.0) as w:
+        await put(w, "ANF_FENCE_FLOOR", 5.0, 9)
+        await w.take_off(10.0)
+        w.drone.faults.mute = True
+        await w.client.silence("HEARTBEAT", 2.0)
+        for message, state in ((ardrone3.Landing(), "landed"), (ardrone3.TakeOff(), "hovering")):
+            somebody_else(w, message)
+            await w.drone.wait_log(lambda e, to=state: e.name == "flying" and e.args["to"] == to, 40.0)
+        mark = w.client.mark()
+        w.drone.faults.mute = False
+        await w.client.heartbeat(lambda beat: True, since=mark, timeout=20.0)
+        await watched(3.0)
+        assert w.drone.pose.up < 3.0
+        assert [text for text in texts(w.client, mark) if "below floor" in text] == []
 
 
 async def test_conf_076_return_that_the_drone_cannot_fly_becomes_a_hold() -> None:

@@ -427,9 +427,12 @@ class FenceWatch:
                 side.retry_at = now + RETRY
 
     def link_down(self) -> None:
-        """Forget the vehicle's state relative to the fence; the fence and its settings stay."""
-        self._sides, self._acting, self.verdict = _sides(), None, None
-        self.blind = self._above_floor = False
+        """End the action under way, and forget that the floor was reached.
+
+        The drone may land and take off unseen. The rest of the vehicle's state relative to the fence ends when the
+        fence is taken at the next connection.
+        """
+        self._acting, self._above_floor = None, False
 
     def _judge(self, breach: Breach, zones: Fence, sight: Sight) -> Finding:
         """Return the observation of one kind of boundary."""
