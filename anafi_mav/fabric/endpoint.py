@@ -25,7 +25,7 @@ from anafi_mav.fabric.connection import FabricConnection
 from anafi_mav.fabric.envelope import MAX_SAMPLE, Pong, UpEnvelope, sender_of
 from anafi_mav.fabric.keys import KeyKind, session_of
 from anafi_mav.fabric.sample_age import INPUTS, REFUSED, StationInput, StopKind, refusal_of
-from anafi_mav.fabric.station_places import StationPlaces
+from anafi_mav.fabric.station_places import MAX_WAITING, StationPlaces
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, Outbox, Sink, shaped_channel
 from anafi_mav.mavlink.channel import Channel
@@ -41,6 +41,10 @@ STATE_EVERY = 1.0
 
 FIRST_PINGS = 0.2
 """s between pings until the first is answered: a station's frames are dropped until then."""
+
+UNANSWERED_PINGS, UNANSWERED_FOR = 10, 10.0
+"""Pings, and s since the first of them, without an answer or a sample: the station is lost, whatever its token says.
+zenoh closes a silent link after as many seconds, but not over a link where the end of a token was lost."""
 
 LIST_LIMIT = 15.0
 """s for a link to the router and a list of the tokens there."""
@@ -97,6 +101,10 @@ class _Station:
     heard: float
     """Time of its last sample, or of getting its place."""
     pinged: float = 0.0
+    unanswered: int = 0
+    """Pings since its last sample or answer."""
+    waiting_since: float = 0.0
+    """Time of the first of these."""
     reported: float = -math.inf
     """Time of the last text about a late frame."""
 
@@ -118,6 +126,8 @@ class FabricEndpoint(Endpoint):
         """True while all tokens that exist are known."""
         self._stations: dict[str, _Station] = {}
         self._places = StationPlaces(url.options.max_clients)
+        self._silent: set[str] = set()
+        """Stations that were lost by their silence, and whose tokens have not ended; `MAX_WAITING` at most."""
         self._readers: set[int] = set()
         """Systems whose frames to all have a reader."""
         self._open_lane: _Lane | None = None
@@ -211,9 +221,9 @@ class FabricEndpoint(Endpoint):
             self._claim()
         elif key.kind is KeyKind.STATION:
             if not change.is_alive:
-                self._drop(key.owner)
-                self._follow(self._places.leave(key.owner))
-            elif not self._places.is_known(key.owner):
+                self._silent.discard(key.owner)
+                self._leave(key.owner)
+            elif key.owner not in self._silent and not self._places.is_known(key.owner):
                 if self._places.arrive(key.owner):
                     self._add(key.owner)
                 else:
@@ -245,6 +255,11 @@ class FabricEndpoint(Endpoint):
         self._stations[station] = _Station(lane, StationInput(session_of(station)), self._clock.monotonic())
         self._ping(station)
         self._sink.opened(lane.channel)
+
+    def _leave(self, station: str) -> None:
+        """Lose a station, and give its place to one that waits."""
+        self._drop(station)
+        self._follow(self._places.leave(station))
 
     def _follow(self, station: str | None) -> None:
         """Serve a station that has got the place of another one."""
@@ -315,10 +330,16 @@ class FabricEndpoint(Endpoint):
 
     def _sample(self, sample: FabricSample) -> None:
         key = self._connection.keys.parse(sample.key)
+        if key is not None and key.owner in self._silent:
+            self._silent.discard(key.owner)
+            self._token(TokenChange(self._connection.keys.station_token(key.owner), is_alive=True))
         station = None if key is None else self._stations.get(key.owner)
         if key is None or station is None or key.sysid not in self.claims.held:
             self.counters["unknown_keys"] += 1
             return
+        token = self._connection.keys.station_token(key.owner)
+        self._connection.zenoh.note_heard(token, is_in_use=key.kind is KeyKind.UP)
+        station.unanswered = 0
         now = self._clock.monotonic()
         if key.kind is KeyKind.PONG:
             self._pong(station, key.sysid, sample, now)
@@ -340,7 +361,6 @@ class FabricEndpoint(Endpoint):
             channel.counters["repeated_samples"] += 1
             return
         station.heard = now
-        self._connection.zenoh.is_in_use = True
         channel.counters["lost_samples"] = station.input.lost
         station.input.hear(sysid)
         age = station.input.age(envelope, now)
@@ -404,8 +424,10 @@ class FabricEndpoint(Endpoint):
         for sysid in taken ^ self._reported:
             if self._systems.report_id(sysid, is_taken=sysid in taken):
                 self._reported ^= {sysid}
-        for station in tuple(self._stations):
-            self._ping_if_due(station, now)
+        for name in tuple(self._stations):
+            self._lose_if_silent(name, now)
+        for name in tuple(self._stations):
+            self._ping_if_due(name, now)
         if now - self._stated >= STATE_EVERY and self._connection.is_up:
             self._stated = now
             for sysid in sorted(self.claims.held):
@@ -413,6 +435,16 @@ class FabricEndpoint(Endpoint):
                 if state is not None:
                     self._states[sysid] = state
                     self._connection.publish(self._connection.keys.state(sysid), state)
+
+    def _lose_if_silent(self, name: str, now: float) -> None:
+        station = self._stations[name]
+        if station.unanswered >= UNANSWERED_PINGS and now - station.waiting_since >= UNANSWERED_FOR:
+            self.counters["silent_stations"] += 1
+            logger.warning("%s: station %s lost: silent for %.0f s", self.url, name, now - station.waiting_since)
+            if len(self._silent) >= MAX_WAITING:
+                self._silent.pop()
+            self._silent.add(name)
+            self._leave(name)
 
     def _ping_if_due(self, name: str, now: float) -> None:
         station = self._stations[name]
@@ -425,6 +457,9 @@ class FabricEndpoint(Endpoint):
         now = self._clock.monotonic()
         station = self._stations[name]
         station.pinged = now
+        if not station.unanswered:
+            station.waiting_since = now
+        station.unanswered += 1
         key = self._connection.keys.ping(station.input.ping_system(self.claims.held), name)
         self._connection.publish(key, station.input.ping(self._connection.session, now).encode(), is_urgent=True)
 

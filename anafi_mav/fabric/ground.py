@@ -234,12 +234,14 @@ class FabricGround:
         if key is None or station is None:
             self.counters["unknown_keys"] += 1
             return
-        self._connection.zenoh.is_in_use = True
+        keys = self._connection.keys
+        holders = [keys.drone_token(key.sysid, holder) for holder in self._holders[key.sysid]]
+        self._connection.zenoh.note_heard(*holders, is_in_use=True)
         if key.kind is KeyKind.PING:
             ping = Ping.decode(sample.payload)
             if ping is not None:
                 pong = Pong(ping.session, ping.sent, micros(self._clock.monotonic()))
-                pong_key = self._connection.keys.pong(key.sysid, station.name)
+                pong_key = keys.pong(key.sysid, station.name)
                 self._connection.publish(pong_key, pong.encode(), is_urgent=True)
         elif key.kind is KeyKind.DOWN:
             for raw in split_frames(sample.payload):

@@ -4,8 +4,9 @@ Only this module and `declaration_check` import zenoh, an optional dependency; `
 the session, declares and publishes: each of these may block. zenoh calls back in threads of its own, which only hand
 bytes on.
 
-Over a link that loses datagrams a third thread looks regularly at what the router knows: it reports tokens that were
-lost on the way here, and opens another session where a declaration of ours was lost on the way there.
+Over a link that loses datagrams a third thread looks regularly at what the router knows. It reports tokens and ends
+of tokens that were lost on the way here, and the readers of published keys. It opens another session where a
+declaration of ours, or its end, was lost on the way there.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from anafi_mav.fabric.arrivals import (
     TokenChange,
     TokensListed,
 )
-from anafi_mav.fabric.declaration_check import DeclarationCheck, is_probe, probe_of
+from anafi_mav.fabric.declaration_check import AgreedLooks, DeclarationCheck, KnownKeys, is_probe, probe_of
 from anafi_mav.fabric.envelope import MAX_SAMPLE
 
 logger = logging.getLogger(__name__)
@@ -74,8 +75,6 @@ class ZenohSession:
 
         `retries`: the first attempt to open may fail. `is_lossy`: the link to the router loses datagrams.
         """
-        self.is_in_use = False
-        """Set by the owner when it has heard from another program: then no other session is opened for some seconds."""
         self.opened = threading.Event()
         """Set when the first attempt to open has ended."""
         self.failure = ""
@@ -94,6 +93,15 @@ class ZenohSession:
         """How each of these is declared again in another session."""
         self._alive: set[str] = set()
         """Tokens that were reported and have not ended."""
+        self._heard: set[str] = set()
+        """Tokens of programs that were heard since the last look."""
+        self._is_in_use = False
+        self._ended: set[str] = set()
+        """Tokens whose end was reported since the present look began: it may have seen them before."""
+        self._former: set[str] = set()
+        """Our own tokens that ended in this session, while the router may know them."""
+        self._read: set[str] = set()
+        """Published keys that were reported as read: with a lossy link only."""
         self._probed: set[str] = set()
         """Probes that have arrived in this session."""
         self._is_lossy = is_lossy
@@ -114,6 +122,15 @@ class ZenohSession:
         """Begin to close it; `ended` is set afterwards."""
         self._stopping.set()
         self._queue.add_work(lambda session: None)
+
+    def note_heard(self, *tokens: str, is_in_use: bool) -> None:
+        """Note that the programs with these tokens are heard: the tokens have not ended.
+
+        `is_in_use`: they use this session, and the next look does not open another one.
+        """
+        if self._is_lossy:
+            self._heard.update(tokens)
+            self._is_in_use |= is_in_use
 
     # Called in the event loop; carried out by the thread.
 
@@ -153,10 +170,14 @@ class ZenohSession:
     def publish_on(self, key: str) -> None:
         """Report when a key gets its first reader and loses its last.
 
-        Without a reader its samples are not sent.
+        Without a reader its samples are not sent. Over a lossy link nothing is declared, and the looks find readers:
+        zenoh would send the samples under the number of a key that the router may never have heard, and only while it
+        has heard of a reader.
         """
 
         def declare(session: zenoh.Session) -> Any:
+            if self._is_lossy:
+                return None
             publisher = session.declare_publisher(key, congestion_control=zenoh.CongestionControl.DROP)
 
             def report(status: zenoh.MatchingStatus) -> None:
@@ -207,6 +228,7 @@ class ZenohSession:
     def _declare(self, kind: str, key: str, declare: Callable[[zenoh.Session], Any]) -> None:
         def work(session: zenoh.Session) -> None:
             if (kind, key) not in self._declared:
+                self._former.discard(key)
                 self._declarations[kind, key] = declare
                 self._declared[kind, key] = declare(session)
 
@@ -218,6 +240,8 @@ class ZenohSession:
             declared = self._declared.pop((kind, key), None)
             if declared is not None:
                 declared.undeclare()
+                if self._is_lossy and kind == "token":
+                    self._former.add(key)
 
         self._queue.add_work(work)
 
@@ -272,6 +296,7 @@ class ZenohSession:
         for token in tuple(self._alive):
             self._note_token(token, is_alive=False)
         self._probed.clear()
+        self._former.clear()
         self._reopens = False
         opened = self._open()
         if opened is not None:
@@ -281,30 +306,53 @@ class ZenohSession:
 
     def _check_regularly(self) -> None:
         pause = CHECK_FIRST
+        ends, lingering = AgreedLooks(), AgreedLooks()
         while not self._stopping.wait(pause):
             pause = CHECK_EVERY
             if not self._is_up or self._reopens:
                 continue
+            self._ended.clear()
             declarations = tuple(self._declarations)
-            check = DeclarationCheck(self._settings, [key for kind, key in declarations if kind == "tokens"])
+            published = {key for kind, key in declarations if kind == "publisher"}
+            self._read &= published
             own = {key for kind, key in declarations if kind == "token"}
             probes = {probe_of(key) for kind, key in declarations if kind == "subscriber"}
-            missing = check.missing(own, probes, self._probed.__contains__, self._stopping)
-            missing -= {key if kind == "token" else probe_of(key) for kind, key in declarations
-                        if (kind, key) not in self._declarations}  # fmt: skip
-            for token in check.tokens - own:
+            check = DeclarationCheck(self._settings, [key for kind, key in declarations if kind == "tokens"], published)
+            known = KnownKeys(own, probes, (self._alive | self._former) - own, self._read)
+            check.look(known, self._probed.__contains__, self._stopping)
+            heard, self._heard = self._heard, set()
+            is_in_use, self._is_in_use = self._is_in_use, False
+            for token in check.tokens - own - self._former - self._ended:
                 self._note_token(token, is_alive=True)
-            is_in_use, self.is_in_use = self.is_in_use, False
-            if missing and not is_in_use and not self._stopping.is_set():
-                logger.warning("declarations lost on the way, opening another session: %s", ", ".join(sorted(missing)))
+            for key in check.read - self._read:
+                self._note_readers(key, has_readers=True)
+            for key in ends.add(check.absent - heard):
+                self._former.discard(key)
+                if key in self._read:
+                    self._note_readers(key, has_readers=False)
+                elif key in self._alive:
+                    self._note_token(key, is_alive=False)
+            lost = check.missing - {key if kind == "token" else probe_of(key) for kind, key in declarations
+                                    if (kind, key) not in self._declarations}  # fmt: skip
+            lost |= lingering.add(check.tokens & self._former)
+            if lost and not is_in_use and not self._stopping.is_set():
+                logger.warning("declarations lost on the way, opening another session: %s", ", ".join(sorted(lost)))
                 self._reopens, pause = True, CHECK_FIRST
                 self._queue.add_work(lambda session: None)
+
+    def _note_readers(self, key: str, *, has_readers: bool) -> None:
+        if has_readers:
+            self._read.add(key)
+        else:
+            self._read.discard(key)
+        self._report(ReadersChange(key, has_readers))
 
     def _note_token(self, key: str, *, is_alive: bool) -> None:
         if is_alive:
             self._alive.add(key)
         else:
             self._alive.discard(key)
+            self._ended.add(key)
         self._report(TokenChange(key, is_alive))
 
     def _serve(self, session: zenoh.Session) -> None:

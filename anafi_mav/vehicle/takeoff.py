@@ -142,13 +142,18 @@ class Takeoff(PlainTask):
             async with vehicle.control.acquire(HAND_LAUNCH, by=by):
                 await vehicle.drone.piloting.hand_launch()
             return
-        waiting = self._situation.attempt
         self._enter(step(self._situation, Event.ARM, client=client, until=_after(AUTO_DISARM)))
         vehicle.changed()
-        if isinstance(waiting, WaitingTakeoff) and waiting.client == client:
-            self._start(self._rise(waiting.height, by, lifts_off=True))
-        else:
+        if not self._start_when_armed(by):
             self._tell_armed(client)
+
+    def _start_when_armed(self, by: Right) -> bool:
+        """Begin the take-off that waits for this client to arm, if it has; return True if it begins."""
+        waiting = self._situation.attempt
+        if not (isinstance(waiting, WaitingTakeoff) and waiting.client == by.client and self.is_armed_by(by.client)):
+            return False
+        self._start(self._rise(waiting.height, by, lifts_off=True))
+        return True
 
     async def disarm(self, by: Right, *, force: bool) -> None:
         """Disarm on the ground; propellers that turn there are stopped first.
@@ -208,8 +213,11 @@ class Takeoff(PlainTask):
             async with vehicle.control.acquire(self, by=by):  # what lifts off while it waits is replaced now
                 waiting = WaitingTakeoff(height, by.client, _after(ARM_WAIT))
                 self._enter(step(self._situation, Event.REQUEST, attempt=waiting))
+            self._start_when_armed(by)
             return
         async with vehicle.control.acquire(self, by=by, below=self._below, rules=_RISES):
+            if not self.armed:
+                raise Refused(texts.TAKEOFF, texts.ARMING_EXPIRED)
             await self._lift_off()
         self._start(self._rise(height, by))
 

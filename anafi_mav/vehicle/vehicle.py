@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 
 from anafi_mav import texts
@@ -182,7 +182,7 @@ class Vehicle(Aircraft):
         self._initiators = Initiators()
         self.holds = HoldRule()
         """Which Holds of clients count against a return of the drone's own."""
-        self.return_end = ReturnEnd(self, self._land_after_return)
+        self.return_end = ReturnEnd(self, self._command_landing)
         self.mission = MissionFlight(self, clock)
         self.takeoff = Takeoff(self, self.mission.armed)
         self.guided = GuidedFlight(self)
@@ -203,6 +203,9 @@ class Vehicle(Aircraft):
     @property
     def armed(self) -> bool:
         return self.takeoff.armed or (self.flying_state is not None and not self.on_ground)
+
+    def is_armed_by(self, client: Hashable) -> bool:
+        return self.takeoff.is_armed_by(client)
 
     @property
     def origin(self) -> GeoPoint | None:
@@ -335,15 +338,14 @@ class Vehicle(Aircraft):
 
     async def land(self, by: By) -> None:
         """Land here. On the ground there is nothing to do."""
-        self._initiators.land_commanded(self._clock.monotonic())
         rules = replace(LAND.rules, keeps_below=self.on_ground)  # on the ground there is no mode to leave
         async with self.control.acquire(LAND, by=by, rules=rules):
-            await self.drone.piloting.land()
+            await self._command_landing()
         if self.flying_state not in LANDING:
             self.control.release(LAND)
 
-    async def _land_after_return(self) -> None:
-        """Land at the end of a return that a client commanded; the landing is that client's too."""
+    async def _command_landing(self) -> None:
+        """Land for a client, also at the end of its return: it is that client's landing."""
         self._initiators.land_commanded(self._clock.monotonic())
         await self.drone.piloting.land()
 
@@ -682,6 +684,8 @@ class Vehicle(Aircraft):
         if not self.on_ground:
             self.takeoff.left_ground()
             if before in ON_GROUND:
+                if not self.drone.piloting.has_launched:
+                    self.control.lose(texts.FOREIGN_TAKEOFF)  # a mode chosen before was not meant for this flight
                 self.offboard.left_ground()
         self.return_end.on_flying_state()
         self._note_hover()

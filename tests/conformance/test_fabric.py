@@ -340,6 +340,28 @@ async def test_station_that_answers_no_ping_can_stop_the_flight_and_begin_nothin
             token.undeclare()
 
 
+async def test_silent_station_with_a_token_is_lost_and_returns_with_its_next_sample(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The end of its token was lost: no ping is answered."""
+    monkeypatch.setattr(endpoint, "UNANSWERED_PINGS", 3)
+    monkeypatch.setattr(endpoint, "UNANSWERED_FOR", 0.3)
+    async with router() as node, world(endpoints=(node.url,)) as w:
+        name = f"{7:016x}-1"
+        with await asyncio.to_thread(opened, node) as session:
+            samples = session.declare_subscriber(f"anafi/1/down/{name}")
+            token = session.liveliness().declare_token(f"anafi/station/v1/{name}")
+            await asyncio.to_thread(samples.recv)
+            while "0 stations" not in "".join(w.gateway.lines()):
+                await watched(0.05)
+            assert counted(w, "silent_stations") == 1
+            raw = frame(pack(own.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)), 1, 255, 190)
+            session.put(f"anafi/1/up/{name}", raw, attachment=UpEnvelope(7, 1, 0).encode())
+            while "1 station" not in "".join(w.gateway.lines()):
+                await watched(0.05)
+            token.undeclare()
+
+
 async def test_frames_that_do_not_reach_a_station_are_counted() -> None:
     beat = pack(own.MAVLink_heartbeat_message(2, 12, 81, 0, 4, 3))
     async with router() as node:

@@ -31,6 +31,7 @@ from support.fault_scenarios import (
 from support.mav import NAN
 from support.missions import put, takeoff, way
 from support.params import send_set, write
+from support.plans import clear
 from support.setpoints import VELOCITY_ONLY, heard, local, motion, said, streaming, texts
 from support.world import HOME, World, world
 
@@ -156,6 +157,30 @@ async def test_takeoff_command_whose_landing_has_ended_on_the_ground_is_refused(
         assert w.drone.pose.up < 0.1
 
 
+async def test_takeoff_whose_arming_lapses_in_the_wait_is_refused() -> None:
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        await watched(AUTO_DISARM - 2.0)
+        await home_being_undone(w)
+        mark, began = w.client.mark(), now()
+        w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
+        assert (TAKEOFF_CMD, REJECTED) in await until(w.client, mark, 2)
+        await watched(4.0)
+        assert heard(w, "TakeOff", since=began) == []
+
+
+async def test_takeoff_whose_client_arms_in_the_wait_is_flown() -> None:
+    async with world(speed=1.0) as w:
+        await home_being_undone(w)
+        mark = w.client.mark()
+        w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
+        await watched(0.5)
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        assert (TAKEOFF_CMD, ACCEPTED) in await until(w.client, mark, 3)
+        await w.at_height(5.0)
+        assert "not armed" not in " ".join(m.text for _, m in w.client.since(mark, "STATUSTEXT"))
+
+
 # A mission.
 
 
@@ -171,6 +196,34 @@ async def test_mission_start_whose_arming_lapses_in_the_wait_is_refused() -> Non
         await watched(4.0)
         assert flown(w, began) == []
         assert w.drone.pose.up < 0.1
+
+
+@pytest.mark.parametrize("own", [True, False])
+async def test_mission_start_whose_client_arms_in_the_wait_is_flown(own: bool) -> None:
+    """The arming of another client starts no motor."""
+    async with world(speed=1.0, web=True, clients=2) as w:
+        await put(w, [takeoff(6.0), way(20.0, 0.0, 6.0)])
+        await home_being_undone(w)
+        mark, began = w.client.mark(), now()
+        w.client.send_command(START)
+        await watched(0.5)
+        assert (await w.clients[0 if own else 1].command(ARM, 1)).result == ACCEPTED
+        assert (START, ACCEPTED) in await until(w.client, mark, 3 if own else 2)
+        await watched(8.0)
+        assert bool(flown(w, began)) is own
+
+
+async def test_mission_mode_on_the_ground_whose_mission_is_deleted_in_its_wait_is_not_entered() -> None:
+    async with world(speed=1.0) as w:
+        await put(w, [takeoff(6.0), way(20.0, 0.0, 6.0)])
+        await home_being_undone(w)
+        mark = w.client.mark()
+        w.client.send_command(START)  # disarmed: it would wait for arming
+        await watched(0.5)
+        assert (await clear(w.client, dialect.MAV_MISSION_TYPE_MISSION)).type == dialect.MAV_MISSION_ACCEPTED
+        assert (START, REJECTED) in await until(w.client, mark, 2)
+        await watched(2.0)
+        assert (await w.client.heartbeat(lambda beat: True)).custom_mode == w.modes.idle
 
 
 # What acquires control, and what happens in its wait.

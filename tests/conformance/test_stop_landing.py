@@ -21,6 +21,7 @@ from support.fault_scenarios import (
     TAKEOFF_CMD,
     goto,
     heard,
+    home_being_undone,
     somebody_else,
     watched,
 )
@@ -232,6 +233,22 @@ async def test_client_landing_behind_a_skycontroller_is_ended_by_clients() -> No
         await landing(w)
         assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 8.0)
+
+
+async def test_landing_of_the_pilot_after_a_land_that_was_never_sent_is_ended_by_no_client() -> None:
+    async with world(speed=1.0, skycontroller=3) as w:
+        await w.take_off(8.0)
+        await home_being_undone(w)
+        w.client.send_command(LAND_CMD)  # waits for what it replaces
+        await watched(0.2)
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        assert heard(w, "Landing") == []
+        assert w.drone.skycontroller is not None
+        w.drone.skycontroller.press(1)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == LAND)
+        await watched(5.0)  # until another Hold counts
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == REJECTED
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
 
 
 # Callers without the right.

@@ -18,6 +18,10 @@ class LossyRelay:
         self.passed = self.lost = 0
         self.lose_next = b""
         """The next datagram with these bytes is lost; none: by chance only."""
+        self.is_cut = False
+        """True: all datagrams from and to the first client are lost."""
+        self.has_cut = {"up": asyncio.Event(), "down": asyncio.Event()}
+        """Set once the cut has lost a datagram to the router, and from it."""
         self._to = target
         self.loss, self._delay = loss, delay
         self._chance = random.Random(seed)
@@ -45,7 +49,15 @@ class LossyRelay:
             if transport is not None:
                 transport.close()
 
+    def _is_lost(self, way: str, client: tuple[str, int]) -> bool:
+        is_lost = self.is_cut and client == next(iter(self._onward), None)
+        if is_lost:
+            self.has_cut[way].set()
+        return is_lost
+
     def _from_client(self, data: bytes, client: tuple[str, int]) -> None:
+        if self._is_lost("up", client):
+            return
         if client in self._onward:
             self._later(self._onward[client], data, None)
         elif client in self._opening:
@@ -57,7 +69,8 @@ class LossyRelay:
     async def _open(self, client: tuple[str, int]) -> None:
         def back(data: bytes, _: tuple[str, int]) -> None:
             assert self._listener is not None
-            self._later(self._listener, data, client)
+            if not self._is_lost("down", client):
+                self._later(self._listener, data, client)
 
         transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
             lambda: _Receiver(back), remote_addr=self._to

@@ -220,7 +220,7 @@ def _fields(vehicle: Vehicle) -> Mapping[bool, tuple[int, ...]]:
     """Return the fields of MISSION_CURRENT by `Flavour.zero_home` of its receivers."""
     machine = vehicle.mission.machine
     there, current = machine.rest is not State.NO_MISSION, machine.progress.current
-    in_mission = vehicle.mode is FlightMode.MISSION and not machine.is_paused
+    in_mission = vehicle.mode is FlightMode.MISSION and machine.state is not State.PAUSED
     mode = IN_MISSION_MODE if in_mission else NOT_IN_MISSION_MODE
     same = (
         len(machine.mission.items) if there else NO_TOTAL,

@@ -11,7 +11,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -146,6 +146,10 @@ class Aircraft(ABC):
 
         The drone is off the ground, or arming was accepted and has not expired.
         """
+
+    @abstractmethod
+    def is_armed_by(self, client: Hashable) -> bool:
+        """Return True when this client has armed the vehicle for the flight that begins now."""
 
     @property
     def returning(self) -> bool:

@@ -60,11 +60,16 @@ class TooLow(Refused):
 
 def check_height(vehicle: Aircraft, ato: float) -> None:
     """Raise `Refused` unless the drone may fly to a target height (m above take-off)."""
-    ceiling = vehicle.drone.piloting.state.max_altitude
     if not math.isfinite(ato):
         raise Refused(texts.HEIGHT, texts.NOT_A_NUMBER, lasting=True)
     if ato < (lowest := lowest_height(vehicle)):
         raise TooLow(texts.HEIGHT, texts.TOO_LOW.fill(height=ato, lowest=lowest), lasting=True)
+    check_limits(vehicle, ato)
+
+
+def check_limits(vehicle: Aircraft, ato: float) -> None:
+    """Raise `Refused` for a height (m above take-off) above the ceiling or below the fence."""
+    ceiling = vehicle.drone.piloting.state.max_altitude
     if ceiling is not None and ato > ceiling.current:
         raise Refused(
             texts.HEIGHT,

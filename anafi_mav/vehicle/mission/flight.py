@@ -133,10 +133,12 @@ class MissionFlight(PlainTask):
             return
         vehicle.require_ready()
         async with vehicle.control.acquire(self, by=by):
-            pass
-        self._handle(machine.await_arm(by.client, self._now))
-        if machine.state is not State.AWAIT_ARM:
-            raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
+            effects = machine.await_arm(by.client, self._now)
+            if machine.state is not State.AWAIT_ARM:  # the mission was deleted in the wait
+                raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
+        self._handle(effects)
+        if vehicle.is_armed_by(by.client):  # since it requested this
+            self.armed(by.client)
 
     async def choose(self, by: Right, item: int) -> None:
         """Make an item the current one; a mission that is flown, or about to be, continues there.
@@ -281,7 +283,7 @@ class MissionFlight(PlainTask):
             try:
                 effects = await self._result_of(work, by)
             except AnafiMavError as error:
-                self._handle(self.machine.failed(attempt, _failure(error)))
+                self._handle(self.machine.failed(attempt, Failure(text_of(error), reason_of(error))))
                 self._require_same(attempt)
                 raise
             except BaseException:
@@ -492,7 +494,3 @@ class MissionFlight(PlainTask):
         plan = self._vehicle.drone.flight_plan.state
         plays, in_air = plan.playing == PlayingState.PLAYING, self._vehicle.in_air
         self._handle(self.machine.link_up(record, plan.uid, plays=plays, in_air=in_air))
-
-
-def _failure(error: AnafiMavError) -> Failure:
-    return Failure(text_of(error), reason_of(error))

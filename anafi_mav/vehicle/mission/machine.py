@@ -355,11 +355,6 @@ class MissionMachine:
         return self.mission.items[leg.origins[-1]].command == mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH
 
     @property
-    def is_paused(self) -> bool:
-        """Paused, and no start is under way."""
-        return self.state is S.PAUSED
-
-    @property
     def needs_gimbal(self) -> bool:
         """True while the mission is flown and an item to come needs the gimbal."""
         return self.flying and self.mission.payload.needs_gimbal(self.progress.current, self.progress.jumps)

@@ -15,10 +15,9 @@ from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import Cursor, FlightPlanFile, GatewayStep, Start, translate
 from anafi_mav.units import DEG_PER_RAD
 from anafi_mav.vehicle.base.aircraft import Aircraft
-from anafi_mav.vehicle.base.bounds import check_estimate, check_place
+from anafi_mav.vehicle.base.bounds import check_estimate, check_limits, check_place
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.refusal import Refused
-from anafi_mav.vehicle.fence.fence_watch import OutsideFence
 from anafi_mav.vehicle.mission.texts import FIRST_LABEL
 
 BREATH = 20
@@ -133,12 +132,8 @@ async def check_path(vehicle: Aircraft, parts: Sequence[FlightPlanFile | Gateway
 
 
 def _check(vehicle: Aircraft, start: GeoPoint | None, point: WayPoint) -> None:
-    ceiling = vehicle.drone.piloting.state.max_altitude
     try:
         check_place(vehicle, point.place, start=start)
-        if ceiling is not None and point.ato > ceiling.current:
-            reason = texts.ABOVE_CEILING.fill(height=point.ato, ceiling=ceiling.current)
-            raise Refused(texts.HEIGHT, reason, lasting=True)
-        vehicle.fence.check_height(point.ato)
-    except (Refused, OutsideFence) as error:
+        check_limits(vehicle, point.ato)
+    except Refused as error:
         raise Refused(texts.ITEM.fill(number=point.item + FIRST_LABEL), error.reason, lasting=True) from error

@@ -26,7 +26,6 @@ from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import TooLow
 from anafi_mav.vehicle.base.clients import system_of
-from anafi_mav.vehicle.base.control import Request
 from anafi_mav.vehicle.base.flight_task import Hover, Needs, PlainTask, TaskRules
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
@@ -248,9 +247,12 @@ class OffboardFlight(PlainTask):
         if not self._takeoff.is_armed_by(sender):
             return texts.NOT_ARMED_BY_CLIENT
         by = Right(sender, Extent.COMMANDED)
-        refusal = control.refusal(Request(self, by, self.rules))
-        if (reason := self._grounded if refusal is None else refusal.reason) is not None:
-            return reason
+        try:
+            control.require_allowed(self, by)
+            vehicle.require_ready()
+            self._require_freedom(texts.TAKEOFF)
+        except Refused as refusal:
+            return refusal.reason
         self._stream = stream.climb(sender, now)
         self._watch()
         if self._stream.state is State.LIFTING:
@@ -265,17 +267,6 @@ class OffboardFlight(PlainTask):
     def _is_acquiring(self) -> bool:
         """True while the newest attempt of a client has not ended."""
         return self._attempt is not None and not self._attempt.task.done()
-
-    @property
-    def _grounded(self) -> OperatorText | None:
-        """Why setpoints do not take the drone off; None when they do."""
-        if problems := self._vehicle.prearm_problems():
-            return texts.joined(problems)
-        try:
-            self._require_freedom(texts.TAKEOFF)
-        except Refused as refusal:
-            return refusal.reason
-        return None
 
     def _end_count(self, sender: Hashable) -> None:
         """One setpoint that does not climb ends the second of the client that sent it."""

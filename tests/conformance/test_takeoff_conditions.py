@@ -1,0 +1,75 @@
+"""Conditions of arming and take-off, judged by what the simulated drone received and by the heartbeat."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fault_scenarios import ACCEPTED, ARM, REJECTED, TAKEOFF_CMD, goto, heard, watched
+from support.mav import NAN
+from support.params import write
+from support.world import ARMED, MODES, world
+
+from anafi_mav.arsdk.messages import ardrone3
+from anafi_mav.arsdk.messages.alarms import TakeoffChecklist, TakeoffChecklistType
+from anafi_mav.sim import SimulatedDrone
+from anafi_mav.vehicle.takeoff import AUTO_DISARM
+
+INT32 = dialect.MAV_PARAM_TYPE_INT32
+TAKEOFF_MODE = MODES["px4"].takeoff
+
+
+def now() -> float:
+    return asyncio.get_running_loop().time()
+
+
+async def test_arming_in_the_air_is_accepted_and_leaves_the_flight_alone() -> None:
+    """Also where arming starts the motors: a client that arms once more disturbs no goto."""
+    async with world(speed=1.0) as w:
+        await w.take_off(5.0)
+        assert await goto(w, 30.0, 5.0) == ACCEPTED
+        await write(w.client, "ANF_HAND_LAUNCH", 1, INT32)
+        began = now()
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 29.0, 30.0)
+        assert [e.name for e in w.drone.log if e.kind == "command" and e.t >= began and "PCMD" not in e.name] == []
+
+
+async def test_arming_without_a_flying_state_is_refused() -> None:
+    def silent(drone: SimulatedDrone) -> None:
+        drone.faults.untold = frozenset({ardrone3.FlyingStateChanged.NAME})
+
+    async with world(before=silent) as w:
+        mark = w.client.mark()
+        assert (await w.client.command(ARM, 1)).result == REJECTED
+        text = await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("PreArm"), since=mark)
+        assert "flying state unknown" in text.text.lower()
+        assert not (await w.client.heartbeat(lambda beat: True)).base_mode & ARMED
+
+
+async def test_armed_state_expires_after_a_takeoff_that_the_drone_has_not_begun() -> None:
+    """The drone refuses by silence, for a reason that it has not reported."""
+
+    def refusing(drone: SimulatedDrone) -> None:
+        drone.faults.untold = frozenset({TakeoffChecklist.NAME})
+        drone.faults.refuse_take_off = frozenset({TakeoffChecklistType.MAGNETO_CALIBRATION})
+
+    async with world(before=refusing) as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        assert (await w.client.command(TAKEOFF_CMD, -1, NAN, NAN, NAN, timeout=20.0)).result != ACCEPTED
+        assert heard(w, "TakeOff") == ["TakeOff"]
+        began = now()
+        await w.client.heartbeat(lambda beat: beat.base_mode & ARMED)
+        await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, timeout=2.0 * AUTO_DISARM)
+        assert math.isclose(now() - began, AUTO_DISARM, abs_tol=1.5)
+
+
+async def test_mode_during_the_climb_is_takeoff() -> None:
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=8.0)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "command" and e.name.endswith("moveBy"), 20.0)
+        await watched(1.0)
+        assert (await w.client.heartbeat(lambda beat: True)).custom_mode == TAKEOFF_MODE
+        await w.at_height(8.0)
