@@ -487,7 +487,7 @@ SHOWN_OPTIONS = 12
 
 def _options(setting: Any, options: Any) -> str:
     """Return the options of a setting; of a choice the numbers are the values, of all others the texts."""
-    is_choice = setting.kind.name == "UINT8"
+    is_choice = setting.kind.is_choice
     texts = [f"`{value:g}` {text}" if is_choice else text for value, text in options]
     return f"{texts[0]} to {texts[-1]} ({len(texts)})" if len(texts) > SHOWN_OPTIONS else "; ".join(texts)
 
@@ -500,7 +500,7 @@ def _of_model(setting: Any, entry: Any, union: Any) -> str:
         return f"{entry.limits.low:.4g} to {entry.limits.high:.4g}"
     if len(entry.options) == len(union):
         return "all"
-    if setting.kind.name == "UINT8":
+    if setting.kind.is_choice:
         return ", ".join(f"{option.value:g}" for option in sorted(entry.options))
     return _options(setting, entry.options)
 
@@ -527,7 +527,7 @@ def camera_settings() -> str:
         row = (
             f"`{setting.name}`" + (" †" if setting.guard is Guard.CAPTURE else ""),
             setting.title + (f", {setting.unit}" if setting.unit else ""),
-            setting.kind.name,
+            "INT32" if setting.kind.is_choice else setting.kind.name,
             _options(setting, union) if union else "a range",
             *cells,
             "; ".join(counts) or "–",

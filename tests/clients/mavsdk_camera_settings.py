@@ -76,6 +76,7 @@ async def main(url: str) -> None:
         await tried("recording", give(camera, "CAM_VIDMODE", "0"))
         await held("recording")
         await asyncio.wait_for(reads(camera, "CAM_EV", -1.0), LIMIT)
+        await asyncio.wait_for(reads(camera, "CAM_ANTIFLICKER", 2.0), LIMIT)
         say("done")
 
 

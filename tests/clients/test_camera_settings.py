@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from support.definition_readers import read_definition
-from support.ext_params import fetch, value_of
+from support.ext_params import fetch, value_of, write
 from support.ftp import Ftp
 from support.mav import CAMERA
 from support.product import Process, program
@@ -18,6 +18,7 @@ from support.sim_settings import sim_value
 from support.world import world
 
 from anafi_mav.arsdk.messages.camera import CameraEvCompensation, EvCompensation
+from anafi_mav.mavlink import dialect
 
 pytestmark = pytest.mark.third_party
 
@@ -57,6 +58,9 @@ async def test_conf_116_mavsdk_lists_and_sets_camera_settings(model: str, flavou
             assert tried != "done"
             assert sim_value(w.drone, "CAM_VIDMODE") == before
             w.drone.inject(EvCompensation(cam_id=0, value=CameraEvCompensation.EV_MINUS_1_00))
+            # By another client: MAVSDK notices changes of int32 and float only.
+            choice = dialect.MAV_PARAM_EXT_TYPE_INT32
+            assert (await write(w.client, "CAM_ANTIFLICKER", 2.0, choice)).param_result == dialect.PARAM_ACK_ACCEPTED
             script.say("")
             await script.line(lambda line: line == "done", timeout=30.0)
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from support.cameras import ACCEPTED, PHOTO, VIDEO, command, enter, photos, press, request, shoot, texts, videos
-from support.ext_params import write
+from support.ext_params import CHOICE, write
 from support.flavours import both
 from support.ftp import Ftp
 from support.mav import CAMERA, Client
@@ -186,7 +186,7 @@ async def test_conf_087_one_picture_of_a_series_is_one(model: str) -> None:
         await enter(w.client, PHOTO)
         for count in (0.5, -1.0, math.inf):
             assert await command(w.client, START_PHOTO, 0, 1, count) == DENIED
-        assert (await write(w.client, "CAM_PHOTOMODE", 3.0, 1)).param_result == dialect.PARAM_ACK_ACCEPTED
+        assert (await write(w.client, "CAM_PHOTOMODE", 3.0, CHOICE)).param_result == dialect.PARAM_ACK_ACCEPTED
         mark = w.client.mark()
         assert await command(w.client, START_PHOTO, 0, 0, 1) == ACCEPTED
         await w.client.wait("CAMERA_IMAGE_CAPTURED", since=mark)
@@ -205,7 +205,7 @@ async def test_conf_087_burst_and_bracketing_are_one_message_per_file(model: str
         await enter(w.client, PHOTO)
         first = 0
         for mode, name in ((2.0, "BURST"), (1.0, "BRACKETING")):
-            assert (await write(w.client, "CAM_PHOTOMODE", mode, 1)).param_result == dialect.PARAM_ACK_ACCEPTED
+            assert (await write(w.client, "CAM_PHOTOMODE", mode, CHOICE)).param_result == dialect.PARAM_ACK_ACCEPTED
             mark = w.client.mark()
             assert await command(w.client, START_PHOTO, 0, 0, 1) == ACCEPTED
             await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 1, since=mark)
@@ -354,7 +354,7 @@ async def test_conf_092_photo_without_card_goes_to_the_internal_storage() -> Non
         assert (await shoot(w.client)).capture_result == 1
         assert await command(w.client, FORMAT, 1, 1) == ACCEPTED
         assert (await request(w.client, "CAMERA_CAPTURE_STATUS")).image_count == 0
-        assert (await write(w.client, "CAM_STORAGE", 1.0, 1)).param_result == dialect.PARAM_ACK_ACCEPTED
+        assert (await write(w.client, "CAM_STORAGE", 1.0, CHOICE)).param_result == dialect.PARAM_ACK_ACCEPTED
         assert await command(w.client, START_PHOTO, 0, 0, 1) == DENIED
         assert "Photo refused: no storage" in texts(w.client, mark)
 

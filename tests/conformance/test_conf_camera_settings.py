@@ -13,7 +13,7 @@ from msgspec import structs
 from support.camera_states import MODEL_KEYS
 from support.cameras import PHOTO, enter
 from support.definition_readers import Described, ReadDefinition, read_definition
-from support.ext_params import fetch, read, send_set, value_of, write
+from support.ext_params import CHOICE, fetch, read, send_set, value_of, write
 from support.flavours import both
 from support.ftp import Ftp
 from support.mav import CAMERA, Client
@@ -32,7 +32,7 @@ ACCEPTED, UNSUPPORTED, FAILED, IN_PROGRESS = (
     dialect.PARAM_ACK_FAILED,
     dialect.PARAM_ACK_IN_PROGRESS,
 )
-KINDS = {"uint8": 1, "uint32": 5, "int32": 6, "float": 9}
+KINDS = {"uint32": 5, "int32": 6, "float": 9}
 """MAV_PARAM_EXT_TYPE by the name in a definition."""
 
 DEPENDENT = {"CAM_THM_LOW": (-100.0, 10.5), "CAM_THM_HIGH": (1000.0, 150.0)}
@@ -177,10 +177,10 @@ async def test_conf_095_list_and_reads_agree() -> None:
         ("CAM_EV", float("nan"), 9, UNSUPPORTED),
         ("CAM_ZOOMSPEED", 11.0, 9, UNSUPPORTED),
         ("CAM_SATURATION", 1.5, 9, UNSUPPORTED),
-        ("CAM_WBMODE", 200.0, 1, UNSUPPORTED),
-        ("CAM_WBMODE", 2.0, 6, UNSUPPORTED),
+        ("CAM_WBMODE", 200.0, CHOICE, UNSUPPORTED),
+        ("CAM_WBMODE", 2.0, 5, UNSUPPORTED),
         ("CAM_VIDFPS", 120.0, 9, UNSUPPORTED),
-        ("NO_SUCH_THING", 1.0, 1, FAILED),
+        ("NO_SUCH_THING", 1.0, CHOICE, FAILED),
     ],
 )
 async def test_conf_095_value_that_is_not_accepted_is_refused(name: str, value: float, kind: int, result: int) -> None:
@@ -206,13 +206,17 @@ async def test_conf_095_unreported_value_is_not_accepted_unwritten(model: str) -
     """The interval of a series is shown as its default in other photo modes; the drone has another one."""
     async with world(model=model) as w:
         await enter(w.client, PHOTO)
-        for name, value, kind in (("CAM_PHOTOMODE", 3.0, 1), ("CAM_PHOTOLAPSE", 7.0, 9), ("CAM_PHOTOMODE", 0.0, 1)):
+        for name, value, kind in (
+            ("CAM_PHOTOMODE", 3.0, CHOICE),
+            ("CAM_PHOTOLAPSE", 7.0, 9),
+            ("CAM_PHOTOMODE", 0.0, CHOICE),
+        ):
             assert (await write(w.client, name, value, kind)).param_result == ACCEPTED
         assert value_of(await read(w.client, "CAM_PHOTOLAPSE")) == 2.0
         for _ in range(2):
             assert (await write(w.client, "CAM_PHOTOLAPSE", 2.0, 9)).param_result == FAILED
         assert sim_value(w.drone, "CAM_PHOTOLAPSE") == 7.0
-        assert (await write(w.client, "CAM_PHOTOMODE", 3.0, 1)).param_result == ACCEPTED
+        assert (await write(w.client, "CAM_PHOTOMODE", 3.0, CHOICE)).param_result == ACCEPTED
         assert (await write(w.client, "CAM_PHOTOLAPSE", 2.0, 9)).param_result == ACCEPTED
         assert sim_value(w.drone, "CAM_PHOTOLAPSE") == 2.0
 
@@ -249,7 +253,7 @@ async def test_conf_095_recording_keeps_its_settings(model: str) -> None:
         for name, value in (("CAM_VIDRES", 3.0), ("CAM_MODE", 0.0), ("CAM_HDR", 1.0 - ours.values["CAM_HDR"])):
             before = ours.values[name]
             mark = w.client.mark()
-            ack = await write(w.client, name, value, 1)
+            ack = await write(w.client, name, value, CHOICE)
             assert (ack.param_result, value_of(ack)) == (FAILED, before)
             pushed = await w.client.wait("PARAM_EXT_VALUE", lambda m, name=name: m.param_id == name, since=mark)
             assert value_of(pushed) == before
@@ -326,7 +330,7 @@ async def test_conf_096_settings_that_follow_a_change_are_sent_too() -> None:
     async with world(clients=2) as w:
         other = w.clients[1]
         mark = other.mark()
-        assert (await write(w.client, "CAM_VIDMODE", 2.0, 1)).param_result == ACCEPTED
+        assert (await write(w.client, "CAM_VIDMODE", 2.0, CHOICE)).param_result == ACCEPTED
         for name in ("CAM_VIDMODE", "CAM_VIDRES", "CAM_VIDFPS"):
             message = await other.wait("PARAM_EXT_VALUE", lambda m, name=name: m.param_id == name, since=mark)
             assert value_of(message) == pytest.approx(sim_value(w.drone, name), abs=1e-6)
@@ -337,7 +341,7 @@ async def test_conf_096_mode_as_parameter_and_as_setting_is_one() -> None:
         other = w.clients[1]
         for mode in (0.0, 1.0):
             mark = other.mark()
-            assert (await write(w.client, "CAM_MODE", mode, 1)).param_result == ACCEPTED
+            assert (await write(w.client, "CAM_MODE", mode, CHOICE)).param_result == ACCEPTED
             assert (await other.wait("CAMERA_SETTINGS", since=mark)).mode_id == mode
         mark = w.client.mark()
         ack = await other.command(dialect.MAV_CMD_SET_CAMERA_MODE, 0, 0, target=(1, CAMERA))

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from support import camera_commands
 from support.cameras import ACCEPTED, PHOTO, VIDEO, command, enter, photos, press, request, shoot, texts, videos
-from support.ext_params import fetch, write
+from support.ext_params import CHOICE, fetch, write
 from support.flavours import both
 from support.mav import CAMERA, Client
 from support.missions import ACTIVE, PAUSED, put, start, state, takeoff, way
@@ -151,7 +151,7 @@ async def test_thermal_range_is_that_of_an_absolute_palette() -> None:
     async with world(model="thermal") as w:
         assert await command(w.client, dialect.MAV_CMD_REQUEST_MESSAGE, 277) == REJECTED
         assert await command(w.client, SOURCE, 0, dialect.CAMERA_SOURCE_IR, 0) == ACCEPTED
-        for name, value, kind in (("CAM_THM_PALETTE", 0.0, 1), ("CAM_THM_LOW", 5.0, 9), ("CAM_THM_HIGH", 60.0, 9)):
+        for name, value, kind in (("CAM_THM_PALETTE", 0.0, CHOICE), ("CAM_THM_LOW", 5.0, 9), ("CAM_THM_HIGH", 60.0, 9)):
             assert (await write(w.client, name, value, kind)).param_result == dialect.PARAM_ACK_ACCEPTED, name
         shown = await request(w.client, "CAMERA_THERMAL_RANGE")
         assert (shown.stream_id, shown.min, shown.max) == (2, pytest.approx(5.0, abs=0.1), pytest.approx(60.0, abs=0.1))
@@ -162,7 +162,7 @@ async def test_reset_restores_the_settings_of_the_factory(model: str) -> None:
     async with world(model=model) as w:
         await enter(w.client, PHOTO)
         for name, value in (("CAM_PHOTOMODE", 2.0), ("CAM_WBMODE", 2.0)):
-            assert (await write(w.client, name, value, 1)).param_result == dialect.PARAM_ACK_ACCEPTED
+            assert (await write(w.client, name, value, CHOICE)).param_result == dialect.PARAM_ACK_ACCEPTED
         assert await command(w.client, dialect.MAV_CMD_SET_CAMERA_ZOOM, dialect.ZOOM_TYPE_RANGE, 50) == ACCEPTED
         assert await command(w.client, RESET, 0) == DENIED
         assert await command(w.client, RESET, 1) == ACCEPTED

@@ -217,7 +217,7 @@ TO_CAMERA = (
 
 async def test_random_frames_to_the_camera_are_survived(fuzz_seed: int, mistakes: list[str]) -> None:
     source = random.Random(f"{fuzz_seed} camera")
-    known = [newer.MAVLink_param_ext_set_message(1, 100, name, bytes(128), 1) for name in (b"CAM_MODE", b"CAM_VIDMODE")]
+    known = [newer.MAVLink_param_ext_set_message(1, 100, name, bytes(128), 6) for name in (b"CAM_MODE", b"CAM_VIDMODE")]
     async with world(model="thermal") as w:
         frames = random_frames(source, TO_CAMERA)
         began = w.drone.log[-1].t

@@ -9,7 +9,7 @@ import struct
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field
 
-TYPES = {"uint8": "B", "int32": "i", "uint32": "I", "float": "f"}
+TYPES = {"int32": "i", "uint32": "I", "float": "f"}
 """struct code of the types that are used: QGroundControl, MAVSDK and MAVProxy all know them."""
 
 Value = float
@@ -191,4 +191,4 @@ def _check(one: Described, read: ReadDefinition) -> None:
                 ]
         # What decides over others is a whole number: QGroundControl compares its text (rawValueString).
         if option.exclusions or option.ranges:
-            assert one.kind == "uint8"
+            assert one.kind == "int32"

@@ -9,12 +9,14 @@ from anafi_mav.mavlink import dialect
 from support.mav import CAMERA, Client
 
 CODES = {
-    dialect.MAV_PARAM_EXT_TYPE_UINT8: "B",
     dialect.MAV_PARAM_EXT_TYPE_INT32: "i",
     dialect.MAV_PARAM_EXT_TYPE_UINT32: "I",
     dialect.MAV_PARAM_EXT_TYPE_REAL32: "f",
 }
 """struct code by MAV_PARAM_EXT_TYPE: no other type is used."""
+
+CHOICE = dialect.MAV_PARAM_EXT_TYPE_INT32
+"""MAV_PARAM_EXT_TYPE of a setting with named options."""
 
 FINAL = frozenset({dialect.PARAM_ACK_ACCEPTED, dialect.PARAM_ACK_VALUE_UNSUPPORTED, dialect.PARAM_ACK_FAILED})
 

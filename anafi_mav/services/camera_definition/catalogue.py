@@ -29,7 +29,6 @@ from anafi_mav.drone import (
 from anafi_mav.drone.events import ThermalMode
 from anafi_mav.services.camera_definition import setting_table, thermal_table
 from anafi_mav.services.camera_definition.camera_setting import CameraSetting, Option, ValueLimits, View
-from anafi_mav.services.camera_definition.param_ext_codec import ExtType
 
 SETTINGS: tuple[CameraSetting, ...] = (
     setting_table.CAMERA_SETTINGS[0],
@@ -213,7 +212,7 @@ class Catalogue:
         for some, _ in offered:
             options.update((option.value, option) for option in some)
         # Choices are in the sequence of the table, numbers in their own.
-        ordered = list(options.values()) if setting.kind is ExtType.UINT8 else sorted(options.values())
+        ordered = list(options.values()) if setting.kind.is_choice else sorted(options.values())
         limits = [found for _, found in offered if found is not None]
         if not options and not limits:
             return None

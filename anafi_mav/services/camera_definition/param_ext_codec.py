@@ -26,14 +26,17 @@ value with more digits would not be found again (param_value.cpp get_string)."""
 class ExtType(enum.Enum):
     """Type of a value: MAV_PARAM_EXT_TYPE, its struct code, and its name in a definition file."""
 
-    UINT8 = (dialect.MAV_PARAM_EXT_TYPE_UINT8, "B", "uint8")
+    CHOICE = (dialect.MAV_PARAM_EXT_TYPE_INT32, "i", "int32", True)
+    """Number of a named option. A byte would hold it, but MAVSDK notices changes of int32 and float only ("Type and
+    callback mismatch" for others, mavlink_parameter_subscription.cpp): it kept showing the value of before."""
     INT32 = (dialect.MAV_PARAM_EXT_TYPE_INT32, "i", "int32")
     UINT32 = (dialect.MAV_PARAM_EXT_TYPE_UINT32, "I", "uint32")
     REAL32 = (dialect.MAV_PARAM_EXT_TYPE_REAL32, "f", "float")
 
-    def __init__(self, mav: int, code: str, xml: str) -> None:
+    def __init__(self, mav: int, code: str, xml: str, is_choice: bool = False) -> None:
         self.mav = mav
         self.xml = xml
+        self.is_choice = is_choice
         self._struct = struct.Struct("<" + code)
 
     @property

@@ -360,7 +360,7 @@ MANUAL, MANUAL_ISO, MANUAL_SHUTTER = (
 CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     CameraSetting(
         "CAM_MODE",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Camera mode",
         read=lambda view: number_of(MODES, view.camera.mode),
         write=lambda drone, id, value: drone.camera.set_mode(word_of(MODES, value), id),
@@ -372,7 +372,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     # -- photos
     CameraSetting(
         "CAM_PHOTOMODE",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Photo mode",
         read=lambda view: number_of(PHOTO_MODES, photo(view).mode),
         write=lambda drone, id, value: set_photo(drone, id, PhotoSettings(mode=word_of(PHOTO_MODES, value))),
@@ -382,7 +382,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_PHOTOPROJ",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Photo projection",
         read=lambda view: number_of(PHOTO_FORMATS, photo(view).format),
         write=lambda drone, id, value: set_photo(drone, id, PhotoSettings(format=word_of(PHOTO_FORMATS, value))),
@@ -392,7 +392,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_PHOTOFMT",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Photo file",
         read=lambda view: number_of(PHOTO_FILES, photo(view).file),
         write=lambda drone, id, value: set_photo(drone, id, PhotoSettings(file=word_of(PHOTO_FILES, value))),
@@ -412,7 +412,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_PHOTOBURST",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Burst",
         read=lambda view: number_of(BURSTS, photo(view).burst),
         write=lambda drone, id, value: set_photo(drone, id, PhotoSettings(burst=word_of(BURSTS, value))),
@@ -423,7 +423,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_PHOTOBRKT",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Bracketing",
         read=lambda view: number_of(BRACKETS, photo(view).bracketing),
         write=lambda drone, id, value: set_photo(drone, id, PhotoSettings(bracketing=word_of(BRACKETS, value))),
@@ -461,7 +461,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     # -- videos
     CameraSetting(
         "CAM_PHOTOSIGN",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Sign photos",
         read=lambda view: flag(photo(view).signed),
         write=lambda drone, id, value: set_photo(drone, id, PhotoSettings(signed=value != 0.0)),
@@ -471,7 +471,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_PHOTOLIVE",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Live video while a photo is taken",
         read=lambda view: flag(photo(view).keeps_live_video),
         write=lambda drone, id, value: set_photo(drone, id, PhotoSettings(keeps_live_video=value != 0.0)),
@@ -481,7 +481,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_VIDMODE",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Video mode",
         read=lambda view: number_of(VIDEO_MODES, recording(view).mode),
         write=lambda drone, id, value: set_recording(drone, id, RecordingSettings(mode=word_of(VIDEO_MODES, value))),
@@ -491,7 +491,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_VIDRES",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Video resolution",
         read=lambda view: number_of(RESOLUTIONS, recording(view).resolution),
         write=lambda drone, id, value: set_recording(
@@ -539,7 +539,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_VIDCODEC",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Video codec",
         read=lambda view: number_of(CODECS, recording(view).codec),
         write=lambda drone, id, value: set_recording(drone, id, RecordingSettings(codec=word_of(CODECS, value))),
@@ -549,7 +549,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_STORAGE",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Storage",
         read=lambda view: number_of(STORAGES, view.camera.storage_policy),
         write=lambda drone, id, value: drone.camera.set_storage_policy(word_of(STORAGES, value), id),
@@ -558,7 +558,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_AUTOREC",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Record from take-off to landing",
         read=lambda view: flag(view.camera.autorecord),
         write=lambda drone, id, value: drone.camera.set_autorecord(value != 0.0, id),
@@ -567,7 +567,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_HDR",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "HDR",
         read=lambda view: flag(view.camera.hdr),
         write=lambda drone, id, value: drone.camera.set_hdr(value != 0.0, id),
@@ -578,7 +578,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     # -- light
     CameraSetting(
         "CAM_EXPMODE",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Exposure mode",
         read=lambda view: number_of(EXPOSURES, exposure(view).mode),
         write=lambda drone, id, value: set_exposure(drone, id, ExposureSettings(mode=word_of(EXPOSURES, value))),
@@ -627,7 +627,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_METERING",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Metering",
         read=lambda view: number_of(METERINGS, exposure(view).metering),
         write=lambda drone, id, value: set_exposure(drone, id, ExposureSettings(metering=word_of(METERINGS, value))),
@@ -636,7 +636,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_AELOCK",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Lock exposure",
         read=lambda view: flag(view.camera.exposure_locked),
         write=lambda drone, id, value: drone.camera.lock_exposure(value != 0.0, id=id),
@@ -645,7 +645,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_WBMODE",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "White balance",
         read=lambda view: number_of(WHITE_BALANCES, view.camera.white_balance),
         write=lambda drone, id, value: drone.camera.set_white_balance(word_of(WHITE_BALANCES, value), id=id),
@@ -664,7 +664,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_WBLOCK",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Lock white balance",
         read=lambda view: flag(view.camera.white_balance_locked),
         write=lambda drone, id, value: drone.camera.lock_white_balance(value != 0.0, id),
@@ -677,7 +677,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_ANTIFLICKER",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Anti-flicker",
         read=lambda view: number_of(ANTIFLICKERS, view.cameras.antiflicker),
         write=lambda drone, id, value: drone.camera.set_antiflicker(word_of(ANTIFLICKERS, value)),
@@ -687,7 +687,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     # -- picture
     CameraSetting(
         "CAM_STYLE",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Style",
         read=lambda view: number_of(STYLES, style(view).style),
         write=lambda drone, id, value: drone.camera.set_style(word_of(STYLES, value), id),
@@ -710,7 +710,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_ZOOMLOSSY",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Zoom beyond the lossless range",
         read=lambda view: flag(view.camera.zoom_may_degrade),
         write=lambda drone, id, value: drone.camera.set_zoom_may_degrade(value != 0.0, id),
@@ -719,7 +719,7 @@ CAMERA_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_STREAMING",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Live video",
         read=lambda view: number_of(STREAMINGS, view.camera.streaming),
         write=lambda drone, id, value: drone.camera.set_streaming(word_of(STREAMINGS, value), id),

@@ -79,7 +79,7 @@ def _set_rendering(drone: Drone, mode: RenderingMode | None = None, share: float
 THERMAL_SETTINGS: tuple[CameraSetting, ...] = (
     CameraSetting(
         "CAM_THERMAL",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Thermal camera",
         read=lambda view: view.thermal.mode,
         write=lambda drone, id, value: drone.thermal.set_mode(ThermalMode(round(value))),
@@ -96,7 +96,7 @@ THERMAL_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_THM_RENDER",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Thermal rendering",
         read=lambda view: view.thermal.rendering,
         write=lambda drone, id, value: _set_rendering(drone, RenderingMode(round(value))),
@@ -128,7 +128,7 @@ THERMAL_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_THM_PALETTE",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Thermal palette",
         read=_of_palette(lambda palette: palette.mode),
         write=lambda drone, id, value: _set_palette(drone, mode=PaletteMode(round(value))),
@@ -161,7 +161,7 @@ THERMAL_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_THM_OUTSIDE",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Colours beyond the palette",
         read=_of_palette(lambda palette: palette.outside),
         write=lambda drone, id, value: _set_palette(drone, outside=ColorizationMode(round(value))),
@@ -173,7 +173,7 @@ THERMAL_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_THM_RANGE",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Range of the palette",
         read=_of_palette(lambda palette: palette.range),
         write=lambda drone, id, value: _set_palette(drone, range=RelativeRangeMode(round(value))),
@@ -185,7 +185,7 @@ THERMAL_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_THM_SPOT",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Spots",
         read=_of_palette(lambda palette: palette.spot),
         write=lambda drone, id, value: _set_palette(drone, spot=SpotType(round(value))),
@@ -229,7 +229,7 @@ THERMAL_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_THM_SENS",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Thermal sensitivity",
         read=lambda view: view.thermal.sensitivity,
         write=lambda drone, id, value: drone.thermal.set_sensitivity(ThermalSensitivity(round(value))),
@@ -241,7 +241,7 @@ THERMAL_SETTINGS: tuple[CameraSetting, ...] = (
     ),
     CameraSetting(
         "CAM_THM_SHUTTER",
-        ExtType.UINT8,
+        ExtType.CHOICE,
         "Thermal calibration",
         read=lambda view: view.thermal.shutter,
         write=lambda drone, id, value: drone.thermal.set_shutter(ShutterTrigger(round(value))),
