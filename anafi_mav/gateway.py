@@ -92,7 +92,7 @@ CANCEL_WAIT = 0.1
 """s until a task that has not ended is cancelled once more."""
 
 DISK_LIMIT = 1.0
-"""s that closing waits for files of the state folder that are still being written."""
+"""s that closing, and `ready`, wait for files of the state folder that are being written."""
 
 HOVER_TIME = 2.0
 """s that closing stays with a flying drone after its moves have ended: as long as hover centres the sticks."""
@@ -557,13 +557,16 @@ class Gateway:
     async def ready(self, timeout: float) -> bool:
         """Wait until each drone is connected or one attempt has failed.
 
-        True when all of them are connected.
+        True when all of them are connected. The lock of the state folder has their serial numbers then, unless the disk
+        needs more than `DISK_LIMIT`.
         """
         waits = [asyncio.ensure_future(s.first_attempt.wait()) for s in self._supervised]
         if waits:
             _, pending = await asyncio.wait(waits, timeout=timeout)
             for wait in pending:
                 wait.cancel()
+        if self._lock is not None:
+            await STATE_WRITER.drain(DISK_LIMIT)
         return all(s.system.active for s in self._supervised)
 
     async def close(self) -> None:

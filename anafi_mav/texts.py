@@ -435,6 +435,7 @@ SETPOINT_DROPPED = Template("Setpoint dropped: {reason}", reason="r" * REASON_BY
 MOVE_CANCELLED = Reason("move cancelled elsewhere")
 MOVE_FAILED = Reason("drone aborted the move")
 NOT_ITS_TAKEOFF = Reason("takeoff of another client")
+FOREIGN_TAKEOFF = Reason("takeoff by another controller")
 GROUND_SETPOINTS_STOPPED = OperatorText("Setpoints stopped on the ground: disarming")
 OFFBOARD_STOPPED_ON_GROUND = OperatorText("Offboard setpoints stopped: on the ground")
 OFFBOARD_STOPPED_TAKEOFF = OperatorText("Offboard setpoints stopped: takeoff continues")

@@ -506,11 +506,11 @@ class Drone:
 
     def _allows(self, message: Message) -> bool:
         """The gate of every command: see `Commander.gate`."""
-        if is_motion(message) and not isinstance(message, ardrone3.PCMD):  # the sticks know by themselves
+        if type(message) is not ardrone3.PCMD and is_motion(message):  # the sticks know by themselves
             self.piloting.require_free()
         if self.calibration.state.started and _starts_motors(message):
             raise CommandRejected("the magnetometer is being calibrated: somebody turns the drone by hand")
-        if isinstance(message, common.MagnetoCalibration) and message.calibrate:
+        if type(message) is common.MagnetoCalibration and message.calibrate:
             self._require_standing("calibrated")
         return self.controller.allows(message)
 

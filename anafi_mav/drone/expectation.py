@@ -231,7 +231,7 @@ class Commander:
             return BLOCKED
         if message_log.isEnabledFor(logging.DEBUG):
             message_log.debug("%s: sent %r", self.name, without_secrets(message))
-        is_urgent = stops or isinstance(message, ardrone3.Landing)
+        is_urgent = stops or type(message) is ardrone3.Landing
         rank = Rank.URGENT if is_urgent else Rank.SETTING if is_setting else Rank.NORMAL
         token = self._wire.send(message, rank, at_once=at_once)
         if self.on_command is not None:

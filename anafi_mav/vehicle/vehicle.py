@@ -684,6 +684,8 @@ class Vehicle(Aircraft):
         if not self.on_ground:
             self.takeoff.left_ground()
             if before in ON_GROUND:
+                if not self.drone.piloting.has_launched:
+                    self.control.lose(texts.FOREIGN_TAKEOFF)  # a mode chosen before was not meant for this flight
                 self.offboard.left_ground()
         self.return_end.on_flying_state()
         self._note_hover()

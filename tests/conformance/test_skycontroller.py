@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import ACCEPTED, REJECTED, RTL, goto, heard
+from support.fault_scenarios import ACCEPTED, ARM, REJECTED, RTL, SET_MODE, goto, heard, watched
 from support.missions import CORNERS, put, start
 from support.params import write
 from support.plans import ACCEPTED as TAKEN
 from support.plans import FENCE, square, upload
+from support.setpoints import COPTER_GUIDED, VELOCITY_ONLY, local, motion, streaming
 from support.world import HOME, World, world
 
 from anafi_mav.arsdk.messages.skyctrl import Source
@@ -53,6 +55,35 @@ async def greeted(w: World) -> None:
     """Wait for the last text that a client is greeted with."""
     w.client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
     await w.client.wait("STATUSTEXT", lambda m: "firmware" in m.text, since=0, timeout=10.0)
+
+
+STREAMS: dict[str, tuple[tuple[float, ...], Any]] = {
+    "ardupilot": ((1, COPTER_GUIDED), local(VELOCITY_ONLY, v=(3.0, 0.0, 0.0))),
+    "px4": ((1, 3, 0), dialect.MAVLink_manual_control_message(1, 400, 0, 500, 0, 0)),
+}
+"""By flavour: a mode that is no flight task, and what flies northwards in it."""
+
+
+@pytest.mark.parametrize("arms", [False, True])
+@pytest.mark.parametrize("flavour", STREAMS)
+async def test_stream_from_before_pilots_takeoff_does_not_fly_the_drone(flavour: str, arms: bool) -> None:
+    """The pilot takes off by the button, at a height of 1 m: what a client chose on the ground was not for that."""
+    mode, message = STREAMS[flavour]
+    async with world(flavour=flavour, skycontroller=3) as w:
+        assert w.drone.skycontroller is not None
+        assert (await w.client.command(SET_MODE, *mode)).result == ACCEPTED
+        async with streaming(w.client, message):
+            if arms:
+                assert (await w.client.command(ARM, 1)).result == ACCEPTED
+            mark = w.client.mark()
+            w.drone.skycontroller.press(1)
+            name = "Guided" if flavour == "ardupilot" else "Position"
+            ended = f"{name} ended: takeoff by another controller"
+            await w.client.wait("STATUSTEXT", lambda m: m.text == ended, since=mark, timeout=10.0)
+            await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 20.0)
+            await watched(4.0)
+            assert motion(w, 0.0) == []
+            assert abs(w.drone.pose.north) < 0.5
 
 
 @generations

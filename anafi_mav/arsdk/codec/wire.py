@@ -375,7 +375,7 @@ def encode(message: Message | UnknownMessage) -> bytes:
 
     Raises `LocalProtocolError` when an argument does not fit its wire type.
     """
-    if isinstance(message, UnknownMessage):
+    if type(message) is UnknownMessage:  # not by isinstance, which takes longer than the lookup below
         return HEADER.pack(*message.id) + message.payload
     return _CODECS[HEADER.pack(*message.ID)].encode(message)
 

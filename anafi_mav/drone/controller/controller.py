@@ -466,16 +466,18 @@ class Controller(Element[ControllerState]):
 
 _ANIMATIONS = animation.Cancel.ID.project
 
-_MOVES = (
-    flight_plan.StartAt,
-    flight_plan.StartAtV2,
-    ardrone3.MoveTo,
-    move.ExtendedMoveTo,
-    ardrone3.StartPilotedPOI,
-    ardrone3.StartPilotedPOIV2,
-    common.Start,
-    follow_me.Start,
-    move.ExtendedMoveBy,
+_MOVES: frozenset[type[Message]] = frozenset(
+    {
+        flight_plan.StartAt,
+        flight_plan.StartAtV2,
+        ardrone3.MoveTo,
+        move.ExtendedMoveTo,
+        ardrone3.StartPilotedPOI,
+        ardrone3.StartPilotedPOIV2,
+        common.Start,
+        follow_me.Start,
+        move.ExtendedMoveBy,
+    }
 )
 
 
@@ -485,10 +487,11 @@ def is_motion(message: Message) -> bool:
     Centring the sticks does not, and neither do commands that stop, land, take off or return: the pilot's sticks do
     not conflict with these.
     """
+    kind = type(message)  # isinstance takes some ten times as long for these classes
+    if kind in _MOVES:
+        return True
     if isinstance(message, ardrone3.PCMD):
         return bool(message.roll or message.pitch or message.yaw or message.gaz)
     if isinstance(message, ardrone3.MoveBy):
         return bool(message.dX or message.dY or message.dZ or message.dPsi)
-    if message.ID.project == _ANIMATIONS:
-        return not isinstance(message, animation.Cancel)
-    return isinstance(message, _MOVES)
+    return message.ID.project == _ANIMATIONS and kind is not animation.Cancel

@@ -112,6 +112,11 @@ class Motors:
     def about_to_fly(self) -> bool:
         return self._flight.state.flying == FlyingState.LANDED and self._sent.may_start_motors(loop_time())
 
+    @property
+    def has_launched(self) -> bool:
+        executed = any(self._sent.is_executed(slot) for slot in (Slot.LAUNCH, Slot.PLAN))
+        return executed or self._sent.may_start_motors(loop_time())
+
     async def take_off(self, timeout: float) -> None:
         self._commander.require_link()
         flying = self._flight.state.flying

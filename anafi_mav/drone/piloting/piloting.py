@@ -145,6 +145,14 @@ class Piloting(PilotingSettings):
         """
         return self._motors.about_to_fly
 
+    @property
+    def has_launched(self) -> bool:
+        """True when a command of this program has started the motors that turn, or may have.
+
+        False when another controller has, a Skycontroller for instance.
+        """
+        return self._motors.has_launched
+
     def require_free(self) -> None:
         """Raise `CommandRejected` while the drone returns by itself or lands.
 

@@ -138,8 +138,11 @@ class Control:
         `Vehicle.mode` puts first what the drone does by itself.
         """
         task, below = self._situation.shown
-        modes = (one.mode for one in (task, below) if one is not None)
-        return next((mode for mode in modes if mode is not None), FlightMode.HOLD)
+        if task is not None and (mode := task.mode) is not None:
+            return mode
+        if below is not None and (mode := below.mode) is not None:
+            return mode
+        return FlightMode.HOLD
 
     @property
     def paused(self) -> bool:
