@@ -163,7 +163,7 @@ def head(status: GatewayStatus) -> list[str]:
     ]
     if status.web is not None:
         lines.append(f"page {status.web.url}status")
-    return [*lines, *status.problems]
+    return [*lines, *(endpoint.state for endpoint in status.endpoints), *status.problems]
 
 
 def tables(status: GatewayStatus) -> list[TableRows]:

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import aiohttp
+import msgspec
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -91,6 +92,12 @@ async def test_status_command_finds_the_gateway_by_its_state_folder() -> None:
 def test_status_command_without_a_gateway_names_the_folder(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=re.escape(str(tmp_path))):
         command.find(str(tmp_path), None)
+
+
+def test_lines_above_the_tables_have_the_state_of_each_endpoint() -> None:
+    """An endpoint that connects may not be connected, and has no client then."""
+    replaced = msgspec.structs.replace(STATUS, problems=("the state folder is full",))
+    assert command.head(replaced)[-2:] == ["1 client", "the state folder is full"]
 
 
 def test_tables_of_the_status_show_what_was_refused() -> None:
