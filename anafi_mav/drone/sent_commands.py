@@ -297,17 +297,20 @@ class SentCommands:
 
         - LANDED is a refusal only once the motors have turned: a drone refuses a take-off by silence, so a LANDED
           before that is an older one, repeated.
+        - Motors that ramp up are those of the oldest launch that was withdrawn and not reported yet: the LANDED that
+          follows them ends that one, and is no refusal of a newer TakeOff.
         - A TakeOff against a landing that reaches the drone on the ground starts the motors there. LANDED and the
           motors that ramp up may arrive together, so its effect is unwanted from LANDED on.
         """
-        newest = None
+        newest, is_older = None, False
         for one in self._slots[Slot.LAUNCH]:
             newest = one
             if state in one.target:
                 one.apply(Event.EXECUTED)
             elif state == FlyingState.EMERGENCY or (state == FlyingState.LANDED and one.answered):
                 one.apply(Event.REFUSED if one.awaited else Event.OVER)
-            elif state != FlyingState.LANDED:
+            elif state != FlyingState.LANDED and not is_older:
+                is_older = not one.answered and one.phase is Phase.WITHDRAWN and one.may_begin(now)
                 one.answered = True
         for one in self._slots[Slot.LANDING_END]:
             if state == FlyingState.LANDED and one.may_begin(now):

@@ -856,7 +856,8 @@ def _judge_motors(flight: Flight) -> None:
     for entry in flight.w.drone.log:
         if entry.kind == "state" and entry.name == "flying":
             flying = entry.args["to"] != "landed"
-            if not flying:
+            # Motors that a disarming stopped, which a newer command has replaced: the vehicle stayed armed.
+            if not flying and not (entry.args["from"] == "motor_ramping" and _disarming_replaced(flight, entry.t)):
                 landed_at = entry.t
         if entry.kind != "command" or entry.t < began or flying:
             continue
@@ -896,6 +897,13 @@ def _judge_motors(flight: Flight) -> None:
             ] + [s.begun for s in flight.streams if s.ended + s.lasts >= stops[-1][0]]
             if not newer:
                 flight.wrong.append(f"{name} is received after an accepted landing, without a newer command")
+
+
+def _disarming_replaced(flight: Flight, at: float) -> bool:
+    """Whether the newest disarming until then was cancelled by a newer command."""
+    disarmings = [s for s in flight.sent if s.command == ARM and s.values[:1] == (0.0,) and s.at <= at]
+    results = [result for _, result in _finals(flight, disarmings[-1])] if disarmings else []
+    return results == [newer.MAV_RESULT_CANCELLED]
 
 
 def _crossed(flight: Flight, at: float) -> bool:

@@ -128,6 +128,22 @@ def test_cut_motors_refuse_a_take_off_at_once(sent: SentCommands) -> None:
     assert one.phase is R
 
 
+def test_late_events_of_a_withdrawn_launch_are_no_refusal_of_the_next(sent: SentCommands) -> None:
+    """A disarming stopped the motors; the second TakeOff was sent before the events about the first one arrived."""
+    first, second = launch(), launch()
+    sent.place(first, 0.0)
+    first.apply(Event.DELIVERED)
+    sent.withdraw(first, 0.1)
+    sent.place(second, 0.2)
+    second.apply(Event.DELIVERED)
+    sent.attribute(flying(FlyingState.MOTOR_RAMPING), 0.3)
+    sent.attribute(flying(FlyingState.LANDED), 0.3)
+    assert (first.phase, second.phase) == (E, D)
+    sent.attribute(flying(FlyingState.MOTOR_RAMPING), 0.4)
+    sent.attribute(flying(FlyingState.LANDED), 0.5)
+    assert second.phase is R
+
+
 def test_executed_take_off_cannot_begin_after_the_touchdown(sent: SentCommands) -> None:
     one = launch()
     sent.place(one, 0.0)
