@@ -156,8 +156,8 @@ async def test_conf_082_commanded_speed_ends_with_the_landing(flavour: str) -> N
         await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, timeout=30.0)
         mark = w.client.mark()
         w.client.send(dialect.MAVLink_param_request_read_message(1, 1, b"ANF_CRUISE_SPEED", -1))
-        told = await w.client.wait("PARAM_VALUE", lambda m: m.param_id == "ANF_CRUISE_SPEED", since=mark)
-        assert told.param_value == 2.0
+        value = await w.client.wait("PARAM_VALUE", lambda m: m.param_id == "ANF_CRUISE_SPEED", since=mark)
+        assert value.param_value == 2.0
         if flavour == "ardupilot":
             assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, w.modes.hold)).result == ACCEPTED
         assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == ACCEPTED

@@ -387,6 +387,20 @@ async def test_names_of_both_families_are_one_setting(flavour: str) -> None:
         assert not [e for e in w.drone.log if e.kind == "command" and e.name.startswith("rth.set_")]
 
 
+async def test_rally_point_below_the_take_off_is_raised_to_it() -> None:
+    """The height at the end of a return may count from that of the home."""
+    async with world(speed=FAST) as w:
+        await write(w.client, "ANF_RTL_TYPE", 1, INT32)
+        place = geo.destination(*HOME[:2], 10.0, 0.0)
+        point = Item(dialect.MAV_CMD_NAV_RALLY_POINT, *place, z=-20.0, frame=dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT)
+        mark = w.client.mark()
+        assert (await upload(w.client, [point], RALLY)).type == ACCEPTED
+        await away(w)
+        await said(w.client, "^Home height raised to take-off: was -20 m$", mark)
+        await said(w.client, "Returns end at rally point 0", mark)
+        assert [entry.args["altitude"] for entry in w.commands("rth.set_custom_location")] == [pytest.approx(0.0)]
+
+
 async def test_return_to_a_rally_point_lands_there() -> None:
     async with world(speed=FAST) as w:
         await write(w.client, "ANF_RTL_TYPE", 1, INT32)
