@@ -48,7 +48,10 @@ class LinkChange(NamedTuple):
 
 
 class TokensListed(NamedTuple):
-    """All tokens that exist have been reported."""
+    """All tokens that the router has named have been reported."""
+
+    is_complete: bool = True
+    """False when the router has never completed its list: there may be more."""
 
 
 class StateQuery(NamedTuple):

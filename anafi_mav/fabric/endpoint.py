@@ -123,7 +123,9 @@ class FabricEndpoint(Endpoint):
         wanted = [sysid for sysid in systems.sysids() if shown is None or sysid in shown]
         self.claims = SystemClaims(self._connection.session_text, wanted)
         self._is_listed = False
-        """True while all tokens that exist are known."""
+        """True while all tokens that exist are known, as far as the router has named them."""
+        self._is_list_complete = False
+        """The router has completed its newest list of tokens."""
         self._stations: dict[str, _Station] = {}
         self._places = StationPlaces(url.options.max_clients)
         self._silent: set[str] = set()
@@ -178,10 +180,13 @@ class FabricEndpoint(Endpoint):
             listed.cancel()
         if not self._listed.is_set():
             return []  # a router that is not there yet is no mistake
-        return [
+        found = [
             f"{self.url}: system {sysid} is held by gateway {holder}: give each drone an id of its own"
             for sysid, holder in sorted(self.claims.refused.items())
         ]
+        if not self._is_list_complete:
+            found.append(f"{self.url}: the router does not name all system ids that are held: check again")
+        return found
 
     # What the fabric reports.
 
@@ -195,7 +200,7 @@ class FabricEndpoint(Endpoint):
         elif isinstance(arrival, StateQuery):
             self._answer(arrival)
         elif isinstance(arrival, TokensListed):
-            self._is_listed = True
+            self._is_listed, self._is_list_complete = True, arrival.is_complete
             self._listed.set()
             self._claim()
         elif isinstance(arrival, LinkChange):

@@ -149,6 +149,7 @@ class ZenohSession:
         """
 
         def work(session: zenoh.Session) -> None:
+            is_complete = False
             for _ in range(LIST_TRIES):
                 is_complete = True
                 for expression in expressions:
@@ -159,7 +160,7 @@ class ZenohSession:
                             is_complete = False  # an error: "Timeout"
                 if is_complete or self._stopping.is_set():
                     break
-            self._report(TokensListed())
+            self._report(TokensListed(is_complete))
 
         self._queue.add_work(work)
 
