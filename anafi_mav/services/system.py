@@ -87,9 +87,9 @@ from anafi_mav.services.telemetry.telemetry_service import CHANGES, TelemetrySer
 from anafi_mav.services.telemetry.video_service import VideoTelemetryService
 from anafi_mav.services.video.video_stream_service import VideoStreamService
 from anafi_mav.texts import OperatorText
-from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.height import TakeoffRecord
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.right import system_of
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import (
     EventHandler,

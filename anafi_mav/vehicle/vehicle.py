@@ -38,7 +38,6 @@ from anafi_mav.errors import CommandRejected
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.aborted_return import AbortedReturn
 from anafi_mav.vehicle.base.aircraft import Aircraft, CommandedSpeeds
-from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.control_machine import DroneAct, State
 from anafi_mav.vehicle.base.flight_task import LAND, MOTOR_CUT, FlightTask, Hover
 from anafi_mav.vehicle.base.flying import AIRBORNE, LANDING, ON_GROUND, TAKING_OFF
@@ -47,7 +46,7 @@ from anafi_mav.vehicle.base.height import ESTIMATE_ERROR, TakeoffRecord
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import By, Source, client_of, right_of
-from anafi_mav.vehicle.base.right import Extent, Right
+from anafi_mav.vehicle.base.right import Extent, Right, system_of
 from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions

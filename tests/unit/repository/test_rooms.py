@@ -67,7 +67,7 @@ CORES = [
     "fabric/system_state.py",
     *("relay/admission.py", "relay/dialogue.py", "relay/digest.py", "relay/feed.py", "relay/uri_host.py"),
     *("sim/autopilot/firmware.py", "sim/autopilot/flight.py", "sim/world/scramble.py"),
-    *("vehicle/base/clients.py", "vehicle/base/control_machine.py", "vehicle/base/height.py"),
+    *("vehicle/base/control_machine.py", "vehicle/base/height.py", "vehicle/base/right.py"),
     *("vehicle/link_loss.py", "vehicle/base/modes.py", "vehicle/base/requester.py"),
     "vehicle/base/move_heading.py",
     *("vehicle/base/roll_sign.py", "vehicle/base/severity.py", "vehicle/offboard/silence.py"),
