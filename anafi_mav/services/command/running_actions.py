@@ -14,7 +14,7 @@ from msgspec import Struct
 
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import ActionGroup, CommandHistory, Execution
-from anafi_mav.vehicle.base.flight_actions import FlightAction, FlightActions
+from anafi_mav.vehicle.base.flight_task import FlightAction, FlightActions
 
 MAX_WAITING = 32
 """Actions of one group that run one after another: a drone that answers none of them takes seconds for each."""
