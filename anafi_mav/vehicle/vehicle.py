@@ -52,7 +52,6 @@ from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.controller_inputs import ControllerInputs
 from anafi_mav.vehicle.fence.rally import RallyPoints
-from anafi_mav.vehicle.flight_policy import operator_refusal_of
 from anafi_mav.vehicle.follow_flight import FollowFlight
 from anafi_mav.vehicle.guided_flight import GuidedFlight
 from anafi_mav.vehicle.hold_rule import APART, HoldRule
@@ -62,7 +61,7 @@ from anafi_mav.vehicle.link_loss import LossPolicy
 from anafi_mav.vehicle.manual_flight import ManualFlight
 from anafi_mav.vehicle.mission.flight import MissionFlight
 from anafi_mav.vehicle.offboard.flight import OffboardFlight
-from anafi_mav.vehicle.operator_control import Need, OperatorControl
+from anafi_mav.vehicle.operator_control import Need, OperatorControl, operator_refusal_of
 from anafi_mav.vehicle.pilot_switch import PilotSwitch
 from anafi_mav.vehicle.return_end import ReturnEnd
 from anafi_mav.vehicle.takeoff import Takeoff
