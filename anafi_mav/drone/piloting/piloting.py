@@ -36,7 +36,7 @@ from anafi_mav.drone.piloting.stick_stream import StickStream
 from anafi_mav.drone.piloting.sticks import Limits, PilotingCommand, percent
 from anafi_mav.drone.sent_commands import Slot
 from anafi_mav.drone.status.home import Home
-from anafi_mav.errors import CommandTimeout, NotSupported
+from anafi_mav.errors import NotSupported
 
 _IN_FLIGHT = frozenset({FlyingState.HOVERING, FlyingState.FLYING})
 
@@ -368,7 +368,7 @@ class Piloting(PilotingSettings):
         try:
             self.hover()
             for answer in answers:
-                answer.expire_after(timeout, CommandTimeout("hover", timeout))
+                answer.expire_after(timeout, "hover")
             for answer in answers:
                 await answer.wait()
             # Of what was given up before it was confirmed no event may speak; but the order to stop has to arrive.
