@@ -39,7 +39,7 @@ from anafi_mav.services.commands import (
     from_long,
 )
 from anafi_mav.services.flavours import Flavour, flavour_of
-from anafi_mav.services.service import Host, MessageHandler, Query, Service, channel_of, client_of
+from anafi_mav.services.service import Host, MessageHandler, Query, Service, channel_of
 from anafi_mav.vehicle.base.refusal import NotInControl, Refused, Unsupported, text_of
 from anafi_mav.vehicle.base.severity import Severity
 
@@ -126,7 +126,7 @@ class CommandService(Service):
             return None
         is_long = inbound.message.get_msgId() == dialect.MAVLINK_MSG_ID_COMMAND_LONG
         decode: _Decode = from_long if is_long else from_int
-        return decode(inbound.message, action, client_of(inbound), flavour_of(inbound.channel))
+        return decode(inbound.message, action, inbound.client, flavour_of(inbound.channel))
 
     async def settle(self, limit: float = SETTLE) -> None:
         """Wait until running commands have ended after the link is lost, `limit` s at most.
@@ -195,7 +195,7 @@ class CommandService(Service):
             self._acknowledge(inbound, id, dialect.MAV_RESULT_UNSUPPORTED)
             self._note(inbound, id, dialect.MAV_RESULT_UNSUPPORTED)
             return
-        command = decode(inbound.message, definition, client_of(inbound), flavour_of(inbound.channel))
+        command = decode(inbound.message, definition, inbound.client, flavour_of(inbound.channel))
         if definition is QUERY:
             result = dialect.MAV_RESULT_FAILED
             try:
