@@ -774,7 +774,7 @@ class Vehicle(Aircraft):
         height, origin = self.height, self.origin
         if self.on_ground or not height.flight_id or height.takeoff_amsl is None:
             return None
-        place = (None, None) if origin is None else origin.point
+        place = (None, None) if origin is None else origin
         return TakeoffRecord(height.flight_id, height.takeoff_amsl, height.estimated, *place)
 
     def on_return(self) -> None:

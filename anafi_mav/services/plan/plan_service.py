@@ -242,7 +242,7 @@ class PlanService(Service):
         """Home as an item; all zeros while it is not known."""
         vehicle = self.host.vehicle
         home = vehicle.home
-        x, y = (0, 0) if home is None else map(units.deg_e7, home.point)
+        x, y = (0, 0) if home is None else map(units.deg_e7, home)
         z = vehicle.height.amsl(0.0)
         return PlanItem(
             dialect.MAV_CMD_NAV_WAYPOINT, dialect.MAV_FRAME_GLOBAL, (0.0, 0.0, 0.0, 0.0), x, y, 0.0 if z is None else z
