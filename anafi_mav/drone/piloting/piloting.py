@@ -7,7 +7,7 @@ answer, and then its command is withdrawn; `LinkLost` when the link is lost mean
 own: body axes front, right, down; heights above the take-off point.
 
 The promises of the verbs are documented here. Their implementation is in `motors` (up and down),
-`guided_moves` (guided moves), `return_home` (home) and `stick_stream` (PCMDs); common to all of them, and
+`guided_moves` (guided moves, home) and `stick_stream` (PCMDs); common to all of them, and
 therefore here, is above all `hover`.
 """
 
@@ -25,11 +25,10 @@ from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.drone.element import Reducer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, QUIET, Commander, loop_time
-from anafi_mav.drone.piloting.guided_moves import GuidedMoves
+from anafi_mav.drone.piloting.guided_moves import GuidedMoves, ReturnHome
 from anafi_mav.drone.piloting.landing import LandingEnd
 from anafi_mav.drone.piloting.motors import Motors
 from anafi_mav.drone.piloting.moves import Displacement, Move, MoveEnd, Moves
-from anafi_mav.drone.piloting.return_home import ReturnHome
 from anafi_mav.drone.piloting.settings import PilotingSettings
 from anafi_mav.drone.piloting.state import REDUCERS, PilotingState
 from anafi_mav.drone.piloting.stick_stream import StickStream
