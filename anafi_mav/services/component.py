@@ -25,9 +25,8 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.frames import Batch, Packed
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.router import EVERY_COMPONENT
-from anafi_mav.services.command.command_service import CommandService
+from anafi_mav.services.command.command_service import CommandService, RunningActions
 from anafi_mav.services.command.operator_need import ACKNOWLEDGEMENTS, need_of, stop_of
-from anafi_mav.services.command.running_actions import RunningActions
 from anafi_mav.services.commands import Action, Effect
 from anafi_mav.services.definition_link import DefinitionLink
 from anafi_mav.services.dropped_inputs import InputStream
