@@ -97,7 +97,7 @@ class Expectation(Generic[T]):
             self.future.set_exception(error)
 
     def expire_after(self, seconds: float, what: str) -> None:
-        """(Re)start the clock: the wait fails with `CommandTimeout` about `what` when nothing has come by then."""
+        """(Re)start the clock: the wait fails with `CommandTimeout` about `what` after this time."""
         if self._timer is not None:
             self._timer.cancel()
         self._timer = self.future.get_loop().call_later(seconds, self._expire, what, seconds)

@@ -1,4 +1,4 @@
-"""Flight tasks, their needs and their differences as data; the running actions that fly them.
+"""Flight tasks with their needs and differences as data, and the actions that run them.
 
 At most one flight task is active (`Control`). Offboard setpoints, a target to follow, a mission, a goto, a take-off
 and a return are flight tasks. Hold, Guided and Position are hovering modes: what is active below a task and after it.
