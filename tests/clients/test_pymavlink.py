@@ -24,13 +24,13 @@ async def test_pymavlink_helpers_fly_and_stop_the_drone(tmp_path: Path) -> None:
         async with program(sys.executable, "-u", str(SCRIPT), f"tcp:{address}:5760") as script:
             assert await script.end(timeout=120.0) == 0, str(script)
         assert script.lines == [
-            "vehicle 1 1 BRAKE 0",
+            "vehicle 1 0 BRAKE 0",
             "mode ACCEPTED GUIDED",
             "armed 128",
             "takeoff ACCEPTED",
             "loiter ACCEPTED LOITER",
             "stopped",
-            "auto DENIED",
+            "auto TEMPORARILY_REJECTED",
             "rtl ACCEPTED RTL",
             "land ACCEPTED LAND",
             "disarmed 0",
