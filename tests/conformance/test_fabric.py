@@ -6,6 +6,7 @@ import asyncio
 import itertools
 import json
 import math
+import socket
 import sys
 import threading
 import time
@@ -219,6 +220,15 @@ async def test_system_id_of_another_gateway_is_left_to_it(tmp_path: Path, monkey
             mark = station.mark()
             await station.heartbeat(lambda beat: True, since=mark, timeout=10.0)
             assert "1 station" in "".join(other.gateway.lines())
+
+
+async def test_router_that_is_not_there_is_a_problem() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))  # and does not listen
+        url = f"zenoh://127.0.0.1:{taken.getsockname()[1]}"
+        async with world(endpoints=(url,)) as w:
+            (problem,) = await w.gateway.endpoint_problems()
+        assert problem.startswith(f"{url}: no router within 15 s (")
 
 
 async def test_list_of_ids_that_is_not_the_routers_is_a_problem(monkeypatch: pytest.MonkeyPatch) -> None:

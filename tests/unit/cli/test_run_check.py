@@ -9,7 +9,6 @@ import pytest
 from support.world import loopback
 
 from anafi_mav.cli import main
-from anafi_mav.fabric import endpoint
 from anafi_mav.mavlink.key_ring import write_key
 from anafi_mav.state_lock import StateLock
 
@@ -50,18 +49,6 @@ def test_check_names_a_busy_port(tmp_path: Path, capsys: pytest.CaptureFixture[s
         status, out = check(configuration(tmp_path, taken.getsockname()[1]), capsys)
     assert status == 1
     assert "endpoints[0]: WRONG: cannot open tcpin://127.0.0.1:" in out
-
-
-def test_check_names_a_router_that_is_not_there(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(endpoint, "LIST_LIMIT", 1.0)
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))  # and does not listen
-        url = f"zenoh://127.0.0.1:{taken.getsockname()[1]}"
-        status, out = check(configuration(tmp_path, 0), capsys, "--endpoint", url)
-    assert status == 1
-    assert f"fabric: WRONG: {url}: no router within 1 s (Unable to connect to any of" in out
 
 
 def test_check_names_another_gateway_of_the_state_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
