@@ -437,7 +437,7 @@ class Vehicle(Aircraft):
 
     @property
     def interrupted(self) -> FlightTask | None:
-        """The goto or mission that a pause has stopped or is stopping, while nothing else was commanded since."""
+        """The goto or mission that a pause has stopped, while nothing else was commanded since."""
         control = self.control
         is_pending = control.state in (State.RELEASING, State.ACQUIRING)
         below = control.next_below if is_pending else control.below

@@ -162,7 +162,10 @@ class Control:
 
     @property
     def has_pause(self) -> bool:
-        """True while a pause is in force that `resume` ends: no request is pending, which could begin another."""
+        """True while a pause is in force that `resume` ends.
+
+        Not while a request is pending, which may begin another one.
+        """
         return self._situation.is_paused and self._situation.pending is None
 
     @property
