@@ -1,4 +1,4 @@
-"""Looks at what a zenoh router knows: the tokens, and what a link that loses datagrams has lost.
+"""Looks at what a zenoh router knows, and at what a link that loses datagrams has lost.
 
 It uses sessions of its own, another one for each try. zenoh sends each declaration, and the end of each, once, and its
 sessions remember what they have declared and heard: within a session what was lost on the way stays lost. Imports
@@ -66,7 +66,7 @@ def configured(settings: Mapping[str, Any]) -> zenoh.Config:
 
 
 def list_proven(settings: Mapping[str, Any], expression: str, witness: str, stopping: threading.Event) -> set[str]:
-    """Return the tokens of an expression that the router knows; none when it named no complete list.
+    """Return the tokens that the router knows; none when it named no complete list.
 
     `witness`: a token of another session, which the expression covers. A list without it is not the router's: zenoh
     answers for a router that it has no link to, or loses meanwhile, with an empty list that counts as complete.

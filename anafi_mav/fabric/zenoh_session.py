@@ -172,9 +172,9 @@ class ZenohSession:
         self._queue.add_work(work)
 
     def proven_tokens(self, expression: str, witness: str) -> set[str]:
-        """Return the tokens that the router knows; none without a complete list. Blocks, in any thread.
+        """Return the tokens that the router knows; none without a complete list.
 
-        Another session looks, and finds `witness`, a token of this one.
+        Blocks, in any thread. Another session looks, and finds `witness`, a token of this one.
         """
         return list_proven(self._settings, expression, witness, self._stopping)
 

@@ -25,7 +25,7 @@ OPTIONS = {
 
 
 class Party:
-    """A node with an observer, a flyer, a client of some systems, a pilot and the channel of a foreign drone."""
+    """A node with observer, flyer, a client of some systems, a pilot and the channel of a foreign drone."""
 
     def __init__(self) -> None:
         self.node = Node()
