@@ -294,9 +294,9 @@ class Command(Struct, frozen=True):
         return GeoPoint(self.x, self.y)
 
     def height(self, vehicle: Aircraft, *, flown: bool = True) -> float | None:
-        """Return the height above take-off (m) of its z; None when z is unset. COMMAND_LONG has AMSL.
+        """Return the height above take-off (m) of its z; None when z is unset.
 
-        By the frame, and by the flavour of its sender. `flown`: the drone is to fly at this height. Raises `Refused`,
+        By the frame (AMSL in COMMAND_LONG), and by the flavour of its sender. `flown`: the drone is to fly at this height. Raises `Refused`,
         `UnsupportedFrame`.
         """
         if math.isnan(self.z):

@@ -1,4 +1,4 @@
-"""Turns a mission into files, from the drone's position on, checks their path and uploads them.
+"""Turns a mission into files, from the drone's position on; checks and uploads them.
 
 The check reads the lines of the files, because those are flown. A file is uploaded once, and known by its content.
 """
