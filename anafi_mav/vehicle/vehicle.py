@@ -374,14 +374,14 @@ class Vehicle(Aircraft):
         """Stop and hover. A landing or return goes on, and this is refused, unless `by` may end it.
 
         `chosen`: a client has chosen the mode by name or number. `pause`: setpoints of every client are ignored from
-        now on; what flew is what DO_PAUSE_CONTINUE goes on with.
+        now on; what flew is what DO_PAUSE_CONTINUE goes on with. During a pause the shown mode keeps both.
         """
-        hover = Hover(mode, client_of(by) if chosen else None, self._paused_task if pause else None)
+        pauses = pause or (self.control.paused and mode is self.mode)
+        hover = Hover(mode, client_of(by) if chosen else None, self._paused_task if pauses else None)
         task = self.manual if mode is FlightMode.POSITION else hover
         self._require_endable(task, by)
         own = self.returning_by_itself
         rising = self.drone.piloting.about_to_fly
-        pauses = pause or (self.control.paused and mode is self.mode)
         async with self.control.acquire(task, by=by, pauses=pauses) as grant:
             if not self.on_ground or rising:
                 await self._stop(task, by, own=own)
@@ -436,8 +436,10 @@ class Vehicle(Aircraft):
     @property
     def interrupted(self) -> FlightTask | None:
         """The goto or mission that a pause has stopped, while nothing else was commanded since."""
-        below = self.control.below
-        return below.resumes if isinstance(below, Hover) and self.control.active is below else None
+        control = self.control
+        is_pending = control.state in (State.RELEASING, State.ACQUIRING)
+        below = control.next_below if is_pending else control.below
+        return below.resumes if isinstance(below, Hover) and (is_pending or control.active is below) else None
 
     async def take_off(self, ato: float | None, by: Right) -> None:
         """Take off to a height, or end a landing: then the drone hovers where it is."""

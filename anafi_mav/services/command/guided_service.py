@@ -241,7 +241,7 @@ class GuidedService(Service):
                 await vehicle.guided.go(task, by=command.right)
             elif task is vehicle.mission and vehicle.mission.paused:
                 await vehicle.set_mode(FlightMode.MISSION, command.right)
-            elif task is None and vehicle.control.paused:
+            elif task is None and vehicle.control.has_pause:
                 vehicle.control.resume()  # setpoints may fly it again
             else:
                 raise Refused(texts.CONTINUE, texts.NOTHING_PAUSED)

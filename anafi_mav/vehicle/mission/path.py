@@ -17,9 +17,10 @@ from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import Cursor, FlightPlanFile, GatewayStep, Start, translate
 from anafi_mav.units import DEG_PER_RAD
 from anafi_mav.vehicle.base.aircraft import Aircraft
-from anafi_mav.vehicle.base.bounds import check_estimate, check_limits, check_place
+from anafi_mav.vehicle.base.bounds import LOWEST, check_estimate, check_limits, check_place
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.mission.texts import FIRST_LABEL
 
 BREATH = 20
@@ -123,17 +124,23 @@ def way_points(leg: FlightPlanFile, after: int = -1) -> Iterator[WayPoint]:
 async def check_path(vehicle: Aircraft, parts: Sequence[FlightPlanFile | GatewayStep], after: int) -> None:
     """Raise `Refused` if a way point, or the straight way to it, is where the drone may not be.
 
-    `after` is the line of the first file after which it is flown.
+    `after` is the line of the first file after which it is flown. A text warns of the lowest way point below the height
+    at which an ANAFI hovers by itself, as PX4 does below home: over a slope that falls it is meant, elsewhere it is the
+    ground.
     """
-    where, seen = vehicle.place, 0
+    where, seen, lowest = vehicle.place, 0, None
     for part in parts:
         if isinstance(part, FlightPlanFile):
             for point in way_points(part, after):
                 _check(vehicle, where, point)
                 where, seen = point.place, seen + 1
+                lowest = point if lowest is None or point.ato < lowest.ato else lowest
                 if seen % BREATH == 0:
                     await asyncio.sleep(0)
         after = -1
+    if lowest is not None and lowest.ato < LOWEST:
+        item = lowest.item + FIRST_LABEL
+        vehicle.text(Severity.WARNING, texts.MISSION_LOW.fill(item=item, height=lowest.ato))
 
 
 def _check(vehicle: Aircraft, start: GeoPoint | None, point: WayPoint) -> None:
