@@ -296,8 +296,8 @@ class Command(Struct, frozen=True):
     def height(self, vehicle: Aircraft, *, flown: bool = True) -> float | None:
         """Return the height above take-off (m) of its z; None when z is unset.
 
-        By the frame (AMSL in COMMAND_LONG), and by the flavour of its sender. `flown`: the drone is to fly at this height. Raises `Refused`,
-        `UnsupportedFrame`.
+        By the frame (AMSL in COMMAND_LONG), and by the flavour of its sender. `flown`: the drone is to fly at this
+        height. Raises `Refused`, `UnsupportedFrame`.
         """
         if math.isnan(self.z):
             return None
