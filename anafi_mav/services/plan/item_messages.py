@@ -1,4 +1,4 @@
-"""Items of a plan as MISSION_ITEM_INT, MISSION_ITEM and `plans.plan.Item`, both ways. No I/O.
+"""Items of a plan as MISSION_ITEM_INT, MISSION_ITEM and plan `Item`, both ways. No I/O.
 
 MISSION_ITEM_INT is the form that is kept. What comes as MISSION_ITEM, with places in single precision, becomes the
 integers that give the same floats back (MAVLink mission.md; conformance C5, D2).
