@@ -22,7 +22,7 @@ from anafi_mav.services.commands import (
     effect_of_mode,
 )
 from anafi_mav.services.flavours import flavour_of
-from anafi_mav.services.service import MessageHandler, Service, client_of
+from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
@@ -152,7 +152,7 @@ class FlightService(Service):
     def _set_mode(self, inbound: Inbound) -> None:
         """SET_MODE has no acknowledgement: the heartbeat shows the mode, a text the refusal."""
         mode: FlightMode | None = flavour_of(inbound.channel).mode_of_number(inbound.message.custom_mode)
-        client, vehicle, now = client_of(inbound), self.host.vehicle, self.host.clock.monotonic()
+        client, vehicle, now = inbound.client, self.host.vehicle, self.host.clock.monotonic()
         is_hold = mode is not None and EFFECT_OF_MODE[mode] is Effect.HOLD
         counted = not is_hold or vehicle.holds.arrive(client, now)
         self.host.run_action(client, change_mode(vehicle, mode, Right(client, Extent.ALL, now, counted)))

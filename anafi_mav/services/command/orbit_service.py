@@ -149,7 +149,7 @@ class OrbitService(Service, PlainTask):
         orbit = _Orbit(Lap(self._held_back(circle)), vehicle.cruise_speed)
         circle = orbit.lap.circle
         bearing = _bearing(circle.centre, start)
-        off = abs(geo.distance(*circle.centre.point, *here.point) - circle.radius)
+        off = abs(geo.distance(*circle.centre, *here) - circle.radius)
         is_away = off > ON_IT or abs((vehicle.drone.piloting.state.altitude or 0.0) - circle.height) > ON_IT
         if is_away:
             check_place(vehicle, start, start=here)
@@ -296,5 +296,5 @@ def _facing(behaviour: float) -> Facing:
 
 def _bearing(centre: GeoPoint, place: GeoPoint) -> float:
     """rad, clockwise from north, of a place seen from a centre."""
-    north, east = geo.offset(*centre.point, *place.point)
+    north, east = geo.offset(*centre, *place)
     return math.atan2(east, north)

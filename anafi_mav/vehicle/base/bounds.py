@@ -11,7 +11,7 @@ import math
 from anafi_mav import geo, texts
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
-from anafi_mav.vehicle.base.geo_point import GeoPoint, point_of
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.height import ESTIMATE_FLOOR
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
@@ -135,7 +135,7 @@ def check_place(vehicle: Aircraft, place: GeoPoint, *, start: GeoPoint | None = 
         if centre is not None:
             _check_geofence(vehicle, distance)
     try:
-        vehicle.fence.check_place(point_of(place), point_of(home), point_of(start))
+        vehicle.fence.check_place(place, home, start)
     except OutsideFence as error:
         raise Refused(texts.GOTO, error.reason, lasting=error.lasting) from error
 

@@ -36,8 +36,15 @@ from anafi_mav.vehicle.base.control_machine import (
     Step,
     step,
 )
-from anafi_mav.vehicle.base.flight_actions import FlightAction, FlightActions
-from anafi_mav.vehicle.base.flight_task import FlightTask, Needs, Preparation, TaskRules, lasting_needs
+from anafi_mav.vehicle.base.flight_task import (
+    FlightAction,
+    FlightActions,
+    FlightTask,
+    Needs,
+    Preparation,
+    TaskRules,
+    lasting_needs,
+)
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, text_of
 from anafi_mav.vehicle.base.requester import By, Source, client_of
