@@ -47,7 +47,10 @@ Work = Callable[[], Awaitable[None]]
 
 
 def require_standing(vehicle: Vehicle, what: OperatorText) -> None:
-    """Raise `Refused` unless the drone stands with its motors off; after a motor cut it may still be falling."""
+    """Raise `Refused` unless the drone stands with its motors off.
+
+    After a motor cut it may still be falling.
+    """
     if vehicle.flying_state is FlyingState.EMERGENCY:
         raise Refused(what, texts.EMERGENCY_STOP)
     if not vehicle.on_ground or vehicle.drone.piloting.about_to_fly:
