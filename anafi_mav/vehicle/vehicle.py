@@ -344,13 +344,17 @@ class Vehicle(Aircraft):
 
     async def _command_landing(self) -> None:
         """Land for a client, also at the end of its return: it is that client's landing."""
-        self._initiators.land_commanded(self._clock.monotonic())
+        self.note_landing_command()
         await self.drone.piloting.land()
+
+    def note_landing_command(self) -> None:
+        if not self.on_ground or self.drone.piloting.about_to_fly:  # else it ends no flight, and none that follows
+            self._initiators.land_commanded(self._clock.monotonic())
 
     async def return_home(self, by: By) -> None:
         """Fly home by the drone's own return. A landing goes on unless `by` may end it."""
         if self.on_ground:
-            raise Refused(texts.RETURN, texts.ON_GROUND)
+            raise Refused(texts.RETURN, self.activity)
         if self.return_end.shown:
             return  # it waits above home or lands there, and would climb and fly home once more
         if lands := self.landing:
@@ -374,19 +378,20 @@ class Vehicle(Aircraft):
         """Stop and hover. A landing or return goes on, and this is refused, unless `by` may end it.
 
         `chosen`: a client has chosen the mode by name or number. `pause`: setpoints of every client are ignored from
-        now on; what flew is what DO_PAUSE_CONTINUE goes on with.
+        now on; what flew is what DO_PAUSE_CONTINUE goes on with. During a pause the shown mode keeps both.
         """
-        hover = Hover(mode, client_of(by) if chosen else None, self._paused_task if pause else None)
+        pauses = pause or (self.control.paused and mode is self.mode)
+        hover = Hover(mode, client_of(by) if chosen else None, self._paused_task if pauses else None)
         task = self.manual if mode is FlightMode.POSITION else hover
         self._require_endable(task, by)
         own = self.returning_by_itself
         rising = self.drone.piloting.about_to_fly
-        pauses = pause or (self.control.paused and mode is self.mode)
+        ramping = self.flying_state is FlyingState.MOTOR_RAMPING
         async with self.control.acquire(task, by=by, pauses=pauses) as grant:
             if not self.on_ground or rising:
                 await self._stop(task, by, own=own)
             grant.begin(pauses=pauses and (rising or not self.on_ground))
-        if rising:
+        if rising or ramping:
             self.text(Severity.WARNING, texts.MODE_MAY_RISE.fill(mode=mode.value))
 
     def end_inputs_of_others(self) -> None:
@@ -436,8 +441,10 @@ class Vehicle(Aircraft):
     @property
     def interrupted(self) -> FlightTask | None:
         """The goto or mission that a pause has stopped, while nothing else was commanded since."""
-        below = self.control.below
-        return below.resumes if isinstance(below, Hover) and self.control.active is below else None
+        control = self.control
+        is_pending = control.state in (State.RELEASING, State.ACQUIRING)
+        below = control.next_below if is_pending else control.below
+        return below.resumes if isinstance(below, Hover) and (is_pending or control.active is below) else None
 
     async def take_off(self, ato: float | None, by: Right) -> None:
         """Take off to a height, or end a landing: then the drone hovers where it is."""
@@ -834,7 +841,7 @@ class Vehicle(Aircraft):
             return
         if self.control.leaves_to_pilot(Source.GATEWAY):
             if self.drone.piloting.about_to_fly:
-                await self.drone.piloting.land()
+                await self._command_landing()
             return
         await self.control.perform(self._stay())
 
@@ -842,7 +849,7 @@ class Vehicle(Aircraft):
         """Hover, or stay on the ground."""
         async with self.control.acquire(Hover(), by=Source.GATEWAY):
             if self.drone.piloting.about_to_fly:
-                await self.drone.piloting.land()
+                await self._command_landing()
             if not self.on_ground:
                 await self.drone.piloting.stop()
 
