@@ -275,7 +275,7 @@ def operator_refusal_of(control: OperatorControl, request: Request) -> Refused |
 
     None: it is permitted.
     """
-    if not isinstance(request.by, Right) or not request.rules.is_flight:
+    if control.is_free or not isinstance(request.by, Right) or not request.rules.is_flight:
         return None
     need = Need.FLY if request.rules.needs_operator else Need.COMMAND
     reason = control.objection(request.by.system, need)

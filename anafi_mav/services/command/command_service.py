@@ -25,7 +25,6 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.command.command_log import CommandLog, Refusal
-from anafi_mav.services.command_targets import UnsupportedFrame
 from anafi_mav.services.commands import (
     LATE_PROGRESS_AFTER,
     PROGRESS_AFTER,
@@ -44,6 +43,7 @@ from anafi_mav.services.commands import (
 )
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Query, Service, channel_of
+from anafi_mav.vehicle.base.bounds import UnsupportedFrame
 from anafi_mav.vehicle.base.flight_task import FlightAction, FlightActions
 from anafi_mav.vehicle.base.refusal import NotInControl, Refused, Unsupported, text_of
 from anafi_mav.vehicle.base.severity import Severity

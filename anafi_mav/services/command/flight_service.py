@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.command_targets import height, place
 from anafi_mav.services.commands import (
     EFFECT_OF_MODE,
     Action,
@@ -108,7 +107,7 @@ class FlightService(Service):
         if command.frame is None and relative and not math.isnan(command.z):
             await vehicle.take_off(command.z, command.right)
             return
-        await vehicle.take_off(height(vehicle, command), command.right)
+        await vehicle.take_off(command.height(vehicle), command.right)
 
     async def _reposition(self, command: Command) -> None:
         """Run MAV_CMD_DO_REPOSITION: go to a place, height and heading.
@@ -124,7 +123,7 @@ class FlightService(Service):
             raise Refused(texts.GOTO, texts.PARAM1_SPEED_HEADING, lasting=True)
         if speed > 0.0 and not SLOWEST <= speed <= FASTEST:
             raise Refused(texts.SPEED, texts.SPEED_RANGE.fill(slowest=SLOWEST, fastest=FASTEST), lasting=True)
-        where, ato, heading = place(command), height(vehicle, command), _heading(command)
+        where, ato, heading = command.place(), command.height(vehicle), _heading(command)
         mode = command.flavour.guided_mode
         if where is None and ato is None and heading is None:
             if speed > 0.0:

@@ -16,11 +16,18 @@ from anafi_mav.drone.events import RthHomeType
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.command_targets import UnsupportedFrame, height, height_in_frame, place
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Service
-from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST, check_height, check_on_earth, home_height
+from anafi_mav.vehicle.base.bounds import (
+    FASTEST,
+    SLOWEST,
+    UnsupportedFrame,
+    check_height,
+    check_on_earth,
+    height_in_frame,
+    home_height,
+)
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
@@ -261,10 +268,10 @@ class GuidedService(Service):
             if where is None:
                 raise Refused(texts.HOME, texts.POSITION_UNKNOWN)
         else:
-            where = place(command)
+            where = command.place()
             if where is None:
                 raise Refused(texts.HOME, texts.NO_PLACE, lasting=True)
-            ato = height(vehicle, command, flown=False) or 0.0
+            ato = command.height(vehicle, flown=False) or 0.0
         check_on_earth(where, texts.HOME)
         async with vehicle.home_choice:
             before = home.state.preferred_type

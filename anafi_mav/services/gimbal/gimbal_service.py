@@ -20,7 +20,6 @@ from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.command_targets import height, place
 from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.dropped_inputs import InputStream
 from anafi_mav.services.flavours import Flavour, flavour_of
@@ -340,12 +339,12 @@ class GimbalService(Service):
         await self._look_at_place(command)
 
     async def _look_at_place(self, command: Command) -> None:
-        where = place(command)
+        where = command.place()
         if where is None:
             raise Refused(texts.ROI, texts.NO_PLACE, lasting=True)
         if command.frame is None and command.flavour.relative_long_regions:
             command = replace(command, frame=dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT)
-        await self._look(command, where, height(self.host.vehicle, command, flown=False) or 0.0)
+        await self._look(command, where, command.height(self.host.vehicle, flown=False) or 0.0)
 
     async def _look(self, command: Command, where: GeoPoint, ato: float) -> None:
         self._require_control(command.client)
@@ -381,7 +380,7 @@ class GimbalService(Service):
         is_none = kind == dialect.MAV_ROI_NONE or math.isnan(kind)
         if not is_none and kind != dialect.MAV_ROI_LOCATION:
             raise Refused(texts.ROI, texts.ROI_KINDS, lasting=True)
-        if (is_none and place(command) is None) or (command.x == 0.0 and command.y == 0.0):
+        if (is_none and command.place() is None) or (command.x == 0.0 and command.y == 0.0):
             self._require_control(command.client)
             await self._roi.stop()
         else:
