@@ -83,7 +83,10 @@ def _number(word: str, item: int, source: str) -> float | None:
 
 
 def text_of(header: str, items: list[Item], current: int | None = 0, unset: str = UNSET) -> bytes:
-    """A file of these items; `current` is the one that is marked, `unset` stands for a value that is not set."""
+    """Return a file of these items.
+
+    `current` is the one that is marked, `unset` stands for a value that is not set.
+    """
     lines = [header]
     for number, item in enumerate(items):
         numbers = "\t".join([unset if value is None else _decimal(value) for value in item.params])
