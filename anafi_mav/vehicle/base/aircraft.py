@@ -294,6 +294,10 @@ class Aircraft(ABC):
         """
 
     @abstractmethod
+    def note_landing_command(self) -> None:
+        """Note that a landing is about to be sent: it is a client's, not the drone's own."""
+
+    @abstractmethod
     async def terminate(self, by: By) -> None:
         """Cut the motors, if the configuration allows it at all."""
 
