@@ -366,7 +366,7 @@ class ZenohSession:
                 self._queue.add_work(lambda session: None)
 
     def _declare_beside(self, lost: Collection[str]) -> None:
-        """Declare in a session of their own what these tokens and probes stand for. Nothing is ended."""
+        """Declare in a session of their own what these tokens and probes stand for."""
         places = [
             (kind, key)
             for kind, key in tuple(self._declarations)
