@@ -351,17 +351,11 @@ class Vehicle(Aircraft):
 
     async def return_home(self, by: By) -> None:
         """Fly home by the drone's own return. A landing goes on unless `by` may end it."""
-        if self.on_ground:
-            raise Refused(texts.RETURN, texts.ON_GROUND)
         if self.return_end.shown:
             return  # it waits above home or lands there, and would climb and fly home once more
-        if lands := self.landing:
-            self._require_endable(self.return_end, by)
-            if self.drone.home.state.rth == RthState.UNAVAILABLE:  # the landing would be ended for nothing
-                raise Refused(texts.RETURN, texts.RETURN_UNAVAILABLE)
-        async with self.control.acquire(self.return_end, by=by):
-            if (lands or self.landing) and await self.drone.piloting.settle_landing():
-                self._require_endable(self.return_end, by)
+        async with self.control.acquire(self.return_end, by=by, condition=lambda: self._require_return(by)):
+            if await self.drone.piloting.settle_landing():
+                self._require_return(by)
                 await self._end_landing(by)
             self._initiators.return_commanded(self._clock.monotonic())
             attempt = self.return_end.command()
@@ -372,6 +366,15 @@ class Vehicle(Aircraft):
                 raise
         self.return_end.announce(attempt, system_of(client_of(by)))
 
+    def _require_return(self, by: By) -> None:
+        """Raise `Refused` when the drone stands, or lands and `by` may not end that."""
+        if self.on_ground:
+            raise Refused(texts.RETURN, texts.ON_GROUND)
+        if self.landing:
+            self._require_endable(self.return_end, by)
+            if self.drone.home.state.rth == RthState.UNAVAILABLE:  # the landing would be ended for nothing
+                raise Refused(texts.RETURN, texts.RETURN_UNAVAILABLE)
+
     async def hold(self, mode: FlightMode, by: By, *, chosen: bool = False, pause: bool = False) -> None:
         """Stop and hover. A landing or return goes on, and this is refused, unless `by` may end it.
 
@@ -380,11 +383,12 @@ class Vehicle(Aircraft):
         """
         hover = Hover(mode, client_of(by) if chosen else None, self._paused_task if pause else None)
         task = self.manual if mode is FlightMode.POSITION else hover
-        self._require_endable(task, by)
         own = self.returning_by_itself
         rising = self.drone.piloting.about_to_fly
         pauses = pause or (self.control.paused and mode is self.mode)
-        async with self.control.acquire(task, by=by, pauses=pauses) as grant:
+        async with self.control.acquire(
+            task, by=by, pauses=pauses, condition=lambda: self._require_endable(task, by)
+        ) as grant:
             if not self.on_ground or rising:
                 await self._stop(task, by, own=own)
             grant.begin(pauses=pauses and (rising or not self.on_ground))
@@ -446,8 +450,7 @@ class Vehicle(Aircraft):
         if not self.landing or self.on_ground:
             await self.takeoff.take_off(ato, by)
             return
-        self._require_endable(self.takeoff, by)
-        async with self.control.acquire(Hover(), by=by):
+        async with self.control.acquire(Hover(), by=by, condition=lambda: self._require_endable(self.takeoff, by)):
             if await self.drone.piloting.settle_landing():
                 await self._end_landing(by, take_off=True)
             if self.on_ground:
@@ -554,8 +557,7 @@ class Vehicle(Aircraft):
         Returns at once when the drone neither lands nor returns.
         """
         if self.descends:
-            self._require_endable(task, by)
-            async with self.control.acquire(Hover(), by=by):
+            async with self.control.acquire(Hover(), by=by, condition=lambda: self._require_endable(task, by)):
                 await self._stop(task, by)
 
     async def _stop(self, task: FlightTask, by: By, *, own: bool = False) -> None:
@@ -564,8 +566,6 @@ class Vehicle(Aircraft):
         `own`: the drone returned by itself when the command arrived. A return that it begins afterwards goes on.
         """
         piloting, home, right = self.drone.piloting, self.drone.home, right_of(by)
-        if self.landing:  # it may have begun during the wait for what flew
-            self._require_endable(task, by)
         await self._end_landing(by)
         announced = None if right is None else self._announced_for(task, right)
         if own and right is not None and self.returning_by_itself:
@@ -573,6 +573,7 @@ class Vehicle(Aircraft):
             await piloting.cancel_return_home(even_its_own=True)
             self._return_aborted(right, reason)
         await piloting.stop()
+        self._require_endable(task, by)  # what began meanwhile
         # One asked for through another controller, or before the link was lost. Raises when it is the drone's own.
         await piloting.cancel_return_home()
         if await piloting.settle_landing() or self.landing:  # one that began meanwhile

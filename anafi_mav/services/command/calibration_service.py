@@ -16,8 +16,8 @@ from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.service import Service
-from anafi_mav.texts import OperatorText
-from anafi_mav.vehicle.base.flight_task import MAINTENANCE
+from anafi_mav.texts import OperatorText, Subject
+from anafi_mav.vehicle.base.flight_task import maintenance
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
 
@@ -83,7 +83,7 @@ class CalibrationService(Service):
         wanted = {index: value for index, value in enumerate(values, 1) if value != 0.0}
         if not wanted:
             if self.host.vehicle.on_ground:
-                await self._acquire(command)  # ends the one that runs
+                await self._acquire(command, texts.CALIBRATION)  # ends the one that runs
         elif wanted == {2: _MAGNETOMETER}:
             await self._on_ground(command, texts.CALIBRATION, self._magnetometer)
         elif wanted == {5: _HORIZON}:
@@ -93,16 +93,13 @@ class CalibrationService(Service):
             self.host.text(Severity.ERROR, texts.CAL_FAILED.fill(error=texts.CALIBRATIONS))
             raise Refused(texts.CALIBRATION, texts.CALIBRATIONS, lasting=True)
 
-    async def _on_ground(self, command: Command, what: OperatorText, work: Work) -> None:
-        vehicle = self.host.vehicle
-        if not vehicle.on_ground or vehicle.drone.piloting.about_to_fly:
-            raise Refused(what, texts.NOT_ON_GROUND)
-        await self._acquire(command)
+    async def _on_ground(self, command: Command, what: Subject, work: Work) -> None:
+        await self._acquire(command, what)
         await work()
 
-    async def _acquire(self, command: Command) -> None:
-        """End what flies, or is calibrated."""
-        async with self.host.vehicle.control.acquire(MAINTENANCE, by=command.right):
+    async def _acquire(self, command: Command, what: Subject) -> None:
+        """End what is about to fly, or is calibrated."""
+        async with self.host.vehicle.control.acquire(maintenance(what), by=command.right):
             pass
 
     async def _told(

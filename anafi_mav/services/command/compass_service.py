@@ -18,7 +18,7 @@ from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.service import Host, Service
-from anafi_mav.vehicle.base.flight_task import MAINTENANCE
+from anafi_mav.vehicle.base.flight_task import maintenance
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
 
@@ -72,10 +72,7 @@ class CompassService(Service):
         once and does not restart.
         """
         _check_mask(command)
-        vehicle = self.host.vehicle
-        if not vehicle.on_ground or vehicle.drone.piloting.about_to_fly:
-            raise Refused(texts.COMPASS_CALIBRATION, texts.NOT_ON_GROUND)
-        async with vehicle.control.acquire(MAINTENANCE, by=command.right):
+        async with self.host.vehicle.control.acquire(maintenance(texts.COMPASS_CALIBRATION), by=command.right):
             pass
         self._succeeded = False
         await self.host.drone.calibration.start_magnetometer()

@@ -20,7 +20,7 @@ from anafi_mav.services.command_targets import UnsupportedFrame, height, height_
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Service, client_of
-from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST, check_height, check_on_earth, home_height
+from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST, check_on_earth, home_height
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
@@ -90,12 +90,11 @@ async def change_altitude(vehicle: Vehicle, ato: float, flavour: Flavour, by: Ri
     if goto is None:
         await vehicle.guided.reposition(None, ato, None, mode=flavour.guided_mode, by=by)
     else:
-        check_height(vehicle, ato)
         move = vehicle.drone.piloting.move
         # MAVProxy says it as a command and as an item at once, and means one move. If nothing comes of that, the newer
         # order stands for itself.
         if goto.at_height(ato) != goto or move is None or not await move.under_way():
-            await vehicle.guided.go(goto.at_height(ato), by=by)
+            await vehicle.guided.go(goto.at_height(ato), by=by, condition=lambda: vehicle.guided.check(goto.place, ato))
 
 
 def _effect_of_pause(command: Command) -> Effect:
