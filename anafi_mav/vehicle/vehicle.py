@@ -354,9 +354,7 @@ class Vehicle(Aircraft):
         if self.return_end.shown:
             return  # it waits above home or lands there, and would climb and fly home once more
         async with self.control.acquire(self.return_end, by=by, condition=lambda: self._require_return(by)):
-            if await self.drone.piloting.settle_landing():
-                self._require_return(by)
-                await self._end_landing(by)
+            await self._end_settled_landing(self.return_end, by)
             self._initiators.return_commanded(self._clock.monotonic())
             attempt = self.return_end.command()
             try:
@@ -451,8 +449,7 @@ class Vehicle(Aircraft):
             await self.takeoff.take_off(ato, by)
             return
         async with self.control.acquire(Hover(), by=by, condition=lambda: self._require_endable(self.takeoff, by)):
-            if await self.drone.piloting.settle_landing():
-                await self._end_landing(by, take_off=True)
+            await self._end_settled_landing(self.takeoff, by, take_off=True)
             if self.on_ground:
                 raise Refused(texts.LANDING, texts.ALREADY_LANDED, form=texts.NOT_ABORTED)
 
@@ -576,9 +573,7 @@ class Vehicle(Aircraft):
         self._require_endable(task, by)  # what began meanwhile
         # One asked for through another controller, or before the link was lost. Raises when it is the drone's own.
         await piloting.cancel_return_home()
-        if await piloting.settle_landing() or self.landing:  # one that began meanwhile
-            self._require_endable(task, by)
-            await self._end_landing(by)
+        if await self._end_settled_landing(task, by):  # one that began meanwhile
             await piloting.stop()
         if announced is not None and right is not None:
             await self._answer_announced(announced, right)
@@ -629,6 +624,13 @@ class Vehicle(Aircraft):
             self.flight_facts = replace(self.flight_facts, aborted_return=None)
         elif aborted is not None and aborted.due(self, now):
             aborted.report(self, now)
+
+    async def _end_settled_landing(self, task: FlightTask, by: By, *, take_off: bool = False) -> bool:
+        """End a landing, also one that a withdrawn command has begun; return True if there is one."""
+        if lands := await self.drone.piloting.settle_landing() or self.landing:
+            self._require_endable(task, by)
+            await self._end_landing(by, take_off=take_off)
+        return lands
 
     async def _end_landing(self, by: By, *, take_off: bool = False) -> None:
         """End the landing that the drone flies; at once when it flies none."""

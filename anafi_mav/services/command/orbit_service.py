@@ -73,7 +73,7 @@ class _Orbit:
 class OrbitService(Service, PlainTask):
     """Flies circles; the vehicle's flight task while it does."""
 
-    rules = TaskRules(texts.ORBIT, needs=Needs.NO_DESCENT | Needs.IN_AIR | Needs.FIX | STEERING)
+    rules = TaskRules(texts.ORBIT, needs=Needs.NO_DESCENT | Needs.IN_AIR | Needs.FIX | Needs.LIMITS | STEERING)
     mode = FlightMode.ORBIT
 
     def __init__(self, host: Host) -> None:
