@@ -538,7 +538,7 @@ class Gateway:
         found = supervised.system.position
         position = None
         if found is not None:
-            latitude, longitude = found.place.point
+            latitude, longitude = found.place
             age = round(self._clock.monotonic() - found.at, 2)
             position = StatePosition(latitude=latitude, longitude=longitude, amsl_m=round(found.amsl, 2), age_s=age)
         drone = self._report.drone(supervised.reported(), self.relay)

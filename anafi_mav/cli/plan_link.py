@@ -31,8 +31,7 @@ from anafi_mav.plans.plan import (
     without_zero_heading,
 )
 from anafi_mav.services.memory import NOT_KEPT
-from anafi_mav.services.plan.item_messages import item_int, item_of
-from anafi_mav.services.plan.mission_items import from_wire, to_wire
+from anafi_mav.services.plan.item_messages import from_wire, item_int, item_of, to_wire
 from anafi_mav.vehicle.fence.plan_items import PlanFault, PlanItem
 
 MISSION, FENCE, RALLY = (

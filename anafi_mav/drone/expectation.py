@@ -96,11 +96,14 @@ class Expectation(Generic[T]):
         if not self.future.done():
             self.future.set_exception(error)
 
-    def expire_after(self, seconds: float, error: AnafiMavError) -> None:
-        """(Re)start the clock: the wait fails with this error when nothing has come by then."""
+    def expire_after(self, seconds: float, what: str) -> None:
+        """(Re)start the clock: the wait fails with `CommandTimeout` about `what` after this time."""
         if self._timer is not None:
             self._timer.cancel()
-        self._timer = self.future.get_loop().call_later(seconds, self.fail, error)
+        self._timer = self.future.get_loop().call_later(seconds, self._expire, what, seconds)
+
+    def _expire(self, what: str, seconds: float) -> None:
+        self.fail(CommandTimeout(what, seconds))
 
     async def wait(self) -> T:
         """Return the judge's result.
@@ -122,7 +125,7 @@ class Expectation(Generic[T]):
         False when the drone has received the command and then reported nothing. Raises `CommandTimeout` when neither
         is known in time, `LinkLost`.
         """
-        self.expire_after(timeout, CommandTimeout(what, timeout))
+        self.expire_after(timeout, what)
         either: set[asyncio.Future[Any]] = {self.future, delivery}
         await asyncio.wait(either, return_when=asyncio.FIRST_COMPLETED)
         if not self.future.done():
@@ -415,4 +418,4 @@ class Commander:
         except BaseException:
             expectation.close()
             raise
-        expectation.expire_after(timeout, CommandTimeout(command.NAME, timeout))
+        expectation.expire_after(timeout, command.NAME)

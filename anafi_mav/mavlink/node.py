@@ -11,7 +11,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import Counter, defaultdict
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
 import msgspec
@@ -52,6 +52,11 @@ class Inbound(msgspec.Struct, frozen=True):
     """False when it needs more than the access of its channel: it must have no effect."""
     is_late: bool = False
     """True for a command or mode that may have been sent while the host stalled: only a stop has an effect."""
+
+    @property
+    def client(self) -> Hashable:
+        """The sender, as a key among all clients."""
+        return (self.channel, self.sysid, self.compid)
 
 
 Receiver = Callable[[Inbound], None]

@@ -34,14 +34,13 @@ from anafi_mav.services.camera.panorama_service import PanoramaService
 from anafi_mav.services.camera.storage_service import StorageService
 from anafi_mav.services.camera_definition.param_ext_service import ParamExtService
 from anafi_mav.services.command.calibration_service import CalibrationService
-from anafi_mav.services.command.command_service import SETTLE
+from anafi_mav.services.command.command_service import SETTLE, RunningActions
 from anafi_mav.services.command.compass_service import CompassService
 from anafi_mav.services.command.flight_service import FlightService
 from anafi_mav.services.command.guided_service import GuidedService
 from anafi_mav.services.command.modes_service import ModesService
 from anafi_mav.services.command.operator_need import stop_of
 from anafi_mav.services.command.orbit_service import OrbitService
-from anafi_mav.services.command.running_actions import RunningActions
 from anafi_mav.services.commands import Effect
 from anafi_mav.services.component import BY_AUTOPILOT, Component, joined
 from anafi_mav.services.dropped_inputs import DroppedInputs, InputStream
@@ -87,9 +86,9 @@ from anafi_mav.services.telemetry.telemetry_service import CHANGES, TelemetrySer
 from anafi_mav.services.telemetry.video_service import VideoTelemetryService
 from anafi_mav.services.video.video_stream_service import VideoStreamService
 from anafi_mav.texts import OperatorText
-from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.height import TakeoffRecord
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.right import system_of
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import (
     EventHandler,

@@ -106,12 +106,13 @@ class Takeoff(PlainTask):
     @property
     def climbing(self) -> bool:
         """The climb that follows the drone's own take-off is under way."""
-        return self._situation.state is State.CLIMBING
+        attempt = self._situation.attempt
+        return isinstance(attempt, RunningTakeoff) and attempt.climbs
 
     @property
     def under_way(self) -> bool:
         """An accepted take-off has not reached its height yet."""
-        return self._situation.task is not None
+        return isinstance(self._situation.attempt, RunningTakeoff)
 
     @property
     def rises(self) -> bool:

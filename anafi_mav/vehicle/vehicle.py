@@ -38,7 +38,6 @@ from anafi_mav.errors import CommandRejected
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.aborted_return import AbortedReturn
 from anafi_mav.vehicle.base.aircraft import Aircraft, CommandedSpeeds
-from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.control_machine import DroneAct, State
 from anafi_mav.vehicle.base.flight_task import LAND, MOTOR_CUT, FlightTask, Hover
 from anafi_mav.vehicle.base.flying import AIRBORNE, LANDING, ON_GROUND, TAKING_OFF
@@ -47,13 +46,12 @@ from anafi_mav.vehicle.base.height import ESTIMATE_ERROR, TakeoffRecord
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import By, Source, client_of, right_of
-from anafi_mav.vehicle.base.right import Extent, Right
+from anafi_mav.vehicle.base.right import Extent, Right, system_of
 from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.controller_inputs import ControllerInputs
 from anafi_mav.vehicle.fence.rally import RallyPoints
-from anafi_mav.vehicle.flight_policy import operator_refusal_of
 from anafi_mav.vehicle.follow_flight import FollowFlight
 from anafi_mav.vehicle.guided_flight import GuidedFlight
 from anafi_mav.vehicle.hold_rule import APART, HoldRule
@@ -63,7 +61,7 @@ from anafi_mav.vehicle.link_loss import LossPolicy
 from anafi_mav.vehicle.manual_flight import ManualFlight
 from anafi_mav.vehicle.mission.flight import MissionFlight
 from anafi_mav.vehicle.offboard.flight import OffboardFlight
-from anafi_mav.vehicle.operator_control import Need, OperatorControl
+from anafi_mav.vehicle.operator_control import Need, OperatorControl, operator_refusal_of
 from anafi_mav.vehicle.pilot_switch import PilotSwitch
 from anafi_mav.vehicle.return_end import ReturnEnd
 from anafi_mav.vehicle.takeoff import Takeoff
@@ -377,13 +375,13 @@ class Vehicle(Aircraft):
         """Stop and hover. A landing or return goes on, and this is refused, unless `by` may end it.
 
         `chosen`: a client has chosen the mode by name or number. `pause`: setpoints of every client are ignored from
-        now on; what flew is what DO_PAUSE_CONTINUE goes on with.
+        now on; what flew is what DO_PAUSE_CONTINUE goes on with. During a pause the shown mode keeps both.
         """
-        hover = Hover(mode, client_of(by) if chosen else None, self._paused_task if pause else None)
+        pauses = pause or (self.control.paused and mode is self.mode)
+        hover = Hover(mode, client_of(by) if chosen else None, self._paused_task if pauses else None)
         task = self.manual if mode is FlightMode.POSITION else hover
         own = self.returning_by_itself
         rising = self.drone.piloting.about_to_fly
-        pauses = pause or (self.control.paused and mode is self.mode)
         async with self.control.acquire(
             task, by=by, pauses=pauses, condition=lambda: self._require_endable(task, by)
         ) as grant:
@@ -440,8 +438,10 @@ class Vehicle(Aircraft):
     @property
     def interrupted(self) -> FlightTask | None:
         """The goto or mission that a pause has stopped, while nothing else was commanded since."""
-        below = self.control.below
-        return below.resumes if isinstance(below, Hover) and self.control.active is below else None
+        control = self.control
+        is_pending = control.state in (State.RELEASING, State.ACQUIRING)
+        below = control.next_below if is_pending else control.below
+        return below.resumes if isinstance(below, Hover) and (is_pending or control.active is below) else None
 
     async def take_off(self, ato: float | None, by: Right) -> None:
         """Take off to a height, or end a landing: then the drone hovers where it is."""
@@ -779,7 +779,7 @@ class Vehicle(Aircraft):
         height, origin = self.height, self.origin
         if self.on_ground or not height.flight_id or height.takeoff_amsl is None:
             return None
-        place = (None, None) if origin is None else origin.point
+        place = (None, None) if origin is None else origin
         return TakeoffRecord(height.flight_id, height.takeoff_amsl, height.estimated, *place)
 
     def on_return(self) -> None:

@@ -17,7 +17,6 @@ from anafi_mav.drone import events
 from anafi_mav.drone.piloting.moves import Move, MoveEnd
 from anafi_mav.drone.values import Values
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.command_targets import height, place
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.stream import MessageStream, Times
@@ -162,7 +161,7 @@ class OrbitService(Service, PlainTask):
             raise Refused(texts.ORBIT, texts.NO_FIX)
         check_height(vehicle, circle.height)
         start = entry(circle, here)
-        off = abs(geo.distance(*circle.centre.point, *here.point) - circle.radius)
+        off = abs(geo.distance(*circle.centre, *here) - circle.radius)
         is_away = off > ON_IT or abs((vehicle.drone.piloting.state.altitude or 0.0) - circle.height) > ON_IT
         check_place(vehicle, start, start=here if is_away else None)
         for before, point in pairwise(outline(circle)):
@@ -173,7 +172,7 @@ class OrbitService(Service, PlainTask):
         vehicle, piloting = self.host.vehicle, self.host.drone.piloting.state
         radius, speed, facing, angle = command.params
         running = self.circle
-        where = place(command) or (None if running is None else running.centre) or vehicle.place
+        where = command.place() or (None if running is None else running.centre) or vehicle.place
         if where is None:
             raise Refused(texts.ORBIT, texts.ORBIT_NO_CENTRE)
         check_on_earth(where, texts.ORBIT)
@@ -189,7 +188,7 @@ class OrbitService(Service, PlainTask):
             angle = math.inf
         if angle < 0.0:
             raise Refused(texts.ORBIT, texts.PARAM4_ORBIT, lasting=True)
-        ato = height(vehicle, command)
+        ato = command.height(vehicle)
         if ato is None:
             ato = piloting.altitude if running is None else running.height
         if ato is None:
@@ -297,5 +296,5 @@ def _facing(behaviour: float) -> Facing:
 
 def _bearing(centre: GeoPoint, place: GeoPoint) -> float:
     """rad, clockwise from north, of a place seen from a centre."""
-    north, east = geo.offset(*centre.point, *place.point)
+    north, east = geo.offset(*centre, *place)
     return math.atan2(east, north)

@@ -2,7 +2,7 @@
 
 For clients of endpoints with `operator_control`; for the others both do not exist, because stations of before 2026 take
 CONTROL_STATUS for a damaged frame. `vehicle.operator_control` decides. The role that a message needs is in
-`operator_need`, that of a flight task in `vehicle.flight_policy`.
+`operator_need`, that of a flight task in `operator_refusal_of`.
 """
 
 from __future__ import annotations

@@ -14,7 +14,6 @@ from anafi_mav.drone import Drone
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Node
 from anafi_mav.services import commands, system
-from anafi_mav.services.command_targets import height
 from anafi_mav.services.commands import (
     Action,
     ActionGroup,
@@ -303,4 +302,4 @@ def test_height_of_a_command_without_altitude_raises() -> None:
     definition = Definition(location=True, altitude=Altitude.UNUSED, effect=Effect.CHANGE)
     vehicle: Any = None
     with pytest.raises(ValueError, match="its row says that it has no height"):
-        height(vehicle, Command(21, definition, (NAN, NAN, NAN, NAN), 48.0, 2.0, 10.0, None))
+        Command(21, definition, (NAN, NAN, NAN, NAN), 48.0, 2.0, 10.0, None).height(vehicle)
