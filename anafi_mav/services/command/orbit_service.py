@@ -152,7 +152,7 @@ class OrbitService(Service, PlainTask):
                 self._begin(orbit)
 
     def _way(self, circle: Circle) -> tuple[GeoPoint, bool]:
-        """Return the point at which the circle begins, and True when the drone is away from the circle.
+        """Return the first point of the circle, and True when the drone is away from it.
 
         Raises `Refused` for a way or a circle that may not be flown.
         """

@@ -410,7 +410,10 @@ class MissionFlight(PlainTask):
             self._vehicle.text(Severity.WARNING, texts.MISSION_PAYLOAD_CHANGED)
 
     def _require_freedom(self, attempt: MissionAttempt, *, ends_return: bool = False) -> None:
-        """Raise `Refused` while the drone may not fly it; `ends_return`: a return is the mission's own."""
+        """Raise `Refused` while the drone may not fly an attempt.
+
+        `ends_return`: a return under way is the mission's own.
+        """
         vehicle = self._vehicle
         self._require_same(attempt)
         if vehicle.returning_by_itself:

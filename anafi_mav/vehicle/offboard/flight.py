@@ -360,7 +360,7 @@ class OffboardFlight(PlainTask):
             self._begin()
 
     def _pilot_for(self, client: Hashable) -> Hashable:
-        """Return the client whose setpoints mode Offboard flies for this one; raises `Refused` without one."""
+        """Return the client whose setpoints mode Offboard flies for this one, or raise `Refused`."""
         self._require_freedom(texts.OFFBOARD)
         pilot = self._stream.candidate(client, self._clock.monotonic())
         if pilot is None:
