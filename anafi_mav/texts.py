@@ -341,6 +341,7 @@ SETPOINT_TAKEOFF_SOON = Template("Takeoff by setpoints of system {system} in 1 s
 SETPOINT_TAKEOFF_NO_CLIMB = OperatorText("Takeoff by setpoints cancelled: no climb")
 SETPOINT_TAKEOFF_CANCELLED = OperatorText("Takeoff by setpoints cancelled")
 SETPOINT_TAKEOFF_FAILED = Template("Takeoff by setpoints failed: {error}", error=BELOW)
+ORIGIN_KEPT = OperatorText("Origin not set: it is the takeoff point")
 TAKEOFF_AMSL_ESTIMATED = Template("Take-off altitude estimated: GPS only (+-{error:g} m)", error=10)
 TAKEOFF_AMSL_INACCURATE = Template("Take-off altitude inaccurate: GPS +-{error} m", error=9999)
 

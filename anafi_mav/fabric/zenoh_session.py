@@ -11,7 +11,6 @@ declaration of ours, or its end, was lost on the way there.
 
 from __future__ import annotations
 
-import json
 import logging
 import threading
 from collections.abc import Callable, Mapping
@@ -29,7 +28,15 @@ from anafi_mav.fabric.arrivals import (
     TokenChange,
     TokensListed,
 )
-from anafi_mav.fabric.declaration_check import AgreedLooks, DeclarationCheck, KnownKeys, is_probe, probe_of
+from anafi_mav.fabric.declaration_check import (
+    AgreedLooks,
+    DeclarationCheck,
+    KnownKeys,
+    configured,
+    is_probe,
+    list_proven,
+    probe_of,
+)
 from anafi_mav.fabric.envelope import MAX_SAMPLE
 
 logger = logging.getLogger(__name__)
@@ -145,11 +152,11 @@ class ZenohSession:
     def list_tokens(self, *expressions: str) -> None:
         """Report the tokens of these keys once, and then the end of the list.
 
-        A list that the router does not complete in time is requested again.
+        A list that the router does not complete in time is requested again. It may still lack tokens (`list_proven`):
+        those of others are reported when they come, and an id that two hold is decided then.
         """
 
         def work(session: zenoh.Session) -> None:
-            is_complete = False
             for _ in range(LIST_TRIES):
                 is_complete = True
                 for expression in expressions:
@@ -160,9 +167,16 @@ class ZenohSession:
                             is_complete = False  # an error: "Timeout"
                 if is_complete or self._stopping.is_set():
                     break
-            self._report(TokensListed(is_complete))
+            self._report(TokensListed())
 
         self._queue.add_work(work)
+
+    def proven_tokens(self, expression: str, witness: str) -> set[str]:
+        """Return the tokens that the router knows; none without a complete list.
+
+        Blocks, in any thread. Another session looks, and finds `witness`, a token of this one.
+        """
+        return list_proven(self._settings, expression, witness, self._stopping)
 
     def subscribe(self, expression: str) -> None:
         """Report samples with these keys."""
@@ -271,10 +285,7 @@ class ZenohSession:
     def _open(self) -> zenoh.Session | None:
         while not self._stopping.is_set():
             try:
-                config = zenoh.Config()
-                for key, value in self._settings.items():
-                    config.insert_json5(key, json.dumps(value))
-                session = zenoh.open(config)
+                session = zenoh.open(configured(self._settings))
             except zenoh.ZError as error:
                 # Its text goes on with the place in zenoh's sources.
                 problem = str(error).partition(" at /")[0]

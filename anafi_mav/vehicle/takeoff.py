@@ -169,6 +169,7 @@ class Takeoff(PlainTask):
                 raise Refused(texts.DISARM, texts.JUST_TAKEN_OFF)
         elif self._turns_near_ground:
             async with vehicle.control.acquire(DISARM, by=by):
+                vehicle.note_landing_command()
                 await vehicle.drone.piloting.stop_motors(force=force)
         elif force:
             await vehicle.terminate(by)
@@ -180,10 +181,14 @@ class Takeoff(PlainTask):
     @property
     def _airborne(self) -> OperatorText:
         """Return the reason of a refusal while the drone does not report that it stands."""
-        return texts.FLYING_STATE_UNKNOWN if self._vehicle.flying_state is None else texts.IN_AIR
+        state = self._vehicle.flying_state
+        if state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF):
+            return texts.STARTS_MOTORS
+        return texts.FLYING_STATE_UNKNOWN if state is None else texts.IN_AIR
 
     async def _land(self, by: By) -> None:
         async with self._vehicle.control.acquire(DISARM, by=by):
+            self._vehicle.note_landing_command()
             await self._vehicle.drone.piloting.land()
 
     def _set_disarmed(self) -> None:

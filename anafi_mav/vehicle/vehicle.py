@@ -344,8 +344,12 @@ class Vehicle(Aircraft):
 
     async def _command_landing(self) -> None:
         """Land for a client, also at the end of its return: it is that client's landing."""
-        self._initiators.land_commanded(self._clock.monotonic())
+        self.note_landing_command()
         await self.drone.piloting.land()
+
+    def note_landing_command(self) -> None:
+        if not self.on_ground or self.drone.piloting.about_to_fly:  # else it ends no flight, and none that follows
+            self._initiators.land_commanded(self._clock.monotonic())
 
     async def return_home(self, by: By) -> None:
         """Fly home by the drone's own return. A landing goes on unless `by` may end it."""
@@ -365,7 +369,7 @@ class Vehicle(Aircraft):
     def _require_return(self, by: By) -> None:
         """Raise `Refused` when the drone stands, or lands and `by` may not end that."""
         if self.on_ground:
-            raise Refused(texts.RETURN, texts.ON_GROUND)
+            raise Refused(texts.RETURN, self.activity)
         if self.landing:
             self._require_endable(self.return_end, by)
             if self.drone.home.state.rth == RthState.UNAVAILABLE:  # the landing would be ended for nothing
@@ -382,13 +386,14 @@ class Vehicle(Aircraft):
         task = self.manual if mode is FlightMode.POSITION else hover
         own = self.returning_by_itself
         rising = self.drone.piloting.about_to_fly
+        ramping = self.flying_state is FlyingState.MOTOR_RAMPING
         async with self.control.acquire(
             task, by=by, pauses=pauses, condition=lambda: self._require_endable(task, by)
         ) as grant:
             if not self.on_ground or rising:
                 await self._stop(task, by, own=own)
             grant.begin(pauses=pauses and (rising or not self.on_ground))
-        if rising:
+        if rising or ramping:
             self.text(Severity.WARNING, texts.MODE_MAY_RISE.fill(mode=mode.value))
 
     def end_inputs_of_others(self) -> None:
@@ -839,7 +844,7 @@ class Vehicle(Aircraft):
             return
         if self.control.leaves_to_pilot(Source.GATEWAY):
             if self.drone.piloting.about_to_fly:
-                await self.drone.piloting.land()
+                await self._command_landing()
             return
         await self.control.perform(self._stay())
 
@@ -847,7 +852,7 @@ class Vehicle(Aircraft):
         """Hover, or stay on the ground."""
         async with self.control.acquire(Hover(), by=Source.GATEWAY):
             if self.drone.piloting.about_to_fly:
-                await self.drone.piloting.land()
+                await self._command_landing()
             if not self.on_ground:
                 await self.drone.piloting.stop()
 

@@ -16,10 +16,11 @@ from anafi_mav.arsdk.messages import move as guided
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, FlyingStateChanged, OrientationMode
 from anafi_mav.arsdk.messages.rth import RthState
 from anafi_mav.drone.element import Element, Position
-from anafi_mav.drone.expectation import QUIET, Commander, loop_time
+from anafi_mav.drone.expectation import Commander, loop_time
 from anafi_mav.drone.piloting.moves import Displacement, Move, MoveEnd, Moves
 from anafi_mav.drone.piloting.state import PilotingState, in_state
 from anafi_mav.drone.piloting.stick_stream import StickStream
+from anafi_mav.drone.sent_commands import QUIET
 from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.drone.status.home import BY_ITSELF, Home
 from anafi_mav.errors import (

@@ -14,10 +14,10 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.drone.element import Element
-from anafi_mav.drone.expectation import QUIET, Commander, loop_time
+from anafi_mav.drone.expectation import Commander, loop_time
 from anafi_mav.drone.piloting.state import MOTORS_OFF, PilotingState, in_state
 from anafi_mav.drone.piloting.stick_stream import StickStream
-from anafi_mav.drone.sent_commands import AUTOMATIC, TAKEN_OFF, Phase, SentCommand, Slot
+from anafi_mav.drone.sent_commands import AUTOMATIC, QUIET, TAKEN_OFF, Phase, SentCommand, Slot
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout
 
 RAMPING_TIMEOUT = 10.0
@@ -115,7 +115,7 @@ class Motors:
     @property
     def has_launched(self) -> bool:
         executed = any(self._sent.is_executed(slot) for slot in (Slot.LAUNCH, Slot.PLAN))
-        return executed or self._sent.may_start_motors(loop_time())
+        return executed or self._sent.has_started_motors(loop_time())
 
     async def take_off(self, timeout: float) -> None:
         self._commander.require_link()

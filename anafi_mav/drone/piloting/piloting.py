@@ -24,7 +24,7 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveToStatus, Orienta
 from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.drone.element import Reducer
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT, QUIET, Commander, loop_time
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
 from anafi_mav.drone.piloting.guided_moves import GuidedMoves, ReturnHome
 from anafi_mav.drone.piloting.landing import LandingEnd
 from anafi_mav.drone.piloting.motors import Motors
@@ -33,7 +33,7 @@ from anafi_mav.drone.piloting.settings import PilotingSettings
 from anafi_mav.drone.piloting.state import REDUCERS, PilotingState
 from anafi_mav.drone.piloting.stick_stream import StickStream
 from anafi_mav.drone.piloting.sticks import Limits, PilotingCommand, percent
-from anafi_mav.drone.sent_commands import Slot
+from anafi_mav.drone.sent_commands import QUIET, Slot
 from anafi_mav.drone.status.home import Home
 from anafi_mav.errors import NotSupported
 

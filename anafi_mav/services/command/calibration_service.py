@@ -17,7 +17,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.service import Service
 from anafi_mav.texts import OperatorText, Subject
-from anafi_mav.vehicle.base.flight_task import maintenance
+from anafi_mav.vehicle.base.flight_task import CommandTask, Needs, maintenance
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
 
@@ -83,7 +83,7 @@ class CalibrationService(Service):
         wanted = {index: value for index, value in enumerate(values, 1) if value != 0.0}
         if not wanted:
             if self.host.vehicle.on_ground:
-                await self._acquire(command, texts.CALIBRATION)  # ends the one that runs
+                await self._acquire(command, maintenance(texts.CALIBRATION, Needs.NONE))  # ends the one that runs
         elif wanted == {2: _MAGNETOMETER}:
             await self._on_ground(command, texts.CALIBRATION, self._magnetometer)
         elif wanted == {5: _HORIZON}:
@@ -94,12 +94,12 @@ class CalibrationService(Service):
             raise Refused(texts.CALIBRATION, texts.CALIBRATIONS, lasting=True)
 
     async def _on_ground(self, command: Command, what: Subject, work: Work) -> None:
-        await self._acquire(command, what)
+        await self._acquire(command, maintenance(what))
         await work()
 
-    async def _acquire(self, command: Command, what: Subject) -> None:
+    async def _acquire(self, command: Command, task: CommandTask) -> None:
         """End what is about to fly, or is calibrated."""
-        async with self.host.vehicle.control.acquire(maintenance(what), by=command.right):
+        async with self.host.vehicle.control.acquire(task, by=command.right):
             pass
 
     async def _told(
@@ -188,8 +188,8 @@ class CalibrationService(Service):
         await self._on_ground(command, texts.RESTART, self._restart)
 
     async def _restart(self) -> None:
-        self.host.text(Severity.NOTICE, texts.DRONE_RESTARTS)
         await self.host.drone.request_reboot()
+        self.host.text(Severity.NOTICE, texts.DRONE_RESTARTS)
         self.host.spawn(self._watch_restart())
 
     async def _watch_restart(self) -> None:

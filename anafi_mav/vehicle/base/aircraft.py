@@ -294,11 +294,16 @@ class Aircraft(ABC):
         """
 
     @abstractmethod
+    def note_landing_command(self) -> None:
+        """Note that a landing is about to be sent: it is a client's, not the drone's own."""
+
+    @abstractmethod
     async def terminate(self, by: By) -> None:
         """Cut the motors, if the configuration allows it at all."""
 
 
 _UNMET: tuple[tuple[Needs, Callable[[Aircraft], bool], OperatorText], ...] = (
+    (Needs.STANDS, lambda aircraft: aircraft.flying_state is FlyingState.EMERGENCY, texts.EMERGENCY_STOP),
     (
         Needs.STANDS,
         lambda aircraft: not aircraft.on_ground or aircraft.drone.piloting.about_to_fly,

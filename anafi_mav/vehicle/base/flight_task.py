@@ -34,7 +34,10 @@ class Needs(enum.Flag):
     NO_DESCENT = enum.auto()
     """The drone neither lands nor returns, and was not commanded to."""
     STANDS = enum.auto()
-    """The drone is on the ground, and no take-off of ours is about to begin."""
+    """The drone is on the ground with its motors off, and no take-off of ours is about to begin.
+
+    After a motor cut it may still be falling.
+    """
     IN_AIR = enum.auto()
     FIX = enum.auto()
     NO_PILOT = enum.auto()
@@ -184,9 +187,9 @@ DISARM = CommandTask(TaskRules(texts.DISARM, wait=STOP_WAIT, keeps_below=True, l
 HAND_LAUNCH = CommandTask(TaskRules(texts.ARMING, keeps_below=True, lasts=False))
 
 
-def maintenance(what: Subject) -> CommandTask:
+def maintenance(what: Subject, needs: Needs = Needs.STANDS) -> CommandTask:
     """Return the task of a calibration or the like, during which nothing flies."""
-    return CommandTask(TaskRules(what, needs=Needs.STANDS, keeps_below=True, lasts=False, is_flight=False))
+    return CommandTask(TaskRules(what, needs=needs, keeps_below=True, lasts=False, is_flight=False))
 
 
 class FlightAction(Struct, eq=False):
