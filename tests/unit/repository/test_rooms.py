@@ -74,7 +74,7 @@ CORES = [
     *("vehicle/base/subscriptions.py", "vehicle/base/velocity_loop.py", "vehicle/fence"),
     *("vehicle/mission/course.py", "vehicle/mission/effects.py", "vehicle/mission/machine.py"),
     *("vehicle/mission/payload_items.py", "vehicle/mission/progress.py"),
-    *("vehicle/offboard/setpoints.py", "vehicle/offboard/steering.py", "vehicle/offboard/stream.py"),
+    *("vehicle/offboard/setpoints.py", "vehicle/offboard/stream.py"),
     "vehicle/offboard/takeoff.py",
     *("vehicle/circle.py", "vehicle/follow.py", "vehicle/hold_rule.py", "vehicle/initiator.py"),
     *("vehicle/failsafe_settings.py", "vehicle/joystick_override.py", "web/h264_offer.py", "web/metrics.py"),
