@@ -353,7 +353,7 @@ class Vehicle(Aircraft):
 
     async def return_home(self, by: By) -> None:
         """Fly home by the drone's own return. A landing goes on unless `by` may end it."""
-        if self.on_ground:
+        if self.on_ground or self.flying_state is FlyingState.USERTAKEOFF:  # in a hand, where no return may wait
             raise Refused(texts.RETURN, self.activity)
         if self.return_end.shown:
             return  # it waits above home or lands there, and would climb and fly home once more
@@ -386,12 +386,12 @@ class Vehicle(Aircraft):
         self._require_endable(task, by)
         own = self.returning_by_itself
         rising = self.drone.piloting.about_to_fly
-        ramping = self.flying_state is FlyingState.MOTOR_RAMPING
+        starts = self.flying_state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF)
         async with self.control.acquire(task, by=by, pauses=pauses) as grant:
             if not self.on_ground or rising:
                 await self._stop(task, by, own=own)
             grant.begin(pauses=pauses and (rising or not self.on_ground))
-        if rising or ramping:
+        if rising or starts:
             self.text(Severity.WARNING, texts.MODE_MAY_RISE.fill(mode=mode.value))
 
     def end_inputs_of_others(self) -> None:
