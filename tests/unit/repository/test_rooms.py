@@ -73,7 +73,7 @@ CORES = [
     *("vehicle/base/roll_sign.py", "vehicle/base/severity.py", "vehicle/offboard/silence.py"),
     *("vehicle/base/subscriptions.py", "vehicle/base/velocity_loop.py", "vehicle/fence"),
     *("vehicle/mission/course.py", "vehicle/mission/effects.py", "vehicle/mission/machine.py"),
-    *("vehicle/mission/progress.py"),
+    "vehicle/mission/progress.py",
     *("vehicle/offboard/setpoints.py", "vehicle/offboard/stream.py"),
     "vehicle/offboard/takeoff.py",
     *("vehicle/circle.py", "vehicle/follow.py", "vehicle/hold_rule.py", "vehicle/initiator.py"),
