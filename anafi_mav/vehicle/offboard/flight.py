@@ -44,8 +44,7 @@ from anafi_mav.vehicle.base.velocity_loop import (
 from anafi_mav.vehicle.offboard.goals import Goal, resolve
 from anafi_mav.vehicle.offboard.moves import OffboardMoves
 from anafi_mav.vehicle.offboard.setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint, Setpoint
-from anafi_mav.vehicle.offboard.steering import Steering
-from anafi_mav.vehicle.offboard.stream import COUNTS, STREAMS, Event, OffboardStream, State, lasts
+from anafi_mav.vehicle.offboard.stream import COUNTS, STREAMS, Event, OffboardStream, State, Steering, lasts
 from anafi_mav.vehicle.offboard.takeoff import Launcher, climbs
 
 WARN_AGAIN = 1.0

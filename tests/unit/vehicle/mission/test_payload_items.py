@@ -11,7 +11,7 @@ from anafi_mav.plans.rules.parts import GatewayStep
 from anafi_mav.vehicle.mission.course import Course
 from anafi_mav.vehicle.mission.effects import Prepared
 from anafi_mav.vehicle.mission.machine import MissionMachine
-from anafi_mav.vehicle.mission.payload_items import PayloadItems
+from anafi_mav.vehicle.mission.progress import PayloadItems
 
 UP, WAY, SPEED = 22, 16, 178
 AIM = mav_enums.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW

@@ -11,7 +11,7 @@ from anafi_mav.drone import Limits
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.velocity_loop import MotionEstimate, VelocityController
 from anafi_mav.vehicle.offboard.setpoints import AttitudeSetpoint, MotionSetpoint, PositionReference
-from anafi_mav.vehicle.offboard.steering import Steering
+from anafi_mav.vehicle.offboard.stream import Steering
 
 LIMITS = Limits(tilt_deg=35.0, climb_mps=4.0, yaw_rate_dps=90.0)
 NO_VEHICLE: Any = None
