@@ -666,7 +666,7 @@ class Gateway:
     def _on_channel(self, channel: Channel, opened: bool) -> None:
         for supervised in self._supervised:
             if opened:
-                supervised.system.channel_opened()
+                supervised.system.channel_opened(channel)
             else:
                 supervised.system.channel_closed(channel)
 

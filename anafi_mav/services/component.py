@@ -297,7 +297,7 @@ class Component:
     def _objection(self, inbound: Inbound) -> OperatorText | None:
         """Return the reason for which a message has no effect while another station is the operator."""
         operators = self.vehicle.operators
-        if operators.is_free or inbound.sysid == operators.operator:
+        if operators.operator in (0, inbound.sysid):
             return None
         return operators.objection(inbound.sysid, need_of(inbound, self.commands.action_of))
 

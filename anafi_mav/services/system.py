@@ -516,6 +516,9 @@ class System:
 
     def send_heartbeat(self) -> None:
         """Send one more HEARTBEAT of the autopilot to all."""
+        self._send_heartbeat(self._greeted)
+
+    def _send_heartbeat(self, to: Sequence[Channel]) -> None:
         vehicle = self.vehicle
         base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         if vehicle.armed:
@@ -526,7 +529,7 @@ class System:
             lambda flavour: dialect.MAVLink_heartbeat_message(
                 dialect.MAV_TYPE_QUADROTOR, flavour.autopilot, base, flavour.custom_mode(mode), health, 3
             ),
-            self._greeted,
+            to,
         )
 
     def _send_heartbeats(self) -> None:
@@ -701,9 +704,15 @@ class System:
             answer = _answer(inbound, dialect.MAV_RESULT_UNSUPPORTED)
             self._node.send(answer, sysid=self.sysid, compid=message.target_component, to=inbound.channel)
 
-    def channel_opened(self) -> None:
-        """A client's channel is open, or its peer has proved its address."""
+    def channel_opened(self, channel: Channel) -> None:
+        """Send the autopilot's heartbeat on a channel that is open, or has a proved address.
+
+        pymavlink's `wait_heartbeat` returns with the first of any component. With the camera's, `target_system` stays
+        0: the program's next commands are then for every vehicle.
+        """
         self.look_soon()
+        if self.active and channel in self._greeted:
+            self._send_heartbeat([channel])
 
     def channel_closed(self, channel: Channel) -> None:
         """A client's channel is gone."""

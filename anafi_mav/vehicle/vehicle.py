@@ -368,7 +368,7 @@ class Vehicle(Aircraft):
 
     def _require_return(self, by: By) -> None:
         """Raise `Refused` when the drone stands, or lands and `by` may not end that."""
-        if self.on_ground:
+        if self.on_ground or self.flying_state is FlyingState.USERTAKEOFF:  # in a hand, where no return may wait
             raise Refused(texts.RETURN, self.activity)
         if self.landing:
             self._require_endable(self.return_end, by)
@@ -386,14 +386,14 @@ class Vehicle(Aircraft):
         task = self.manual if mode is FlightMode.POSITION else hover
         own = self.returning_by_itself
         rising = self.drone.piloting.about_to_fly
-        ramping = self.flying_state is FlyingState.MOTOR_RAMPING
+        starts = self.flying_state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF)
         async with self.control.acquire(
             task, by=by, pauses=pauses, condition=lambda: self._require_endable(task, by)
         ) as grant:
             if not self.on_ground or rising:
                 await self._stop(task, by, own=own)
             grant.begin(pauses=pauses and (rising or not self.on_ground))
-        if rising or ramping:
+        if rising or starts:
             self.text(Severity.WARNING, texts.MODE_MAY_RISE.fill(mode=mode.value))
 
     def end_inputs_of_others(self) -> None:

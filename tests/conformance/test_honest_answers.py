@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.fault_scenarios import ACCEPTED, PX4_HOLD, REJECTED
+from support.params import write
 from support.setpoints import said, texts
 from support.world import World, world
+
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 
 ARM, TAKEOFF, LAND = dialect.MAV_CMD_COMPONENT_ARM_DISARM, dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_NAV_LAND
 RTL, SET_MODE = dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, dialect.MAV_CMD_DO_SET_MODE
@@ -89,3 +92,18 @@ async def test_landing_by_disarm_is_not_taken_for_the_pilots() -> None:
         await w.clients[1].heartbeat(lambda beat: beat.custom_mode == w.modes.land)
         await w.clients[1].command(SET_MODE, *PX4_HOLD)
         assert [text for text in texts(w.clients[1], mark) if "pilot" in text] == []
+
+
+async def test_drone_in_a_hand_receives_no_return_and_hold_says_that_it_may_take_off() -> None:
+    """With ANF_HAND_LAUNCH arming starts the motors: the drone waits to be thrown, and a return would wait with it."""
+    async with world(speed=1.0) as w:
+        await write(w.client, "ANF_HAND_LAUNCH", 1, dialect.MAV_PARAM_TYPE_INT32)
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        mark = w.client.mark()
+        assert (await w.client.command(RTL)).result == REJECTED
+        await said(w.client, "Return refused: drone is starting its motors", mark)
+        assert [e for e in w.drone.log if e.name == "rth.return_to_home"] == []
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        await said(w.client, "Hold: takeoff possible, to 1 m", mark)
+        assert (await w.client.command(LAND)).result == ACCEPTED
+        assert w.drone.firmware.state is FlyingState.LANDED

@@ -78,6 +78,15 @@ class FlightService(Service):
                 mode=lambda command: command.flavour.mode_of_parameters(command.params[1], command.params[2]),
                 progress=ProgressPolicy.LATE,
             ),
+            dialect.MAV_CMD_NAV_LOITER_UNLIM: Action(
+                lambda command: change_mode(self.host.vehicle, command.mode, command.right),  # its position is ignored
+                location=True,
+                altitude=Altitude.UNUSED,
+                effect=effect_of_mode,
+                mode=lambda command: FlightMode.POSITION,
+                progress=ProgressPolicy.LATE,
+                offered=lambda flavour: flavour.loiter_command,
+            ),
             dialect.MAV_CMD_DO_FLIGHTTERMINATION: Action(
                 self._terminate, location=False, altitude=Altitude.UNUSED, effect=Effect.KILL
             ),

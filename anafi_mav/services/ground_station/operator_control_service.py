@@ -91,7 +91,7 @@ class OperatorControlService(Service):
     def _hear(self, inbound: Inbound) -> None:
         """Note where a station is. An observer has no role, whatever its system id is."""
         channel, system = inbound.channel, inbound.sysid
-        if channel.access is Access.OBSERVE or (self._control.is_free and not channel.options.operator_control):
+        if channel.access is Access.OBSERVE or not (self._control.operator or channel.options.operator_control):
             return
         place = (channel, system)
         self._places.pop(place, None)
