@@ -367,8 +367,11 @@ class Vehicle(Aircraft):
         self.return_end.announce(attempt, system_of(client_of(by)))
 
     def _require_return(self, by: By) -> None:
-        """Raise `Refused` when the drone stands, or lands and `by` may not end that."""
-        if self.on_ground or self.flying_state is FlyingState.USERTAKEOFF:  # in a hand, where no return may wait
+        """Raise `Refused` when the drone stands, or lands and `by` may not end that.
+
+        A drone that is held for a launch stands too: no return may wait there.
+        """
+        if self.on_ground or self.flying_state is FlyingState.USERTAKEOFF:
             raise Refused(texts.RETURN, self.activity)
         if self.landing:
             self._require_endable(self.return_end, by)
