@@ -73,3 +73,14 @@ async def test_mode_during_the_climb_is_takeoff() -> None:
         await watched(1.0)
         assert (await w.client.heartbeat(lambda beat: True)).custom_mode == TAKEOFF_MODE
         await w.at_height(8.0)
+
+
+async def test_mode_after_a_takeoff_that_waited_for_arming_is_hold() -> None:
+    """As after one of an armed vehicle: Position, chosen on the ground, is shown until the drone takes off."""
+    async with world(speed=1.0) as w:
+        position = dialect.MAV_CMD_DO_SET_MODE, 1, 3, 0
+        assert (await w.client.command(*position)).result == ACCEPTED
+        assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)).result == ACCEPTED
+        assert (await w.client.heartbeat(lambda beat: True, since=w.client.mark())).custom_mode == MODES["px4"].position
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        await w.at_height(5.0)
