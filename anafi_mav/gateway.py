@@ -538,7 +538,7 @@ class Gateway:
         found = supervised.system.position
         position = None
         if found is not None:
-            latitude, longitude = found.place.point
+            latitude, longitude = found.place
             age = round(self._clock.monotonic() - found.at, 2)
             position = StatePosition(latitude=latitude, longitude=longitude, amsl_m=round(found.amsl, 2), age_s=age)
         drone = self._report.drone(supervised.reported(), self.relay)
@@ -666,7 +666,7 @@ class Gateway:
     def _on_channel(self, channel: Channel, opened: bool) -> None:
         for supervised in self._supervised:
             if opened:
-                supervised.system.channel_opened()
+                supervised.system.channel_opened(channel)
             else:
                 supervised.system.channel_closed(channel)
 

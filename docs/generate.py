@@ -100,7 +100,8 @@ an endpoint without [`signing`](security.md) can do what its `access` permits.
 - A message beyond the access has no effect. A command is answered with DENIED, a parameter with PARAM_ERROR and its
   value, a plan with MISSION_ACK DENIED, a file request with FILE_PROTECTED; a text names the access. `refused_access`
   of the gateway's counters has their number, in total and by message.
-- It is not forwarded to other systems either. Of an observer's messages only a station's heartbeat and what
+- It is not forwarded to other systems either. Files of those are written with `all` only: among them are parameters
+  and scripts. Of an observer's messages only a station's heartbeat and what
   reads from one system are forwarded: no rates and no ends of file sessions, which that system has for all of the
   gateway's clients. Nothing is forwarded in the name of a drone of the gateway, or of a system that is heard on an
   endpoint with more access (`refused_observer`): give observers system ids of their own.

@@ -7,7 +7,8 @@ import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+
+import msgspec
 
 from anafi_mav.cli import interrupts, plan_files, plan_options
 from anafi_mav.cli.ground_client import Ground, Texts, connected
@@ -31,8 +32,7 @@ from anafi_mav.plans.plan import (
     without_zero_heading,
 )
 from anafi_mav.services.memory import NOT_KEPT
-from anafi_mav.services.plan.item_messages import item_int, item_of
-from anafi_mav.services.plan.mission_items import from_wire, to_wire
+from anafi_mav.services.plan.item_messages import from_wire, item_int, item_of, to_wire
 from anafi_mav.vehicle.fence.plan_items import PlanFault, PlanItem
 
 MISSION, FENCE, RALLY = (
@@ -41,6 +41,9 @@ MISSION, FENCE, RALLY = (
     dialect.MAV_MISSION_TYPE_RALLY,
 )
 NAMES = {MISSION: "mission", FENCE: "fence", RALLY: "rally points"}
+
+HEIGHT_STEP = 0.0101
+"""m by which a height may differ from the uploaded one: an ArduPilot keeps whole cm, some of them cut off."""
 
 
 class TransferRefused(AnafiMavError):
@@ -165,20 +168,24 @@ async def give_list(ground: Ground, kind: int, items: Sequence[PlanItem], said: 
 
 
 async def _has(ground: Ground, kind: int, items: Sequence[PlanItem]) -> bool:
-    """Does the vehicle have these?"""
+    """Read the list back and return True when the vehicle has these items."""
     transfer = Download(*ground.target, kind)
     await ground.run(transfer, lambda done, total: None)
+    if transfer.result is None or transfer.result.outcome is not Outcome.DONE:
+        return False
     there = [item_of(message) for message in transfer.items]
-    return transfer.result is not None and transfer.result.outcome is Outcome.DONE and _same(items, there)
+    # Item 0 of an ArduPilot's mission is its own home, whatever was uploaded.
+    first = int(kind == MISSION and ground.first_item_is_home)
+    return len(items) == len(there) and all(map(_is_same, items[first:], there[first:]))
 
 
-def _same(wanted: Sequence[PlanItem], there: Sequence[PlanItem | PlanFault]) -> bool:
-    def content(item: PlanItem | PlanFault) -> Any:
-        if isinstance(item, PlanFault):
-            return None
-        return from_wire(item)
-
-    return [content(item) for item in wanted] == [content(item) for item in there]
+def _is_same(wanted: PlanItem, found: PlanItem | PlanFault) -> bool:
+    """Return True for the same item, with a height that a vehicle has rounded."""
+    if isinstance(found, PlanFault):
+        return False
+    if wanted.has_place and abs(wanted.z - found.z) <= HEIGHT_STEP:
+        found = msgspec.structs.replace(found, z=wanted.z)
+    return from_wire(wanted) == from_wire(found)
 
 
 def download(arguments: argparse.Namespace) -> int:

@@ -48,7 +48,7 @@ async def findings(config: Config, place: Place) -> list[Finding]:
         if not problems:
             found.append(ok("state", "folder can be written, and no other gateway uses it"))
         found += [
-            wrong("fabric", problem, "end that gateway, or change the id")
+            wrong("fabric", problem, "a gateway needs its router, and each drone an id of its own")
             for problem in await gateway.endpoint_problems()
         ]
         found += [ok("open", line) for line in gateway.lines()]

@@ -2,7 +2,7 @@
 
 It asks the gateway's web server, whose address and token it finds in the state folder. That token is sent to this
 computer only: a gateway elsewhere has another one, which the user gives. On a terminal the tables are shown again every
-second until Ctrl-C, elsewhere once. Nothing is commanded.
+second until Ctrl-C, also while the gateway does not answer or is started again; elsewhere once. Nothing is commanded.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import argparse
 import asyncio
 import json
 import os
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple, NoReturn
 from urllib.parse import urlsplit
 
 import aiohttp
@@ -21,6 +21,7 @@ import msgspec
 from anafi_mav.access_token import AccessToken, read_token
 from anafi_mav.cli import interrupts, log
 from anafi_mav.cli.terminal import TableRows, is_live, live_tables, say, say_json, say_table
+from anafi_mav.clock import SystemClock
 from anafi_mav.errors import AnafiMavError, ConfigError
 from anafi_mav.relay.uri_host import is_loopback
 from anafi_mav.state_lock import read_holder, state_folder
@@ -66,12 +67,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Show the status. Raises `AnafiMavError` when no gateway answers."""
     log.set_up()
-    source = find(arguments.state, arguments.url, arguments.token or os.environ.get(TOKEN_VARIABLE))
+    source = _asked(arguments)
     if arguments.link:
         query = "" if source.token is None else f"?{QUERY}={source.token.text}"
         say(f"{source.url}status{query}")
         return 0
-    interrupts.run(_show(source, as_json=arguments.json))
+    interrupts.run(_show(arguments, source))
     return 0
 
 
@@ -134,10 +135,10 @@ def decode(body: bytes) -> GatewayStatus:
     return status
 
 
-async def _show(source: AskedGateway, *, as_json: bool) -> None:
+async def _show(arguments: argparse.Namespace, source: AskedGateway) -> None:
     async with aiohttp.ClientSession(timeout=aiohttp.ClientTimeout(total=LIMIT)) as session:
         body = await fetch(session, source)
-        if as_json:
+        if arguments.json:
             decode(body)
             say_json(json.loads(body))
             return
@@ -148,11 +149,51 @@ async def _show(source: AskedGateway, *, as_json: bool) -> None:
                 say_table(*table)
             return
         with live_tables() as show:
-            while True:
-                status = decode(body)
-                show(head(status), tables(status))
-                await asyncio.sleep(EVERY)
-                body = await fetch(session, source)
+            await follow(session, lambda: _asked(arguments), decode(body), show)
+
+
+def _asked(arguments: argparse.Namespace) -> AskedGateway:
+    """Return the gateway that the arguments name. Raises `ConfigError`."""
+    return find(arguments.state, arguments.url, arguments.token or os.environ.get(TOKEN_VARIABLE))
+
+
+async def follow(
+    session: aiohttp.ClientSession,
+    find_source: Callable[[], AskedGateway],
+    status: GatewayStatus,
+    show: Callable[[Sequence[str], Sequence[TableRows]], None],
+) -> NoReturn:
+    """Request the status every second and show it, without an end.
+
+    While no answer arrives the last values stay, below a line with their age and the reason. `find_source` is called
+    before each request: a gateway that was started again may have another address.
+    """
+    clock = SystemClock()
+    received_at, reason = clock.monotonic(), ""
+
+    def draw() -> None:
+        age = clock.monotonic() - received_at
+        missed = [f"no answer for {age:.0f} s, the values are of before: {reason}"] if reason else []
+        show([*missed, *head(status)], tables(status))
+
+    while True:
+        draw()
+        await asyncio.sleep(EVERY)
+        request = asyncio.ensure_future(_request(session, find_source))
+        try:
+            while not (await asyncio.wait({request}, timeout=EVERY))[0]:
+                reason = reason or "the gateway is slow"
+                draw()
+            status, received_at, reason = request.result(), clock.monotonic(), ""
+        except AnafiMavError as error:
+            reason = str(error)
+        finally:
+            request.cancel()
+
+
+async def _request(session: aiohttp.ClientSession, find_source: Callable[[], AskedGateway]) -> GatewayStatus:
+    """Return the present status. Raises `AnafiMavError`."""
+    return decode(await fetch(session, find_source()))
 
 
 def head(status: GatewayStatus) -> list[str]:

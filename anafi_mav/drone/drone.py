@@ -480,7 +480,7 @@ class Drone:
                     (drone_manager.ConnectionState, device_manager.State),
                     lambda message: True if self.controller.state.link == Connection.CONNECTED else None,
                 )
-                answer.expire_after(CONTROLLER_TIMEOUT, CommandTimeout("a drone behind it", CONTROLLER_TIMEOUT))
+                answer.expire_after(CONTROLLER_TIMEOUT, "a drone behind it")
                 await answer.wait()
             except CommandTimeout:
                 what = "says nothing of a drone" if state.link is None else f"has no drone: {spoken(state.link)}"
@@ -766,7 +766,7 @@ class Drone:
             return message if predicate is None or predicate(message) else None
 
         expectation = self._commander.expect((answer,), judge)
-        expectation.expire_after(timeout, CommandTimeout(answer.NAME, timeout))
+        expectation.expire_after(timeout, answer.NAME)
         return await expectation.wait()
 
     async def wait_until(self, condition: Callable[[], bool], what: str, timeout: float = WAIT_TIMEOUT) -> None:

@@ -18,7 +18,7 @@ from anafi_mav.arsdk.codec.secret_fields import without_secrets
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.link.transport import Rank
 from anafi_mav.arsdk.messages import ardrone3
-from anafi_mav.drone.sent_commands import AUTOMATIC, Event, Phase, SentCommand, SentCommands, Slot
+from anafi_mav.drone.sent_commands import AUTOMATIC, QUIET, Event, Phase, SentCommand, SentCommands, Slot
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost
 
 logger = logging.getLogger(__name__)
@@ -32,10 +32,6 @@ BLOCKED = 0
 ANSWER_TIMEOUT = 5.0
 """s. A drone answers within tens of milliseconds, over a bad link within a few retransmissions of 150 ms; Parrot's
 own SDK waits 10 s, too long for a ground station that repeats its command every second."""
-
-QUIET = 1.0
-"""s after the drone received a command in which it would have said what it did; silence means that there was nothing to
-do. Its acknowledgement came through, so its events do too, a few retransmissions of 150 ms later at most."""
 
 
 def loop_time() -> float:
@@ -96,11 +92,14 @@ class Expectation(Generic[T]):
         if not self.future.done():
             self.future.set_exception(error)
 
-    def expire_after(self, seconds: float, error: AnafiMavError) -> None:
-        """(Re)start the clock: the wait fails with this error when nothing has come by then."""
+    def expire_after(self, seconds: float, what: str) -> None:
+        """(Re)start the clock: the wait fails with `CommandTimeout` about `what` after this time."""
         if self._timer is not None:
             self._timer.cancel()
-        self._timer = self.future.get_loop().call_later(seconds, self.fail, error)
+        self._timer = self.future.get_loop().call_later(seconds, self._expire, what, seconds)
+
+    def _expire(self, what: str, seconds: float) -> None:
+        self.fail(CommandTimeout(what, seconds))
 
     async def wait(self) -> T:
         """Return the judge's result.
@@ -122,7 +121,7 @@ class Expectation(Generic[T]):
         False when the drone has received the command and then reported nothing. Raises `CommandTimeout` when neither
         is known in time, `LinkLost`.
         """
-        self.expire_after(timeout, CommandTimeout(what, timeout))
+        self.expire_after(timeout, what)
         either: set[asyncio.Future[Any]] = {self.future, delivery}
         await asyncio.wait(either, return_when=asyncio.FIRST_COMPLETED)
         if not self.future.done():
@@ -301,7 +300,7 @@ class Commander:
 
     def _delivered(self, token: int, arrived: bool) -> None:
         if arrived:
-            self.sent.deliver(token)
+            self.sent.deliver(token, loop_time())
         delivery = self._deliveries.pop(token, None)
         if delivery is None or delivery.done():
             return
@@ -415,4 +414,4 @@ class Commander:
         except BaseException:
             expectation.close()
             raise
-        expectation.expire_after(timeout, CommandTimeout(command.NAME, timeout))
+        expectation.expire_after(timeout, command.NAME)

@@ -28,6 +28,10 @@ KEPT = 8
 TAKE_OFF_MEMORY = 10.0
 """s after a start was withdrawn in which the drone may still take off, or takes off and could not report it."""
 
+QUIET = 1.0
+"""s after the drone received a command in which it would have said what it did; silence means that there was nothing to
+do. Its acknowledgement came through, so its events do too, a few retransmissions of 150 ms later at most."""
+
 STAYS_DOWN = 3.0
 """s after LANDED in which a TakeOff that was to end the landing may still be executed."""
 
@@ -150,6 +154,8 @@ class SentCommand(msgspec.Struct, eq=False):
     """The wait of its verb, an `expectation.Expectation`."""
     phase: Phase = Phase.QUEUED
     delivered: bool = False
+    delivered_at: float = math.inf
+    """When the drone acknowledged its receipt."""
     is_in_effect: bool = False
     """An event has reported its effect, and none the end of it; also of a withdrawn one."""
     may_begin_until: float = -math.inf
@@ -164,6 +170,14 @@ class SentCommand(msgspec.Struct, eq=False):
         """Return True when the drone may still execute it."""
         closed = self.phase in (Phase.WITHDRAWN, Phase.ABANDONED)
         return self.awaited or (closed and now < self.may_begin_until)
+
+    def is_ignored(self, now: float) -> bool:
+        """Return True for a launch of before that the drone has received and has not reacted to.
+
+        A drone refuses a take-off by silence. Motors that start now are another controller's.
+        """
+        closed = self.phase in (Phase.WITHDRAWN, Phase.ABANDONED)
+        return self.slot is Slot.LAUNCH and closed and not self.answered and now > self.delivered_at + QUIET
 
     def may_be_reported(self, now: float) -> bool:
         """Return True when an event may still report its effect, or repeat that."""
@@ -207,6 +221,11 @@ class SentCommands:
     def may_start_motors(self, now: float) -> bool:
         """Return True when a drone that stands may still begin to fly."""
         return any(one.may_begin(now) for slot in STARTS_MOTORS for one in self._slots[slot])
+
+    def has_started_motors(self, now: float) -> bool:
+        """Return True when motors that start now are, or may be, started by one of these commands."""
+        sent = (one for slot in STARTS_MOTORS for one in self._slots[slot])
+        return any(one.may_begin(now) and not one.is_ignored(now) for one in sent)
 
     def is_unwanted(self, sent: SentCommand, now: float) -> bool:
         """Return True when the effect of this command, which an event has reported, is to be undone.
@@ -257,10 +276,11 @@ class SentCommands:
             for one in self._slots[slot]:
                 one.may_begin_until = -math.inf
 
-    def deliver(self, token: int) -> None:
+    def deliver(self, token: int, now: float) -> None:
         """The drone has received the command with this token."""
         for one in self.awaited():
             if one.answer.token == token:
+                one.delivered_at = now
                 one.apply(Event.DELIVERED)
 
     def abandon(self, now: float) -> None:
@@ -299,11 +319,14 @@ class SentCommands:
           before that is an older one, repeated.
         - Motors that ramp up are those of the oldest launch that was withdrawn and not reported yet: the LANDED that
           follows them ends that one, and is no refusal of a newer TakeOff.
+        - A launch that was withdrawn after the drone had received and ignored it explains nothing (`is_ignored`).
         - A TakeOff against a landing that reaches the drone on the ground starts the motors there. LANDED and the
           motors that ramp up may arrive together, so its effect is unwanted from LANDED on.
         """
         newest, is_older = None, False
         for one in self._slots[Slot.LAUNCH]:
+            if one.is_ignored(now):
+                continue
             newest = one
             if state in one.target:
                 one.apply(Event.EXECUTED)

@@ -16,7 +16,7 @@ from typing import Any, TypeAlias, TypeVar
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.drone.element import Element, StateT
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation
-from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
+from anafi_mav.errors import AnafiMavError, CommandRejected, LocalProtocolError, NotSupported
 
 T = TypeVar("T")
 
@@ -93,7 +93,7 @@ class Commanding(Element[StateT]):
 
         Raises `CommandRejected` when the subject is given another target meanwhile.
         """
-        answer.expire_after(timeout, CommandTimeout(command.NAME, timeout))
+        answer.expire_after(timeout, command.NAME)
         try:
             order = self._order(subject, command)
             while not (await asyncio.wait({answer.future}, timeout=REPEAT))[0]:

@@ -32,7 +32,7 @@ async def read(commander: Commander, who: str, questions: Sequence[Message], mar
         for question in questions:
             commander.send(question)
         for what, wait in waits:
-            wait.expire_after(STATES_TIMEOUT, CommandTimeout(f"all {what}", STATES_TIMEOUT))
+            wait.expire_after(STATES_TIMEOUT, f"all {what}")
         for what, wait in waits:
             try:
                 await wait.wait()
@@ -52,7 +52,7 @@ async def ask(commander: Commander, name: str, questions: list[Question]) -> Non
     try:
         for command, wait in waits:
             wait.token = commander.send(command)
-            wait.expire_after(DETAILS_TIMEOUT, CommandTimeout(command.NAME, DETAILS_TIMEOUT))
+            wait.expire_after(DETAILS_TIMEOUT, command.NAME)
         for command, wait in waits:
             try:
                 await wait.wait()

@@ -50,9 +50,6 @@ class LinkChange(NamedTuple):
 class TokensListed(NamedTuple):
     """All tokens that the router has named have been reported."""
 
-    is_complete: bool = True
-    """False when the router has never completed its list: there may be more."""
-
 
 class StateQuery(NamedTuple):
     """A query for the key of a state. `query` is zenoh's, to be answered by the session."""

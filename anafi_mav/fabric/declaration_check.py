@@ -1,4 +1,4 @@
-"""Looks at what a zenoh router knows, for sessions over a link that loses datagrams.
+"""Looks at what a zenoh router knows, and at what a link that loses datagrams has lost.
 
 It uses sessions of its own, another one for each try. zenoh sends each declaration, and the end of each, once, and its
 sessions remember what they have declared and heard: within a session what was lost on the way stays lost. Imports
@@ -28,6 +28,15 @@ ANSWER_LIMIT = 0.6
 PROBE_PAUSE = 0.4
 """s for a probe to go to the router and on to the session that is looked at."""
 
+LIST_LIMIT = 2.0
+"""s for the router's list of all tokens."""
+
+LIST_TRIES = 3
+"""Attempts to get a list that is known to be the router's."""
+
+LIST_PAUSE = 0.2
+"""s between them: the router may not have heard of the witness yet."""
+
 LOOKS_TO_END = 2
 """Looks in turn that must agree before an end is reported: a station that is reported as lost stops its drone."""
 
@@ -46,6 +55,33 @@ def probe_of(expression: str) -> str:
 def is_probe(key: str) -> bool:
     """Return True for the key of a probe."""
     return key.endswith(f"/{PROBE}")
+
+
+def configured(settings: Mapping[str, Any]) -> zenoh.Config:
+    """Return zenoh's configuration with these settings."""
+    config: zenoh.Config = zenoh.Config()
+    for key, value in settings.items():
+        config.insert_json5(key, json.dumps(value))
+    return config
+
+
+def list_proven(settings: Mapping[str, Any], expression: str, witness: str, stopping: threading.Event) -> set[str]:
+    """Return the tokens that the router knows; none when it named no complete list.
+
+    `witness`: a token of another session, which the expression covers. A list without it is not the router's: zenoh
+    answers for a router that it has no link to, or loses meanwhile, with an empty list that counts as complete.
+    Blocks for some seconds at most.
+    """
+    for _ in range(LIST_TRIES):
+        if stopping.is_set():
+            break
+        with contextlib.suppress(zenoh.ZError), zenoh.open(configured(settings)) as session:
+            replies = list(session.liveliness().get(expression, timeout=LIST_LIMIT))
+            tokens = {str(reply.ok.key_expr) for reply in replies if reply.ok is not None}
+            if witness in tokens and all(reply.ok is not None for reply in replies):
+                return tokens
+        stopping.wait(LIST_PAUSE)
+    return set()
 
 
 class AgreedLooks:
@@ -109,7 +145,7 @@ class DeclarationCheck:
         expected = {*known.own, *known.tokens}
         tries = 0
         for _ in range(TRIES):
-            with contextlib.suppress(zenoh.ZError), zenoh.open(self._config()) as session:
+            with contextlib.suppress(zenoh.ZError), zenoh.open(configured(self._settings)) as session:
                 publishers = [session.declare_publisher(key) for key in self._published]
                 for expression in self._watched:
                     self._list(session, expression)
@@ -130,12 +166,6 @@ class DeclarationCheck:
             self.missing |= {probe for probe in known.probes if not arrived(probe)}
             self.absent = {key for key in set(known.tokens) - self.tokens if self._answered[key] >= COMPLETE_TRIES}
             self.absent |= set(known.read) - self.read if tries >= COMPLETE_TRIES else set()
-
-    def _config(self) -> zenoh.Config:
-        config: zenoh.Config = zenoh.Config()
-        for key, value in self._settings.items():
-            config.insert_json5(key, json.dumps(value))
-        return config
 
     def _list(self, session: zenoh.Session, expression: str) -> None:
         is_complete = True

@@ -7,6 +7,7 @@ import logging
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 from anafi_mav import texts
@@ -124,8 +125,6 @@ class FabricEndpoint(Endpoint):
         self.claims = SystemClaims(self._connection.session_text, wanted)
         self._is_listed = False
         """True while all tokens that exist are known, as far as the router has named them."""
-        self._is_list_complete = False
-        """The router has completed its newest list of tokens."""
         self._stations: dict[str, _Station] = {}
         self._places = StationPlaces(url.options.max_clients)
         self._silent: set[str] = set()
@@ -178,15 +177,28 @@ class FabricEndpoint(Endpoint):
             await asyncio.wait({listed}, timeout=LIST_LIMIT)
         finally:
             listed.cancel()
-        if not self._listed.is_set():
-            return []  # a router that is not there yet is no mistake
+        if not self._connection.is_up:
+            return [f"{self.url}: no router within {LIST_LIMIT:.0f} s ({self._connection.problem})"]
+        is_named = self.parsed.options.listen or await self._see_all_tokens()
         found = [
             f"{self.url}: system {sysid} is held by gateway {holder}: give each drone an id of its own"
             for sysid, holder in sorted(self.claims.refused.items())
         ]
-        if not self._is_list_complete:
+        if not is_named:
             found.append(f"{self.url}: the router does not name all system ids that are held: check again")
         return found
+
+    async def _see_all_tokens(self) -> bool:
+        """Note all tokens that the router knows; return False when it named no complete list."""
+        keys, session = self._connection.keys, self._connection.zenoh
+        own = keys.gateway_token(self._connection.session_text)
+        look = partial(session.proven_tokens, keys.everything, own)
+        tokens = await asyncio.get_running_loop().run_in_executor(None, look)
+        for key in map(keys.parse, tokens):
+            if key is not None and key.kind is KeyKind.DRONE:
+                self.claims.token(key.sysid, key.owner, is_alive=True)
+        self._claim()
+        return bool(tokens)
 
     # What the fabric reports.
 
@@ -200,7 +212,7 @@ class FabricEndpoint(Endpoint):
         elif isinstance(arrival, StateQuery):
             self._answer(arrival)
         elif isinstance(arrival, TokensListed):
-            self._is_listed, self._is_list_complete = True, arrival.is_complete
+            self._is_listed = True
             self._listed.set()
             self._claim()
         elif isinstance(arrival, LinkChange):

@@ -76,6 +76,8 @@ class FabricKeys:
 
     def __init__(self, prefix: str) -> None:
         self.prefix = prefix
+        self.everything = f"{prefix}/**"
+        """Expression of all keys."""
 
     def down(self, sysid: int | str, station: str | None = None) -> str:
         """Return the key of a system's frames: to one station, or to all."""

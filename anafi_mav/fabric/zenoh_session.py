@@ -6,15 +6,16 @@ bytes on.
 
 Over a link that loses datagrams a third thread looks regularly at what the router knows. It reports tokens and ends
 of tokens that were lost on the way here, and the readers of published keys. It opens another session where a
-declaration of ours, or its end, was lost on the way there.
+declaration of ours, or its end, was lost on the way there: in place of the first one, or beside it while that one is
+in use, because its end would end all its tokens.
 """
 
 from __future__ import annotations
 
-import json
+import contextlib
 import logging
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 import zenoh
@@ -29,7 +30,15 @@ from anafi_mav.fabric.arrivals import (
     TokenChange,
     TokensListed,
 )
-from anafi_mav.fabric.declaration_check import AgreedLooks, DeclarationCheck, KnownKeys, is_probe, probe_of
+from anafi_mav.fabric.declaration_check import (
+    AgreedLooks,
+    DeclarationCheck,
+    KnownKeys,
+    configured,
+    is_probe,
+    list_proven,
+    probe_of,
+)
 from anafi_mav.fabric.envelope import MAX_SAMPLE
 
 logger = logging.getLogger(__name__)
@@ -48,6 +57,9 @@ LIST_TRIES = 3
 
 CHECK_FIRST, CHECK_EVERY = 1.0, 3.0
 """s until the first look at what the router knows, and between further ones."""
+
+MAX_BESIDE = 4
+"""Sessions beside the first one: each is a link of its own."""
 
 MAX_QUERIES = 64
 """Queries that may be open at once: each waits for the event loop and for the thread that publishes."""
@@ -105,6 +117,8 @@ class ZenohSession:
         self._probed: set[str] = set()
         """Probes that have arrived in this session."""
         self._is_lossy = is_lossy
+        self._beside: list[zenoh.Session] = []
+        """Sessions that hold what the link of the first one lost."""
         self._reopens = False
         """True when another session is to be opened."""
         self._is_up: bool | None = None
@@ -145,11 +159,11 @@ class ZenohSession:
     def list_tokens(self, *expressions: str) -> None:
         """Report the tokens of these keys once, and then the end of the list.
 
-        A list that the router does not complete in time is requested again.
+        A list that the router does not complete in time is requested again. It may still lack tokens (`list_proven`):
+        those of others are reported when they come, and an id that two hold is decided then.
         """
 
         def work(session: zenoh.Session) -> None:
-            is_complete = False
             for _ in range(LIST_TRIES):
                 is_complete = True
                 for expression in expressions:
@@ -160,9 +174,16 @@ class ZenohSession:
                             is_complete = False  # an error: "Timeout"
                 if is_complete or self._stopping.is_set():
                     break
-            self._report(TokensListed(is_complete))
+            self._report(TokensListed())
 
         self._queue.add_work(work)
+
+    def proven_tokens(self, expression: str, witness: str) -> set[str]:
+        """Return the tokens that the router knows; none without a complete list.
+
+        Blocks, in any thread. Another session looks, and finds `witness`, a token of this one.
+        """
+        return list_proven(self._settings, expression, witness, self._stopping)
 
     def subscribe(self, expression: str) -> None:
         """Report samples with these keys."""
@@ -266,15 +287,13 @@ class ZenohSession:
                 session.close()  # type: ignore[no-untyped-call]
             if self._checker.is_alive():
                 self._checker.join(CHECK_EVERY)
+            self._close_beside()
             self.ended.set()
 
     def _open(self) -> zenoh.Session | None:
         while not self._stopping.is_set():
             try:
-                config = zenoh.Config()
-                for key, value in self._settings.items():
-                    config.insert_json5(key, json.dumps(value))
-                session = zenoh.open(config)
+                session = zenoh.open(configured(self._settings))
             except zenoh.ZError as error:
                 # Its text goes on with the place in zenoh's sources.
                 problem = str(error).partition(" at /")[0]
@@ -293,6 +312,7 @@ class ZenohSession:
         """Close a session and open another one with the same declarations."""
         self._declared.clear()
         session.close()  # type: ignore[no-untyped-call]
+        self._close_beside()
         self._note(is_up=False, problem=LOST_DECLARATION)
         for token in tuple(self._alive):
             self._note_token(token, is_alive=False)
@@ -307,7 +327,7 @@ class ZenohSession:
 
     def _check_regularly(self) -> None:
         pause = CHECK_FIRST
-        ends, lingering = AgreedLooks(), AgreedLooks()
+        ends, lingering, unseen = AgreedLooks(), AgreedLooks(), AgreedLooks()
         while not self._stopping.wait(pause):
             pause = CHECK_EVERY
             if not self._is_up or self._reopens:
@@ -335,11 +355,44 @@ class ZenohSession:
                     self._note_token(key, is_alive=False)
             lost = check.missing - {key if kind == "token" else probe_of(key) for kind, key in declarations
                                     if (kind, key) not in self._declarations}  # fmt: skip
-            lost |= lingering.add(check.tokens & self._former)
-            if lost and not is_in_use and not self._stopping.is_set():
+            agreed, remaining = unseen.add(lost), lingering.add(check.tokens & self._former)
+            if self._stopping.is_set():
+                return
+            if is_in_use:
+                self._declare_beside(agreed)
+            elif lost := lost | remaining:
                 logger.warning("declarations lost on the way, opening another session: %s", ", ".join(sorted(lost)))
                 self._reopens, pause = True, CHECK_FIRST
                 self._queue.add_work(lambda session: None)
+
+    def _declare_beside(self, lost: Collection[str]) -> None:
+        """Declare in a session of their own what these tokens and probes stand for."""
+        places = [
+            (kind, key)
+            for kind, key in tuple(self._declarations)
+            if (kind == "token" and key in lost) or (kind == "subscriber" and probe_of(key) in lost)
+        ]
+        if not places or len(self._beside) >= MAX_BESIDE:
+            return
+        with contextlib.suppress(zenoh.ZError):  # the next look tries it again
+            session = zenoh.open(configured(self._settings))
+            self._beside.append(session)
+            made = {place: self._declarations[place](session) for place in places if place in self._declarations}
+            self._queue.add_work(lambda _: self._replace(session, made))
+            logger.warning("declarations lost on the way, made beside: %s", ", ".join(sorted(lost)))
+
+    def _replace(self, session: zenoh.Session, made: Mapping[tuple[str, str], Any]) -> None:
+        """Hold these declarations of a session in place of those that were lost."""
+        if session not in self._beside:
+            return
+        for place, declared in made.items():
+            if place in self._declarations:
+                declared, self._declared[place] = self._declared[place], declared
+            declared.undeclare()
+
+    def _close_beside(self) -> None:
+        while self._beside:
+            self._beside.pop().close()  # type: ignore[no-untyped-call]
 
     def _note_readers(self, key: str, *, has_readers: bool) -> None:
         if has_readers:

@@ -67,8 +67,21 @@ MAINTENANCE_MESSAGES = frozenset(
         dialect.MAVLINK_MSG_ID_SERIAL_CONTROL,
         dialect.MAVLINK_MSG_ID_LOG_ERASE,
         dialect.MAVLINK_MSG_ID_SETUP_SIGNING,
+        dialect.MAVLINK_MSG_ID_PARAM_MAP_RC,
+        dialect.MAVLINK_MSG_ID_OSD_PARAM_CONFIG,
+        dialect.MAVLINK_MSG_ID_SET_MAG_OFFSETS,
+        dialect.MAVLINK_MSG_ID_DEVICE_OP_WRITE,
+        dialect.MAVLINK_MSG_ID_SECURE_COMMAND,
+        dialect.MAVLINK_MSG_ID_AUTH_KEY,
+        dialect.MAVLINK_MSG_ID_AIRLINK_AUTH,
+        dialect.MAVLINK_MSG_ID_WIFI_CONFIG_AP,
+        dialect.MAVLINK_MSG_ID_CAN_FRAME,
+        dialect.MAVLINK_MSG_ID_CANFD_FRAME,
+        dialect.MAVLINK_MSG_ID_CAN_FILTER_MODIFY,
+        dialect.MAVLINK_MSG_ID_CUBEPILOT_FIRMWARE_UPDATE_START,
     }
 )
+"""Those after SETUP_SIGNING are for systems behind other endpoints: PX4 and ArduPilot change settings by them."""
 
 OBSERVED_COMMANDS = frozenset(
     {
@@ -103,8 +116,26 @@ MAINTENANCE_COMMANDS = frozenset(
         dialect.MAV_CMD_GIMBAL_REQUEST_AXIS_CALIBRATION,
         dialect.MAV_CMD_RESET_CAMERA_SETTINGS,
         dialect.MAV_CMD_STORAGE_FORMAT,
+        dialect.MAV_CMD_DO_SET_PARAMETER,
+        dialect.MAV_CMD_PREFLIGHT_SET_SENSOR_OFFSETS,
+        dialect.MAV_CMD_PREFLIGHT_UAVCAN,
+        dialect.MAV_CMD_CONFIGURE_ACTUATOR,
+        dialect.MAV_CMD_AIRFRAME_CONFIGURATION,
+        dialect.MAV_CMD_START_RX_PAIR,
+        dialect.MAV_CMD_CAN_FORWARD,
+        dialect.MAV_CMD_POWER_OFF_INITIATED,
+        dialect.MAV_CMD_FIXED_MAG_CAL,
+        dialect.MAV_CMD_FIXED_MAG_CAL_FIELD,
+        dialect.MAV_CMD_FIXED_MAG_CAL_YAW,
+        dialect.MAV_CMD_ACCELCAL_VEHICLE_POS,
+        dialect.MAV_CMD_SET_FACTORY_TEST_MODE,
+        dialect.MAV_CMD_GIMBAL_FULL_RESET,
+        dialect.MAV_CMD_FLASH_BOOTLOADER,
+        dialect.MAV_CMD_DEBUG_TRAP,
+        dialect.MAV_CMD_SCRIPTING,
     }
 )
+"""Those after STORAGE_FORMAT are for systems behind other endpoints."""
 
 COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)
 
@@ -131,7 +162,7 @@ _FTP_READS = frozenset(
 _FTP_WRITES = frozenset(
     {dialect.MAV_FTP_OPCODE_CREATEFILE, dialect.MAV_FTP_OPCODE_WRITEFILE, dialect.MAV_FTP_OPCODE_OPENFILEWO}
 )
-"""Uploads: the only files that clients can write are plans."""
+"""Uploads: the only files of our drones that clients can write are plans."""
 
 
 def needed_access(message: Any) -> Access:
@@ -156,6 +187,16 @@ def needed_access(message: Any) -> Access:
     if id == dialect.MAVLINK_MSG_ID_PARAM_SET and message.param_id == HASH_NAME:
         return Access.OBSERVE
     return Access.ALL if id in MAINTENANCE_MESSAGES else Access.CONTROL
+
+
+def needed_by_others(message: Any) -> Access:
+    """Return the level that a message to a system behind another endpoint needs.
+
+    Files that can be written there are parameters, scripts and firmware too (ArduPilot's @PARAM/param.pck).
+    """
+    if message is not None and message.get_msgId() == dialect.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL:
+        return Access.ALL if bytes(message.payload)[_FTP_OPCODE] in _FTP_WRITES else needed_access(message)
+    return needed_access(message)
 
 
 MESSAGE_IDS: dict[str, int] = {kind.msgname: id for id, kind in dialect.mavlink_map.items()}

@@ -11,7 +11,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import Counter, defaultdict
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
 import msgspec
@@ -20,7 +20,7 @@ from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.endpoint_options import EndpointConfig
 from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.access import STOPPING, Access, concerns_link, needed_access
+from anafi_mav.mavlink.access import STOPPING, Access, concerns_link, needed_access, needed_by_others
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, reason
 from anafi_mav.mavlink.channel import Channel, total
 from anafi_mav.mavlink.endpoint import EndpointFactory, make_endpoint, parse_endpoint
@@ -52,6 +52,11 @@ class Inbound(msgspec.Struct, frozen=True):
     """False when it needs more than the access of its channel: it must have no effect."""
     is_late: bool = False
     """True for a command or mode that may have been sent while the host stalled: only a stop has an effect."""
+
+    @property
+    def client(self) -> Hashable:
+        """The sender, as a key among all clients."""
+        return (self.channel, self.sysid, self.compid)
 
 
 Receiver = Callable[[Inbound], None]
@@ -341,10 +346,13 @@ class Node:
         """Return True if the channel's access covers a frame; otherwise it is counted."""
         if needed_access(received.message) <= channel.access:
             return True
+        self._count_refused(channel, received)
+        return False
+
+    def _count_refused(self, channel: Channel, received: ReceivedFrame) -> None:
         name = "unknown" if received.message is None else received.message.get_type()
         channel.counters["refused_access"] += 1
         channel.counters[f"refused_access.{name}"] += 1
-        return False
 
     def _has_name_of_other(self, channel: Channel, received: ReceivedFrame) -> bool:
         """Return True for a frame in the name of a system of ours.
@@ -365,6 +373,10 @@ class Node:
             return False
         if channel.access is Access.OBSERVE and (is_false or not _is_harmless(received.message)):
             channel.counters["refused_observer"] += 1
+            return False
+        if channel.access is Access.CONTROL and needed_by_others(received.message) > channel.access:
+            if not self._router.is_ours(targets(received.message)[0]):
+                self._count_refused(channel, received)
             return False
         return True
 

@@ -40,20 +40,18 @@ class PeerTable(Generic[PeerT]):
         """Return True when all places of known clients, or of others, are taken."""
         return len(self._known if known else self._heard.keys() - self._known) >= self._places
 
-    def is_known(self, peer: PeerT) -> bool:
-        """Return True for a known client."""
-        return peer in self._known
-
     def add(self, peer: PeerT, now: float, *, known: bool) -> None:
         """Give a new client a place, or a known client one of those in place of its other."""
         self._heard[peer] = now
         if known:
             self._known.add(peer)
 
-    def heard(self, peer: PeerT, now: float) -> None:
-        """A frame of a client has arrived."""
-        if peer in self._heard:
-            self._heard[peer] = now
+    def heard(self, peer: PeerT, now: float) -> bool:
+        """Note a frame of a client; return True when it has a place and is not known."""
+        if peer not in self._heard:
+            return False
+        self._heard[peer] = now
+        return peer not in self._known
 
     def remove(self, peer: PeerT) -> None:
         """Free the place of a client. Twice does no harm."""

@@ -135,11 +135,8 @@ class TcpIn(Listener):
         return peer
 
     def _heard(self, peer: TcpPeer) -> None:
-        if peer not in self._table:  # it has just been dropped
-            return
         now = self._clock.monotonic()
-        self._table.heard(peer, now)
-        if not self._table.is_known(peer) and self._make_room(self._shown(peer), now, known=True):
+        if self._table.heard(peer, now) and self._make_room(self._shown(peer), now, known=True):
             self._table.add(peer, now, known=True)
 
     def _refuse_browser(self, peer: TcpPeer) -> None:

@@ -1,7 +1,7 @@
 """The command protocol: decoding, execution, retransmission and answer of a command.
 
 No I/O. `CommandHistory` decides; `CommandService` runs the handler and sends the acknowledgements.
-Rules: conformance R5-R10, MAVLink command.md.
+Rules: conformance R5-R10, B1 and C2 (frames), MAVLink command.md.
 """
 
 from __future__ import annotations
@@ -13,9 +13,14 @@ from dataclasses import dataclass
 
 from msgspec import Struct
 
+from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import PX4, Flavour
+from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.bounds import height_in_frame
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.fence.plan_items import DEGREES, PLACED
 
@@ -279,6 +284,28 @@ class Command(Struct, frozen=True):
         """When IN_PROGRESS is sent to its client; None: never."""
         progress = self.definition.progress
         return None if progress is ProgressPolicy.FINAL_ONLY and self.flavour.first_answer_as_final else progress
+
+    def place(self) -> GeoPoint | None:
+        """Return its position; None when it is unset. Half a position is refused."""
+        if math.isnan(self.x) and math.isnan(self.y):
+            return None
+        if not (math.isfinite(self.x) and math.isfinite(self.y)):
+            raise Refused(texts.POSITION, texts.LATITUDE_LONGITUDE_NUMBERS, lasting=True)
+        return GeoPoint(self.x, self.y)
+
+    def height(self, vehicle: Aircraft, *, flown: bool = True) -> float | None:
+        """Return the height above take-off (m) of its z; None when z is unset.
+
+        By the frame (AMSL in COMMAND_LONG), and by the flavour of its sender. `flown`: the drone is to fly at this
+        height. Raises `Refused`, `UnsupportedFrame`.
+        """
+        if math.isnan(self.z):
+            return None
+        altitude = self.definition.altitude
+        if altitude is Altitude.UNUSED:
+            raise ValueError(f"MAV_CMD {self.id}: its row says that it has no height")
+        amsl = altitude is Altitude.AMSL and self.flavour.relative_frames_are_amsl
+        return height_in_frame(vehicle, self.z, self.frame, amsl=amsl, flown=flown)
 
     def same_as(self, other: Command) -> bool:
         """True when both commands are equal, with NaN equal to NaN."""

@@ -25,9 +25,8 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.frames import Batch, Packed
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.router import EVERY_COMPONENT
-from anafi_mav.services.command.command_service import CommandService
+from anafi_mav.services.command.command_service import CommandService, RunningActions
 from anafi_mav.services.command.operator_need import ACKNOWLEDGEMENTS, need_of, stop_of
-from anafi_mav.services.command.running_actions import RunningActions
 from anafi_mav.services.commands import Action, Effect
 from anafi_mav.services.definition_link import DefinitionLink
 from anafi_mav.services.dropped_inputs import InputStream
@@ -37,7 +36,7 @@ from anafi_mav.services.gateway_uris import GatewayUris
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.payload_history import PayloadHistory
 from anafi_mav.services.pose import UNKNOWN_POSE, VehiclePose
-from anafi_mav.services.service import MessageHandler, Service, client_of
+from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.services.stream import Times
 from anafi_mav.services.system_position import PositionOf
 from anafi_mav.services.telemetry.message_service import MessageService
@@ -298,7 +297,7 @@ class Component:
     def _objection(self, inbound: Inbound) -> OperatorText | None:
         """Return the reason for which a message has no effect while another station is the operator."""
         operators = self.vehicle.operators
-        if operators.is_free or inbound.sysid == operators.operator:
+        if operators.operator in (0, inbound.sysid):
             return None
         return operators.objection(inbound.sysid, need_of(inbound, self.commands.action_of))
 
@@ -330,14 +329,14 @@ class Component:
         reason = self.vehicle.operators.objection(inbound.sysid, Need.COMMAND)
         if reason is not None:
             _count_refusal(inbound)
-            self.drop_input(client_of(inbound), InputStream.CHANGE, reason)
+            self.drop_input(inbound.client, InputStream.CHANGE, reason)
         return reason
 
     def _refuse(self, inbound: Inbound, reason: OperatorText) -> None:
         """Answer and count a message of a station without the role that it needs; it has no effect."""
         _count_refusal(inbound)
         self._answer_refused(inbound, dialect.MAV_RESULT_NOT_IN_CONTROL, reason)
-        self.drop_input(client_of(inbound), InputStream.CHANGE, reason)
+        self.drop_input(inbound.client, InputStream.CHANGE, reason)
 
     def _answer_refused(self, inbound: Inbound, result: int, reason: str = "") -> None:
         """Answer a message without effect, as its sender expects it; `result`: of a command."""

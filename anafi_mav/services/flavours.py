@@ -110,6 +110,9 @@ class Flavour:
     gimbal_keeps_horizon: bool = False
     """Clients of this family set no lock of the gimbal, and mean pitch and roll to the horizon; otherwise an axis
     without a lock follows the body."""
+    loiter_command: bool = False
+    """MAV_CMD_NAV_LOITER_UNLIM enters Loiter where the vehicle is (ArduCopter GCS_MAVLink_Copter.cpp). Mission
+    Planner's action Loiter_Unlim and pymavlink's set_mode_loiter send it."""
     relative_long_regions: bool = False
     """Altitudes of regions of interest in a COMMAND_LONG count from the take-off point (ArduPilot, as MAVProxy's pull
     request 1154 says; dronekit sends them so); otherwise they are above mean sea level."""
@@ -279,6 +282,7 @@ ARDUPILOT = Flavour(
     text_version=True,
     sik_radio=True,
     gimbal_keeps_horizon=True,
+    loiter_command=True,
     relative_long_regions=True,
     base_mode_in_custom0=True,
     # ArduCopter sends home when it is set; programs take one that arrives later for news (dronekit2's own tests).

@@ -189,13 +189,8 @@ class Host(Protocol):
         """Send only answers on this channel; with False everything again."""
 
 
-def client_of(inbound: Inbound) -> Hashable:
-    """Return a key that identifies the sender of a message among all clients."""
-    return (inbound.channel, inbound.sysid, inbound.compid)
-
-
 def channel_of(client: Hashable) -> Channel | None:
-    """Return the channel of a `client_of`; None for any other value."""
+    """Return the channel of an `Inbound.client`; None for any other value."""
     match client:
         case (Channel() as channel, _, _):
             return channel

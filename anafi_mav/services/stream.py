@@ -79,6 +79,9 @@ class MessageStream:
     """True when its content depends on the flavour of the receiver."""
     is_offered: Callable[[EndpointOptions], bool] = lambda options: True
     """Returns True for endpoints whose clients get it; for the others it does not exist."""
+    is_supported: Callable[[Vehicle], bool] = lambda vehicle: True
+    """Returns True for drones whose model can fill it; for the others it does not exist. A value that such a drone has
+    not reported is None from `build` instead."""
 
     @property
     def is_repeated(self) -> bool:

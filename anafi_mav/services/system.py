@@ -34,14 +34,13 @@ from anafi_mav.services.camera.panorama_service import PanoramaService
 from anafi_mav.services.camera.storage_service import StorageService
 from anafi_mav.services.camera_definition.param_ext_service import ParamExtService
 from anafi_mav.services.command.calibration_service import CalibrationService
-from anafi_mav.services.command.command_service import SETTLE
+from anafi_mav.services.command.command_service import SETTLE, RunningActions
 from anafi_mav.services.command.compass_service import CompassService
 from anafi_mav.services.command.flight_service import FlightService
 from anafi_mav.services.command.guided_service import GuidedService
 from anafi_mav.services.command.modes_service import ModesService
 from anafi_mav.services.command.operator_need import stop_of
 from anafi_mav.services.command.orbit_service import OrbitService
-from anafi_mav.services.command.running_actions import RunningActions
 from anafi_mav.services.commands import Effect
 from anafi_mav.services.component import BY_AUTOPILOT, Component, joined
 from anafi_mav.services.dropped_inputs import DroppedInputs, InputStream
@@ -87,9 +86,9 @@ from anafi_mav.services.telemetry.telemetry_service import CHANGES, TelemetrySer
 from anafi_mav.services.telemetry.video_service import VideoTelemetryService
 from anafi_mav.services.video.video_stream_service import VideoStreamService
 from anafi_mav.texts import OperatorText
-from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.height import TakeoffRecord
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.right import system_of
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import (
     EventHandler,
@@ -517,6 +516,9 @@ class System:
 
     def send_heartbeat(self) -> None:
         """Send one more HEARTBEAT of the autopilot to all."""
+        self._send_heartbeat(self._greeted)
+
+    def _send_heartbeat(self, to: Sequence[Channel]) -> None:
         vehicle = self.vehicle
         base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         if vehicle.armed:
@@ -527,7 +529,7 @@ class System:
             lambda flavour: dialect.MAVLink_heartbeat_message(
                 dialect.MAV_TYPE_QUADROTOR, flavour.autopilot, base, flavour.custom_mode(mode), health, 3
             ),
-            self._greeted,
+            to,
         )
 
     def _send_heartbeats(self) -> None:
@@ -702,9 +704,15 @@ class System:
             answer = _answer(inbound, dialect.MAV_RESULT_UNSUPPORTED)
             self._node.send(answer, sysid=self.sysid, compid=message.target_component, to=inbound.channel)
 
-    def channel_opened(self) -> None:
-        """A client's channel is open, or its peer has proved its address."""
+    def channel_opened(self, channel: Channel) -> None:
+        """Send the autopilot's heartbeat on a channel that is open, or has a proved address.
+
+        pymavlink's `wait_heartbeat` returns with the first of any component. With the camera's, `target_system` stays
+        0: the program's next commands are then for every vehicle.
+        """
         self.look_soon()
+        if self.active and channel in self._greeted:
+            self._send_heartbeat([channel])
 
     def channel_closed(self, channel: Channel) -> None:
         """A client's channel is gone."""

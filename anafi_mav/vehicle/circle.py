@@ -92,16 +92,16 @@ def entry(circle: Circle, here: GeoPoint) -> GeoPoint:
 
     From the centre itself it is the point north of the centre.
     """
-    north, east = geo.offset(*circle.centre.point, *here.point)
+    north, east = geo.offset(*circle.centre, *here)
     distance = math.hypot(north, east)
     north, east = (1.0, 0.0) if distance < 1e-3 else (north / distance, east / distance)
-    return GeoPoint(*geo.destination(*circle.centre.point, north * circle.radius, east * circle.radius))
+    return GeoPoint(*geo.destination(*circle.centre, north * circle.radius, east * circle.radius))
 
 
 def outline(circle: Circle) -> list[GeoPoint]:
     """Return the corners of the circle's outline, to be checked. The last is the first again."""
     corners = (2.0 * math.pi * n / LOOKS for n in range(LOOKS + 1))
-    centre, radius = circle.centre.point, circle.radius
+    centre, radius = circle.centre, circle.radius
     return [GeoPoint(*geo.destination(*centre, math.cos(a) * radius, math.sin(a) * radius)) for a in corners]
 
 
@@ -132,7 +132,7 @@ class Lap:
         circle = self.circle
         if motion.reference is None:
             return None
-        north, east = geo.offset(*motion.reference, *circle.centre.point)
+        north, east = geo.offset(*motion.reference, *circle.centre)
         away_north, away_east = motion.north - north, motion.east - east
         bearing = math.atan2(away_east, away_north)
         if self._bearing is not None:

@@ -1,12 +1,9 @@
-"""Policies in front of flight tasks: pilot or programs, and the operator. No I/O.
+"""Policy in front of flight tasks: pilot or programs. No I/O.
 
 The anafi_ros paper has an explicit switch, `skycontroller/offboard`, between manual and offboard control. `PilotSwitch`
 is its state; it decides in front of `Control.acquire`. Tasks that stop the drone, land it or lead it home are never
 refused (`TaskRules.is_flight`). Automatic is the state that nothing requests: the pilot's stick and a program's command
 take the aircraft from each other, as `drone.controller` arbitrates.
-
-The second policy is that of `operator_control`: with an operator, the flight tasks of stations without its role are
-refused. It comes after the pilot's, and it never concerns what the gateway does by itself.
 """
 
 from __future__ import annotations
@@ -15,10 +12,8 @@ import enum
 
 from anafi_mav import texts
 from anafi_mav.vehicle.base.control import Request
-from anafi_mav.vehicle.base.refusal import NotInControl, Refused
+from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import Source
-from anafi_mav.vehicle.base.right import Right
-from anafi_mav.vehicle.operator_control import Need, OperatorControl
 
 
 class State(enum.Enum):
@@ -77,15 +72,3 @@ def refusal_of(state: State, request: Request) -> Refused | None:
     if state is State.PILOT and is_of_program and request.rules.is_flight:
         return Refused(request.rules.what, texts.PILOT_SWITCH)
     return None
-
-
-def operator_refusal_of(control: OperatorControl, request: Request) -> Refused | None:
-    """Return the refusal of a request while another station than its client's is the operator.
-
-    None: it is permitted.
-    """
-    if not isinstance(request.by, Right) or not request.rules.is_flight:
-        return None
-    need = Need.FLY if request.rules.needs_operator else Need.COMMAND
-    reason = control.objection(request.by.system, need)
-    return None if reason is None else NotInControl(request.rules.what, reason)

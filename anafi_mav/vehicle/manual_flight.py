@@ -19,10 +19,9 @@ from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import PilotingCommand
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
-from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.flight_task import STOP_WAIT, PlainTask, TaskRules
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.right import Extent, Right
+from anafi_mav.vehicle.base.right import Extent, Right, system_of
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.joystick_override import JoystickOverride, Override
 from anafi_mav.vehicle.offboard.silence import SILENCE

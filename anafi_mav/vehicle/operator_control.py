@@ -12,6 +12,9 @@ all of it, as if this did not exist. A stop and the gimbal are never asked about
   keeps the role while any secondary is heard; that would leave the sticks with a station that has none.
 - A station is its system id, as in CONTROL_STATUS: what has the id of the operator is the operator.
 
+The flight tasks of stations without the role are refused by a policy of `Control`, which comes after the pilot's and
+never concerns what the gateway does by itself.
+
 Secondaries are those of the endpoint's option, and those in the range of system ids that the operator has named in
 param4 and param5 of its request (QGroundControl in mavlink/qgroundcontrol#14560 until July 2026; mavlink#2535 has
 removed param5 since, and 0 stands for no range).
@@ -24,6 +27,9 @@ from dataclasses import dataclass
 
 from anafi_mav import texts
 from anafi_mav.texts import OperatorText
+from anafi_mav.vehicle.base.control import Request
+from anafi_mav.vehicle.base.refusal import NotInControl, Refused
+from anafi_mav.vehicle.base.right import Right
 
 SILENT = 5.0
 """s without a message after which an operator is lost: five heartbeats of a station, ArduPilot's FS_GCS_TIMEOUT."""
@@ -262,3 +268,15 @@ class OperatorControl:
 
     def _enter(self, event: Event) -> None:
         self.state = TRANSITIONS[self.state][event]
+
+
+def operator_refusal_of(control: OperatorControl, request: Request) -> Refused | None:
+    """Return the refusal of a request while another station than its client's is the operator.
+
+    None: it is permitted.
+    """
+    if control.is_free or not isinstance(request.by, Right) or not request.rules.is_flight:
+        return None
+    need = Need.FLY if request.rules.needs_operator else Need.COMMAND
+    reason = control.objection(request.by.system, need)
+    return None if reason is None else NotInControl(request.rules.what, reason)

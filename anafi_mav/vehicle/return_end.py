@@ -481,4 +481,4 @@ def _metres(place: GeoPoint | None, other: Position | None) -> float | None:
     """The distance over ground, m; None when one of the places is unknown."""
     if place is None or other is None:
         return None
-    return geo.distance(*place.point, other.latitude, other.longitude)
+    return geo.distance(*place, other.latitude, other.longitude)

@@ -106,12 +106,13 @@ class Takeoff(PlainTask):
     @property
     def climbing(self) -> bool:
         """The climb that follows the drone's own take-off is under way."""
-        return self._situation.state is State.CLIMBING
+        attempt = self._situation.attempt
+        return isinstance(attempt, RunningTakeoff) and attempt.climbs
 
     @property
     def under_way(self) -> bool:
         """An accepted take-off has not reached its height yet."""
-        return self._situation.task is not None
+        return isinstance(self._situation.attempt, RunningTakeoff)
 
     @property
     def rises(self) -> bool:
@@ -168,6 +169,7 @@ class Takeoff(PlainTask):
                 raise Refused(texts.DISARM, texts.JUST_TAKEN_OFF)
         elif self._turns_near_ground:
             async with vehicle.control.acquire(DISARM, by=by):
+                vehicle.note_landing_command()
                 await vehicle.drone.piloting.stop_motors(force=force)
         elif force:
             await vehicle.terminate(by)
@@ -179,10 +181,14 @@ class Takeoff(PlainTask):
     @property
     def _airborne(self) -> OperatorText:
         """Return the reason of a refusal while the drone does not report that it stands."""
-        return texts.FLYING_STATE_UNKNOWN if self._vehicle.flying_state is None else texts.IN_AIR
+        state = self._vehicle.flying_state
+        if state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF):
+            return texts.STARTS_MOTORS
+        return texts.FLYING_STATE_UNKNOWN if state is None else texts.IN_AIR
 
     async def _land(self, by: By) -> None:
         async with self._vehicle.control.acquire(DISARM, by=by):
+            self._vehicle.note_landing_command()
             await self._vehicle.drone.piloting.land()
 
     def _set_disarmed(self) -> None:

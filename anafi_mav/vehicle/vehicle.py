@@ -38,7 +38,6 @@ from anafi_mav.errors import CommandRejected
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.aborted_return import AbortedReturn
 from anafi_mav.vehicle.base.aircraft import Aircraft, CommandedSpeeds
-from anafi_mav.vehicle.base.clients import system_of
 from anafi_mav.vehicle.base.control_machine import DroneAct, State
 from anafi_mav.vehicle.base.flight_task import LAND, MOTOR_CUT, FlightTask, Hover
 from anafi_mav.vehicle.base.flying import AIRBORNE, LANDING, ON_GROUND, TAKING_OFF
@@ -47,13 +46,12 @@ from anafi_mav.vehicle.base.height import ESTIMATE_ERROR, TakeoffRecord
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import By, Source, client_of, right_of
-from anafi_mav.vehicle.base.right import Extent, Right
+from anafi_mav.vehicle.base.right import Extent, Right, system_of
 from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.controller_inputs import ControllerInputs
 from anafi_mav.vehicle.fence.rally import RallyPoints
-from anafi_mav.vehicle.flight_policy import operator_refusal_of
 from anafi_mav.vehicle.follow_flight import FollowFlight
 from anafi_mav.vehicle.guided_flight import GuidedFlight
 from anafi_mav.vehicle.hold_rule import APART, HoldRule
@@ -63,7 +61,7 @@ from anafi_mav.vehicle.link_loss import LossPolicy
 from anafi_mav.vehicle.manual_flight import ManualFlight
 from anafi_mav.vehicle.mission.flight import MissionFlight
 from anafi_mav.vehicle.offboard.flight import OffboardFlight
-from anafi_mav.vehicle.operator_control import Need, OperatorControl
+from anafi_mav.vehicle.operator_control import Need, OperatorControl, operator_refusal_of
 from anafi_mav.vehicle.pilot_switch import PilotSwitch
 from anafi_mav.vehicle.return_end import ReturnEnd
 from anafi_mav.vehicle.takeoff import Takeoff
@@ -346,13 +344,17 @@ class Vehicle(Aircraft):
 
     async def _command_landing(self) -> None:
         """Land for a client, also at the end of its return: it is that client's landing."""
-        self._initiators.land_commanded(self._clock.monotonic())
+        self.note_landing_command()
         await self.drone.piloting.land()
+
+    def note_landing_command(self) -> None:
+        if not self.on_ground or self.drone.piloting.about_to_fly:  # else it ends no flight, and none that follows
+            self._initiators.land_commanded(self._clock.monotonic())
 
     async def return_home(self, by: By) -> None:
         """Fly home by the drone's own return. A landing goes on unless `by` may end it."""
-        if self.on_ground:
-            raise Refused(texts.RETURN, texts.ON_GROUND)
+        if self.on_ground or self.flying_state is FlyingState.USERTAKEOFF:  # in a hand, where no return may wait
+            raise Refused(texts.RETURN, self.activity)
         if self.return_end.shown:
             return  # it waits above home or lands there, and would climb and fly home once more
         if lands := self.landing:
@@ -376,19 +378,20 @@ class Vehicle(Aircraft):
         """Stop and hover. A landing or return goes on, and this is refused, unless `by` may end it.
 
         `chosen`: a client has chosen the mode by name or number. `pause`: setpoints of every client are ignored from
-        now on; what flew is what DO_PAUSE_CONTINUE goes on with.
+        now on; what flew is what DO_PAUSE_CONTINUE goes on with. During a pause the shown mode keeps both.
         """
-        hover = Hover(mode, client_of(by) if chosen else None, self._paused_task if pause else None)
+        pauses = pause or (self.control.paused and mode is self.mode)
+        hover = Hover(mode, client_of(by) if chosen else None, self._paused_task if pauses else None)
         task = self.manual if mode is FlightMode.POSITION else hover
         self._require_endable(task, by)
         own = self.returning_by_itself
         rising = self.drone.piloting.about_to_fly
-        pauses = pause or (self.control.paused and mode is self.mode)
+        starts = self.flying_state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF)
         async with self.control.acquire(task, by=by, pauses=pauses) as grant:
             if not self.on_ground or rising:
                 await self._stop(task, by, own=own)
             grant.begin(pauses=pauses and (rising or not self.on_ground))
-        if rising:
+        if rising or starts:
             self.text(Severity.WARNING, texts.MODE_MAY_RISE.fill(mode=mode.value))
 
     def end_inputs_of_others(self) -> None:
@@ -438,8 +441,10 @@ class Vehicle(Aircraft):
     @property
     def interrupted(self) -> FlightTask | None:
         """The goto or mission that a pause has stopped, while nothing else was commanded since."""
-        below = self.control.below
-        return below.resumes if isinstance(below, Hover) and self.control.active is below else None
+        control = self.control
+        is_pending = control.state in (State.RELEASING, State.ACQUIRING)
+        below = control.next_below if is_pending else control.below
+        return below.resumes if isinstance(below, Hover) and (is_pending or control.active is below) else None
 
     async def take_off(self, ato: float | None, by: Right) -> None:
         """Take off to a height, or end a landing: then the drone hovers where it is."""
@@ -776,7 +781,7 @@ class Vehicle(Aircraft):
         height, origin = self.height, self.origin
         if self.on_ground or not height.flight_id or height.takeoff_amsl is None:
             return None
-        place = (None, None) if origin is None else origin.point
+        place = (None, None) if origin is None else origin
         return TakeoffRecord(height.flight_id, height.takeoff_amsl, height.estimated, *place)
 
     def on_return(self) -> None:
@@ -836,7 +841,7 @@ class Vehicle(Aircraft):
             return
         if self.control.leaves_to_pilot(Source.GATEWAY):
             if self.drone.piloting.about_to_fly:
-                await self.drone.piloting.land()
+                await self._command_landing()
             return
         await self.control.perform(self._stay())
 
@@ -844,7 +849,7 @@ class Vehicle(Aircraft):
         """Hover, or stay on the ground."""
         async with self.control.acquire(Hover(), by=Source.GATEWAY):
             if self.drone.piloting.about_to_fly:
-                await self.drone.piloting.land()
+                await self._command_landing()
             if not self.on_ground:
                 await self.drone.piloting.stop()
 

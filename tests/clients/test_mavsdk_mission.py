@@ -12,7 +12,7 @@ from support.product import program
 from support.world import HOME, World, world
 
 from anafi_mav.plans.formats import files
-from anafi_mav.services.plan.mission_items import to_wire
+from anafi_mav.services.plan.item_messages import to_wire
 
 pytestmark = pytest.mark.third_party
 

@@ -17,7 +17,7 @@ from support.world import loopback
 from anafi_mav import mav_enums
 from anafi_mav.plans.formats import files
 from anafi_mav.plans.plan import Plan
-from anafi_mav.services.plan.mission_items import as_carried, to_wire
+from anafi_mav.services.plan.item_messages import as_carried, to_wire
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 

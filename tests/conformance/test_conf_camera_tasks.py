@@ -31,6 +31,7 @@ REJECTED, DENIED, UNSUPPORTED = (
     dialect.MAV_RESULT_UNSUPPORTED,
 )
 SOURCE, RESET = dialect.MAV_CMD_SET_CAMERA_SOURCE, dialect.MAV_CMD_RESET_CAMERA_SETTINGS
+THERMAL_RANGE = dialect.MAVLINK_MSG_ID_CAMERA_THERMAL_RANGE
 NAN = math.nan
 
 
@@ -144,12 +145,21 @@ async def test_camera_source_chooses_the_shown_picture(model: str) -> None:
 async def test_camera_source_of_a_model_without_thermal_camera_is_unsupported() -> None:
     async with world() as w:
         assert await command(w.client, SOURCE, 0, dialect.CAMERA_SOURCE_IR, 0) == UNSUPPORTED
-        assert await command(w.client, dialect.MAV_CMD_REQUEST_MESSAGE, 277) == REJECTED
+
+
+async def test_thermal_range_of_a_model_without_thermal_camera_is_unsupported() -> None:
+    async with world() as w:
+        for id in (dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAV_CMD_SET_MESSAGE_INTERVAL):
+            assert await command(w.client, id, THERMAL_RANGE, 1e6) == UNSUPPORTED, id
+        mark = w.client.mark()
+        assert await command(w.client, dialect.MAV_CMD_GET_MESSAGE_INTERVAL, THERMAL_RANGE) == ACCEPTED
+        assert (await w.client.wait("MESSAGE_INTERVAL", since=mark)).interval_us == 0
 
 
 async def test_thermal_range_is_that_of_an_absolute_palette() -> None:
     async with world(model="thermal") as w:
-        assert await command(w.client, dialect.MAV_CMD_REQUEST_MESSAGE, 277) == REJECTED
+        assert await command(w.client, dialect.MAV_CMD_REQUEST_MESSAGE, THERMAL_RANGE) == REJECTED
+        assert await command(w.client, dialect.MAV_CMD_SET_MESSAGE_INTERVAL, THERMAL_RANGE, 1e6) == ACCEPTED
         assert await command(w.client, SOURCE, 0, dialect.CAMERA_SOURCE_IR, 0) == ACCEPTED
         for name, value, kind in (("CAM_THM_PALETTE", 0.0, CHOICE), ("CAM_THM_LOW", 5.0, 9), ("CAM_THM_HIGH", 60.0, 9)):
             assert (await write(w.client, name, value, kind)).param_result == dialect.PARAM_ACK_ACCEPTED, name

@@ -76,6 +76,16 @@ async def test_conf_004_autopilot_heartbeat_ends_each_burst(flavour: str) -> Non
             assert later - at < 0.1
 
 
+async def test_conf_004_first_heartbeat_of_a_connection_is_the_autopilots() -> None:
+    """Six clients connect at different times of the second."""
+    async with world() as w:
+        for sysid in range(241, 247):
+            await asyncio.sleep(0.17)
+            client = await w.connect(sysid)
+            first = await client.wait(("HEARTBEAT", "CAMERA_HEARTBEAT"), since=0)
+            assert (first.get_srcComponent(), first.autopilot) == (1, dialect.MAV_AUTOPILOT_PX4)
+
+
 @pytest.mark.parametrize("flavour", FLAVOURS)
 async def test_conf_009_camera_answers_for_itself(flavour: str) -> None:
     """It refuses what it does not have; the autopilot answers for component 0, and nobody for one that is absent."""

@@ -15,7 +15,7 @@ from support.world import World, world
 
 from anafi_mav.plans.formats import files
 from anafi_mav.plans.plan import Item as PlanItem
-from anafi_mav.services.plan.mission_items import DEGREES, to_wire
+from anafi_mav.services.plan.item_messages import DEGREES, to_wire
 from anafi_mav.sim import drone
 
 SPEED = 8.0

@@ -6,7 +6,9 @@ import asyncio
 import itertools
 import json
 import math
+import socket
 import sys
+import threading
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -31,9 +33,10 @@ from support.setpoints import VELOCITY_ONLY, engage, local, streaming
 from support.world import HOME, World, loopback, world
 
 from anafi_mav.clock import SystemClock
-from anafi_mav.fabric import claims, endpoint
+from anafi_mav.fabric import claims, declaration_check, endpoint
 from anafi_mav.fabric.envelope import UpEnvelope
 from anafi_mav.fabric.ground import FabricGround
+from anafi_mav.fabric.settings import session_settings
 from anafi_mav.mavlink import dialect as own
 from anafi_mav.mavlink.endpoint import parse_endpoint
 from anafi_mav.mavlink.frames import frame, pack
@@ -217,6 +220,46 @@ async def test_system_id_of_another_gateway_is_left_to_it(tmp_path: Path, monkey
             mark = station.mark()
             await station.heartbeat(lambda beat: True, since=mark, timeout=10.0)
             assert "1 station" in "".join(other.gateway.lines())
+
+
+async def test_router_that_is_not_there_is_a_problem() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))  # and does not listen
+        url = f"zenoh://127.0.0.1:{taken.getsockname()[1]}"
+        async with world(endpoints=(url,)) as w:
+            (problem,) = await w.gateway.endpoint_problems()
+        assert problem.startswith(f"{url}: no router within 15 s (")
+
+
+async def test_list_of_ids_that_is_not_the_routers_is_a_problem(monkeypatch: pytest.MonkeyPatch) -> None:
+    """zenoh answers for a router that it loses with an empty list that counts as complete."""
+    monkeypatch.setattr(declaration_check, "LIST_TRIES", 1)  # of 3 s each
+    async with router() as node:
+        relay = StallingRelay(node.port)
+        try:
+            async with world(endpoints=(f"zenoh://127.0.0.1:{await relay.start()}",)) as w:
+                while "connected, 0 stations" not in "".join(w.gateway.lines()):
+                    await watched(0.05)
+                assert await w.gateway.endpoint_problems() == []
+                relay.unanswered = 100  # new connections, which prove that the router names the tokens
+                (problem,) = await w.gateway.endpoint_problems()
+                assert problem.endswith("the router does not name all system ids that are held: check again")
+        finally:
+            await relay.close()
+
+
+async def test_list_without_the_token_of_another_session_proves_nothing() -> None:
+    async with router() as node:
+        settings = session_settings(parse_endpoint(node.url))
+
+        def look(witness: str) -> set[str]:
+            return declaration_check.list_proven(settings, "anafi/**", f"anafi/{witness}", threading.Event())
+
+        with await asyncio.to_thread(opened, node) as session:
+            tokens = [session.liveliness().declare_token(f"anafi/{key}") for key in ("1/drone", "gateway/a")]
+            assert await asyncio.to_thread(look, "gateway/a") == {"anafi/1/drone", "anafi/gateway/a"}
+            assert await asyncio.to_thread(look, "gateway/b") == set()
+            assert len(tokens) == 2
 
 
 async def test_lost_link_of_a_gateway_gives_its_system_id_to_no_other(

@@ -117,6 +117,41 @@ async def test_lost_ends_of_tokens_are_found() -> None:
         await seen.wait(TokenChange(OURS, False))
 
 
+async def test_declarations_that_a_session_in_use_loses_are_made_beside_it() -> None:
+    """Its other token does not end meanwhile, and that which was lost ends with `end`."""
+    async with fabric() as (relay, ours, _, reports, theirs):
+        seen, second, up = Reports(), KEYS.drone_token(3, f"{1:016x}"), KEYS.up(1, f"{2:016x}-1")
+        changes: list[TokenChange] = []
+
+        def see(sample: zenoh.Sample) -> None:
+            changes.append(TokenChange(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT))
+            seen.add(changes[-1])
+
+        async def use() -> None:
+            while True:
+                ours.note_heard(is_in_use=True)
+                await asyncio.to_thread(theirs.put, up, b"frames")
+                await asyncio.sleep(0.02)
+
+        await asyncio.to_thread(lambda: theirs.liveliness().declare_subscriber(KEYS.drone_token("*", "*"), see))
+        ours.declare_token(OURS)
+        await seen.wait(TokenChange(OURS, True))
+        using = asyncio.create_task(use())
+        try:
+            relay.lose_next = second.encode()
+            ours.declare_token(second)
+            await seen.wait(TokenChange(second, True))
+            relay.lose_next = b"anafi/1/up"
+            ours.subscribe(KEYS.up(1, "**"))
+            await reports.wait(FabricSample(up, b"frames", b""))
+            assert relay.lost == 2
+            ours.end(second)
+            await seen.wait(TokenChange(second, False))
+        finally:
+            using.cancel()
+        assert changes == [TokenChange(OURS, True), TokenChange(second, True), TokenChange(second, False)]
+
+
 async def test_reader_is_found_and_served_when_a_declaration_of_its_key_is_lost() -> None:
     async with fabric() as (relay, ours, queue, reports, theirs):
         relay.lose_next = DOWN.encode()

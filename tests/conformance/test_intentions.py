@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
 import pytest
@@ -25,13 +26,15 @@ from support.world import HOME, World, world
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.mavlink import dialect
+from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.vehicle.link_loss import LossAction
 
-PAUSE, SET_HOME, ALTITUDE, ROI_NONE = (
+PAUSE, SET_HOME, ALTITUDE, ROI_NONE, TURN = (
     dialect.MAV_CMD_DO_PAUSE_CONTINUE,
     dialect.MAV_CMD_DO_SET_HOME,
     dialect.MAV_CMD_DO_CHANGE_ALTITUDE,
     dialect.MAV_CMD_DO_SET_ROI_NONE,
+    dialect.MAV_CMD_CONDITION_YAW,
 )
 
 
@@ -98,6 +101,55 @@ async def test_two_pauses_are_continued_like_one() -> None:
         first, last = moves(w)[0], moves(w)[-1]
         assert last["altitude"] == pytest.approx(first["altitude"], abs=0.01)  # a little lower than the paused move
         assert {**last, "altitude": 0.0} == {**first, "altitude": 0.0}
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+async def test_pause_then_the_shown_mode_is_continued_with_the_goto(flavour: str) -> None:
+    """Choosing the mode that a pause shows keeps the pause (docs/setpoints.md), so also what it goes on with."""
+    async with world(flavour=flavour, clients=2) as w:
+        await w.take_off()
+        assert await goto(w, 80.0, 10.0) == ACCEPTED
+        await leaves(w, 3.0)
+        assert (await w.client.command(PAUSE, 0)).result == ACCEPTED
+        shown = PX4_HOLD if flavour == "px4" else (1, 4)
+        assert (await w.clients[1].command(dialect.MAV_CMD_DO_SET_MODE, *shown)).result == ACCEPTED
+        count = len(moves(w))
+        assert (await w.client.command(PAUSE, 1)).result == ACCEPTED
+        assert len(moves(w)) == count + 1
+        await leaves(w, 70.0)
+
+
+async def test_two_pauses_over_a_slow_link_are_continued_with_the_goto() -> None:
+    """The second one arrives before the drone has answered the first."""
+    async with world(speed=1.0, clients=2) as w:
+        await w.take_off()
+        assert await goto(w, 80.0, 10.0) == ACCEPTED
+        await leaves(w, 3.0)
+        w.drone.faults.down = w.drone.faults.up = Impairment(delay=0.3)
+        marks = [client.mark() for client in w.clients]
+        w.clients[1].send_command(PAUSE, 0)
+        await asyncio.sleep(0.2)
+        w.client.send_command(PAUSE, 0)
+        assert (await until(w.clients[1], marks[1], 1))[0] == (PAUSE, CANCELLED)
+        assert (await until(w.client, marks[0], 1))[0] == (PAUSE, ACCEPTED)
+        count = len(moves(w))
+        assert (await w.clients[1].command(PAUSE, 1)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: len(moves(w)) > count, 5.0)
+
+
+async def test_continue_before_a_pause_has_begun_is_not_accepted_without_effect() -> None:
+    """ACCEPTED would say that setpoints fly the drone again, and a moment later the pause would hold them off."""
+    async with world(speed=1.0, flavour="ardupilot", clients=2) as w:
+        await w.take_off()
+        w.drone.faults.down = w.drone.faults.up = Impairment(delay=0.3)
+        w.clients[1].send_command(TURN, 180.0, 0, 1, 1)
+        await w.drone.wait_log(lambda e: e.name.endswith(".moveBy") and e.args["dPsi"] != 0.0, 5.0)
+        mark = w.client.mark()
+        w.client.send_command(PAUSE, 0)
+        await asyncio.sleep(0.2)
+        assert (await w.clients[1].command(PAUSE, 1)).result == REJECTED
+        assert (await until(w.client, mark, 1))[0] == (PAUSE, ACCEPTED)
+        assert (await w.client.command(PAUSE, 1)).result == ACCEPTED
 
 
 # -- what was refused

@@ -8,13 +8,15 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.fault_scenarios import ACCEPTED, ARM, REJECTED, RTL, SET_MODE, goto, heard, watched
+from support.fault_scenarios import TAKEOFF_CMD as TAKEOFF
 from support.missions import CORNERS, put, start
 from support.params import write
 from support.plans import ACCEPTED as TAKEN
 from support.plans import FENCE, square, upload
-from support.setpoints import COPTER_GUIDED, VELOCITY_ONLY, local, motion, streaming
+from support.setpoints import COPTER_GUIDED, VELOCITY_ONLY, local, motion, said, streaming, texts
 from support.world import HOME, World, world
 
+from anafi_mav.arsdk.messages import alarms
 from anafi_mav.arsdk.messages.skyctrl import Source
 from anafi_mav.sim.world.faults import Impairment
 
@@ -84,6 +86,43 @@ async def test_stream_from_before_pilots_takeoff_does_not_fly_the_drone(flavour:
             await watched(4.0)
             assert motion(w, 0.0) == []
             assert abs(w.drone.pose.north) < 0.5
+
+
+async def test_pilots_takeoff_after_an_ignored_takeoff_of_a_client_is_the_pilots() -> None:
+    """The drone has refused the client's by silence: a withdrawn take-off that it did not react to is over."""
+    mode, message = STREAMS["ardupilot"]
+    async with world(speed=1.0, flavour="ardupilot", skycontroller=3) as w:
+        assert w.drone.skycontroller is not None
+        w.drone.faults.untold = frozenset({alarms.TakeoffChecklist.NAME})
+        w.drone.faults.refuse_take_off = frozenset({alarms.TakeoffChecklistType.VCAM})
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        w.client.send_command(TAKEOFF, x=0.0, y=0.0, z=5.0)
+        await w.drone.wait_log(lambda e: e.name.endswith(".TakeOff"), 5.0)
+        await watched(1.5)
+        assert (await w.client.command(SET_MODE, *mode)).result == ACCEPTED
+        await watched(1.5)
+        w.drone.faults.refuse_take_off = frozenset()
+        async with streaming(w.client, message):
+            mark = w.client.mark()
+            w.drone.skycontroller.press(1)
+            await said(w.client, "Guided ended: takeoff by another controller", mark)
+            await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 20.0)
+            await watched(4.0)
+            assert motion(w, 0.0) == []
+
+
+async def test_late_takeoff_of_a_client_is_not_taken_for_the_pilots() -> None:
+    """Its acknowledgement was received, and the drone's reaction is on its way: the mode chosen meanwhile stays."""
+    async with world(speed=1.0, flavour="ardupilot", skycontroller=3) as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        mark = w.client.mark()
+        w.drone.faults.down = Impairment(delay=0.4)
+        w.client.send_command(TAKEOFF, x=0.0, y=0.0, z=5.0)
+        await w.drone.wait_log(lambda e: e.name.endswith(".TakeOff"), 5.0)
+        assert (await w.client.command(SET_MODE, 1, COPTER_GUIDED)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 20.0)
+        await watched(1.0)
+        assert not [text for text in texts(w.client, mark) if "another controller" in text]
 
 
 @generations

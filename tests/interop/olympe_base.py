@@ -135,8 +135,15 @@ class Visit:
             return False
 
     def comes_to_know(self, message: Any) -> bool:
-        """It is known, or told soon: Olympe asks for some of it itself when it is connected."""
-        return self.known(message) or bool(self.drone(message(_policy="check_wait", _timeout=LIMIT)).wait().success())
+        """Return True when a state is known or comes soon: Olympe asks for some of them itself when it is connected.
+
+        Olympe does not find the state of a camera by "check", and a busy machine begins to wait after it came.
+        """
+        for _ in range(int(LIMIT)):
+            if self.known(message):
+                return True
+            self.drone(message(_policy="wait", _timeout=1.0)).wait()
+        return False
 
     def flying_state(self, name: str, state: str) -> bool:
         """It is now, or will be."""

@@ -25,6 +25,21 @@ from olympe.examples import media_ai, skyctrl_media  # noqa: E402
 from olympe.features.media import media as media_feature  # noqa: E402
 
 
+def count_each_file_once(listener: type[skyctrl_media.MediaEventListener]) -> None:
+    """Let the examples' listener count a file once that Olympe downloads twice.
+
+    Olympe does so on a busy machine, when a file is created while its media is listed.
+    """
+    unsubscribe = listener.unsubscribe
+
+    def count(self: skyctrl_media.MediaEventListener) -> None:
+        self._media.wait_for_pending_downloads()
+        self._downloaded_resources = list({file.resource_id: file for file in self._downloaded_resources}.values())
+        unsubscribe(self)
+
+    listener.unsubscribe = count
+
+
 def main() -> None:
     olympe.log.update_config({"loggers": {name: {"level": "WARNING"} for name in ("olympe", "ulog", "urllib3")}})
     # The examples end with a disconnect() that must succeed. What would follow is Olympe's own way out, in which its
@@ -37,6 +52,7 @@ def main() -> None:
     # This example's own listener downloads the whole media again for each file of it that it is told of, and then finds
     # that it has more files than the drone. The other example's downloads once.
     media_ai.MediaEventListener = skyctrl_media.MediaEventListener
+    count_each_file_once(skyctrl_media.MediaEventListener)
     # It also says everything to the older camera feature first, which an Ai does not speak, and waits ten seconds.
     media_ai.configure_photo_burst_mode = skyctrl_media.setup_photo_burst_mode
     # Its other half, with a Media of one's own, cannot succeed: it asks the drone for what only that Media is told.

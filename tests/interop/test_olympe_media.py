@@ -27,7 +27,7 @@ async def test_olympes_media_examples(on: olympe.Combination, tmp_path: Path) ->
         report, err = await olympe.run("olympe_media.py", address, port, via, str(downloads), timeout=200.0)
     assert report == {"failed": None}, err
     told = olympe.complaints(err)
-    assert not told, "\n".join(told)
+    assert not told, err
 
     files = sorted(downloads.glob("*/*.JPG"))
     assert [file.name for file in files] == [f"1000000100{number:02}.JPG" for number in range(1, 15)]

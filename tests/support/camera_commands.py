@@ -22,7 +22,7 @@ NOT_PAYLOAD = {"PREFLIGHT_STORAGE"}
 
 THERMAL_MODELS = ("thermal", "usa")
 THERMAL_ONLY = {"SET_CAMERA_SOURCE", "CAMERA_THERMAL_RANGE"}
-"""On models without a thermal camera the command is UNSUPPORTED, the message TEMPORARILY_REJECTED."""
+"""UNSUPPORTED on models without a thermal camera."""
 
 REASONS = {
     "DO_DIGICAM_CONFIGURE": "settings are extended parameters",

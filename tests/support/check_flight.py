@@ -77,7 +77,7 @@ def check_flight(report: dict[str, Any], model: str, log: list[dict[str, Any]]) 
 
 
 def check_what_olympe_knows(report: dict[str, Any], model: str) -> None:
-    assert report["missing"] == []
+    assert not (missing := report["missing"]), missing
     known = report["known"]
     serial = known["serial_high"]["high"] + known["serial_low"]["low"]
     assert re.fullmatch(r"PI0404[0-9A-Z]{6}\d{6}", serial)

@@ -16,15 +16,16 @@ STATION = dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3)
 
 OPTIONS = {
     "observer": EndpointOptions(access="observe"),
+    "flyer": EndpointOptions(access="control"),
     "limited": EndpointOptions(systems=(OURS,)),
     "pilot": EndpointOptions(),
     "drone": EndpointOptions(),
 }
-"""Of the endpoints: `limited` reaches our own drone alone."""
+"""Of the endpoints: `limited` reaches our own drone alone, `flyer` may fly and maintain nothing."""
 
 
 class Party:
-    """A node with an observer, a client of some systems, a pilot and the channel of a foreign drone."""
+    """A node with observer, flyer, a client of some systems, a pilot and the channel of a foreign drone."""
 
     def __init__(self) -> None:
         self.node = Node()

@@ -499,7 +499,7 @@ async def guided(s: Session) -> None:
         await s.command(Cmd.MAV_CMD_DO_SET_ROI, 0, 0, 0, 0, x=HOME[0], y=HOME[1], z=0.0)
         await asyncio.sleep(1.0)
         await s.command(Cmd.MAV_CMD_DO_SET_ROI_NONE)
-        await s.command(Cmd.MAV_CMD_NAV_LOITER_UNLIM)
+        await s.command(Cmd.MAV_CMD_NAV_LOITER_TO_ALT)
         await s.stream(setpoints.attitude(-0.1), 2.0)
         await asyncio.sleep(2.0)
         await s.goto(6.0, 6.0, 500.0)  # above every ceiling

@@ -1,14 +1,18 @@
-"""Frames of the ARSDK transport, in the three protocol versions. No I/O.
+"""Frames of the ARSDK transport, in three protocol versions, and their commands. No I/O.
 
 A datagram is a row of frames. A frame has a type, the id of a queue, a sequence number and a payload; everything is
-little-endian (arsdk-ng libarsdk/src/net/arsdk_transport_net.c). What payloads hold is in `packing`, who sends which
-queue and when in `transport`.
+little-endian (arsdk-ng libarsdk/src/net/arsdk_transport_net.c). Who sends which queue and when is in `transport`.
+
+A payload holds commands. Version 1 puts one command into a frame. Version 2 packs ``u16 length, command`` pairs,
+version 3 ``varint length, command`` pairs, and splits an acknowledged command that is longer than a frame: the next
+frame of that queue then begins with its rest, without a length (arsdk-ng libarsdk/src/cmd_itf/arsdk_cmd_itf{1,2,3}.c).
 """
 
 from __future__ import annotations
 
 import enum
 import struct
+from collections import deque
 from typing import NamedTuple
 
 from anafi_mav.errors import LocalProtocolError
@@ -133,3 +137,142 @@ def _decode_v2(version: int, data: bytes) -> tuple[list[Frame], str | None]:
         frames.append(Frame(type, id, seq, data[start:end]))
         position = end
     return frames, None
+
+
+# Commands in payloads.
+
+PACK_LIMIT = {1: 65_000, 2: 1400, 3: 1000}
+"""Most payload bytes of a frame. v2, v3: ARSDK_PACK_MAX_SIZE of cmd_itf2 and 3; v1: what a UDP datagram can carry."""
+
+MAX_COMMAND = 65_535
+"""Longest split command that is sent or put together. No command of Parrot's comes near."""
+
+SMALLEST_COMMAND = 4
+"""Bytes of a command without arguments."""
+
+_U16 = struct.Struct("<H")
+_SHORT = [encode_varint(length) for length in range(128)]
+"""Nearly every command is shorter than this."""
+
+
+def with_length(version: int, command: bytes) -> bytes:
+    """A command as it lies in a payload."""
+    if version == 1:
+        return command
+    length = len(command)
+    if version == 2:
+        return _U16.pack(length) + command
+    return (_SHORT[length] if length < len(_SHORT) else encode_varint(length)) + command
+
+
+def longest_command(version: int, acknowledged: bool) -> int:
+    """Most bytes of a command that can be sent."""
+    if version == 3 and acknowledged:
+        return MAX_COMMAND
+    return PACK_LIMIT[version] - (0 if version == 1 else 2)
+
+
+class Waiting:
+    """An acknowledged command that is not yet completely in frames.
+
+    `packed` counts the bytes that already are.
+    """
+
+    __slots__ = ("command", "forever", "packed", "token", "yields")
+
+    def __init__(self, token: int, command: bytes, forever: bool, *, yields: bool = False) -> None:
+        self.token = token
+        self.command = command
+        self.forever = forever
+        """True when it is repeated until the link is down."""
+        self.yields = yields
+        """True when an urgent command that is sent later goes before it."""
+        self.packed = 0
+
+
+class Piece(NamedTuple):
+    """A command, or a part of a split one, in a frame; `last` says that it ends here."""
+
+    source: Waiting
+    data: bytes
+    last: bool
+
+
+def pack(version: int, waiting: deque[Waiting]) -> list[Piece]:
+    """Take from `waiting` what the next frame carries.
+
+    Only a command too long for any frame is split.
+    """
+    if version == 1:
+        first = waiting.popleft()
+        return [Piece(first, first.command, True)]
+    pieces: list[Piece] = []
+    room = PACK_LIMIT[version]
+    while waiting:
+        first = waiting[0]
+        data = first.command[first.packed :] if first.packed else with_length(version, first.command)
+        if len(data) <= room:
+            pieces.append(Piece(first, data, True))
+            waiting.popleft()
+            room -= len(data)
+        elif pieces:
+            break
+        else:
+            pieces.append(Piece(first, data[:room], False))
+            first.packed = len(first.command) - len(data) + room
+            break
+    return pieces
+
+
+class Unpacker:
+    """Finds the commands in the payloads that arrive, and puts split ones together."""
+
+    def __init__(self, version: int) -> None:
+        self._version = version
+        self._partial: dict[int, tuple[int, bytearray]] = {}
+        """Queue id -> (length, bytes so far) of a split command; bounded by `MAX_COMMAND` and the few ids."""
+
+    def unpack(self, id: int, acknowledged: bool, payload: bytes) -> tuple[list[bytes], bool]:
+        """Return the complete commands of a payload from queue `id`, and a success flag.
+
+        The flag is False when the rest of the payload is unreadable.
+        """
+        if self._version == 1:
+            return [payload], True
+        commands: list[bytes] = []
+        position, end = 0, len(payload)
+        if acknowledged and id in self._partial:
+            size, collected = self._partial.pop(id)
+            position = min(end, size - len(collected))
+            collected += payload[:position]
+            if len(collected) < size:
+                self._partial[id] = (size, collected)
+                return commands, True
+            commands.append(bytes(collected))
+        while position < end:
+            size = payload[position]
+            if size < 0x80 and self._version == 3:  # nearly every command
+                position += 1
+            else:
+                read = self._length(payload, position)
+                if read is None:
+                    return commands, False
+                size, position = read
+            if size < SMALLEST_COMMAND:
+                return commands, False
+            if size > end - position:
+                if self._version == 2 or not acknowledged or size > MAX_COMMAND:
+                    return commands, False
+                self._partial[id] = (size, bytearray(payload[position:]))
+                return commands, True
+            commands.append(payload[position : position + size])
+            position += size
+        return commands, True
+
+    def _length(self, payload: bytes, position: int) -> tuple[int, int] | None:
+        """(length of the next command, where it begins)."""
+        if self._version == 3:
+            return decode_varint(payload, position)
+        if len(payload) - position < _U16.size:
+            return None
+        return _U16.unpack_from(payload, position)[0], position + _U16.size

@@ -29,17 +29,20 @@ import msgspec
 from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.codec.value_events import Received, receive
 from anafi_mav.arsdk.codec.wire import Buffer, Message, MessageId, UnknownMessage
-from anafi_mav.arsdk.link.frame import VERSIONS, FrameType, decode_frames, encode_frame
-from anafi_mav.arsdk.link.packing import (
-    KNOWN_PAYLOADS,
+from anafi_mav.arsdk.link.frame import (
     PACK_LIMIT,
+    VERSIONS,
+    FrameType,
     Piece,
     Unpacker,
     Waiting,
+    decode_frames,
+    encode_frame,
     longest_command,
     pack,
     with_length,
 )
+from anafi_mav.arsdk.link.known_payloads import KNOWN_PAYLOADS
 from anafi_mav.errors import LocalProtocolError
 
 PING, PONG = 0, 1

@@ -255,16 +255,16 @@ class Animations(Commanding[AnimationsState]):
         self._require(self.state.running, "animations")
         if self.state.running == Type.NONE:
             return not self.state.canceled
-        error = CommandTimeout("the end of an animation", timeout)
+        what = "the end of an animation"
 
         def judge(message: Any) -> bool | AnafiMavError | None:
             if message.type == Type.NONE:
                 return True
-            answer.expire_after(timeout, error)
+            answer.expire_after(timeout, what)
             return None
 
         answer = self._commander.expect((animation.State,), judge)
-        answer.expire_after(timeout, error)
+        answer.expire_after(timeout, what)
         await answer.wait()
         return not self.state.canceled
 

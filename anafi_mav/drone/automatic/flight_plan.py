@@ -256,7 +256,7 @@ class FlightPlan(Commanding[FlightPlanState]):
                 return CommandRejected(self._why())
             if sent.awaited and isinstance(message, common.StartingErrorEvent):
                 seconds = max(0.0, min(begun + timeout - loop_time(), DOUBT_TIMEOUT))
-                sent.answer.expire_after(seconds, CommandTimeout(command.NAME, seconds))
+                sent.answer.expire_after(seconds, command.NAME)
             return True if sent.phase is Phase.CONFIRMED else None
 
         answers = (common.MavlinkFilePlayingStateChanged, common.StartingErrorEvent)

@@ -321,7 +321,7 @@ class Controller(Element[ControllerState]):
             taken = self._expect_source(Source.CONTROLLER)
             if not self.taken:
                 self._take()
-            taken.expire_after(timeout, CommandTimeout(skyctrl.SetPilotingSource.NAME, timeout))
+            taken.expire_after(timeout, skyctrl.SetPilotingSource.NAME)
             await taken.wait()
         except BaseException:
             self.keep_no_longer()
@@ -342,7 +342,7 @@ class Controller(Element[ControllerState]):
             return
         back = self._expect_source(Source.SKY_CONTROLLER)
         self.give_back()
-        back.expire_after(timeout, CommandTimeout(skyctrl.SetPilotingSource.NAME, timeout))
+        back.expire_after(timeout, skyctrl.SetPilotingSource.NAME)
         await back.wait()
 
     def _expect_source(self, source: Source) -> Expectation[bool]:

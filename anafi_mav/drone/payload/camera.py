@@ -39,7 +39,7 @@ from anafi_mav.drone.payload.camera_state import (
     RecordingSettings,
 )
 from anafi_mav.drone.settings import Commanding, Question, number
-from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
+from anafi_mav.errors import AnafiMavError, CommandRejected, LocalProtocolError, NotSupported
 from anafi_mav.units import clip
 
 MAIN = 0
@@ -473,7 +473,7 @@ class Camera(Commanding[CamerasState]):
             if update is None or update.camera != id:
                 return None
             if next is not None:
-                answer.expire_after(next, CommandTimeout(command.NAME, next))
+                answer.expire_after(next, command.NAME)
             return judge(update)
 
         answer = self._commander.expect(events, listen)

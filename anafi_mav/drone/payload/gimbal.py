@@ -32,7 +32,7 @@ from anafi_mav.drone.element import Range, Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.settings import Commanding
 from anafi_mav.drone.values import Values
-from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
+from anafi_mav.errors import AnafiMavError, CommandRejected, LocalProtocolError, NotSupported
 from anafi_mav.units import clip
 
 MAIN = 0
@@ -396,7 +396,7 @@ class Gimbal(Commanding[Gimbals]):
                 return None
             if isinstance(message, gimbal.CalibrationState):
                 if message.state == GimbalCalibrationState.IN_PROGRESS:
-                    answer.expire_after(timeout, CommandTimeout(gimbal.Calibrate.NAME, timeout))
+                    answer.expire_after(timeout, gimbal.Calibrate.NAME)
                 return None
             if message.result == GimbalCalibrationResult.SUCCESS:
                 return True

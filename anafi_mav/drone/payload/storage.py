@@ -31,7 +31,7 @@ from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.payload.camera_enums import StoragePolicy
 from anafi_mav.drone.settings import Commanding, Question
 from anafi_mav.drone.status.alerts import spoken
-from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
+from anafi_mav.errors import AnafiMavError, CommandRejected, LocalProtocolError, NotSupported
 
 FORMAT_TIMEOUT = 120.0
 """s without news from a drone that formats. A full format of a large card is minutes, but it reports its progress."""
@@ -342,7 +342,7 @@ class Storage(Commanding[Storages]):
                 if result == FormattingResult.SUCCESS:
                     return True
                 return CommandRejected(f"format: {spoken(result)}")
-            answer.expire_after(timeout, CommandTimeout(command.NAME, timeout))
+            answer.expire_after(timeout, command.NAME)
             state = self[storage].file_system
             began = began or state == FsState.FORMATTING
             if tells or not began:

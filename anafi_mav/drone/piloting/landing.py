@@ -63,7 +63,7 @@ class LandingEnd:
         if self._flight.state.flying != FlyingState.LANDING:
             return
         answer = self._commander.expect((ardrone3.FlyingStateChanged,), _judge)
-        answer.expire_after(timeout, CommandTimeout("the end of the landing", timeout))
+        answer.expire_after(timeout, "the end of the landing")
         self._motors.landing_doubtful()
         sent, smart = SentCommand(Slot.LANDING_END), take_off and self._is_modern()
         try:

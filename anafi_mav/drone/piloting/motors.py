@@ -14,10 +14,10 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.drone.element import Element
-from anafi_mav.drone.expectation import QUIET, Commander, loop_time
+from anafi_mav.drone.expectation import Commander, loop_time
 from anafi_mav.drone.piloting.state import MOTORS_OFF, PilotingState, in_state
 from anafi_mav.drone.piloting.stick_stream import StickStream
-from anafi_mav.drone.sent_commands import AUTOMATIC, TAKEN_OFF, Phase, SentCommand, Slot
+from anafi_mav.drone.sent_commands import AUTOMATIC, QUIET, TAKEN_OFF, Phase, SentCommand, Slot
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout
 
 RAMPING_TIMEOUT = 10.0
@@ -115,7 +115,7 @@ class Motors:
     @property
     def has_launched(self) -> bool:
         executed = any(self._sent.is_executed(slot) for slot in (Slot.LAUNCH, Slot.PLAN))
-        return executed or self._sent.may_start_motors(loop_time())
+        return executed or self._sent.has_started_motors(loop_time())
 
     async def take_off(self, timeout: float) -> None:
         self._commander.require_link()
@@ -147,7 +147,7 @@ class Motors:
 
         def judge(message: ardrone3.FlyingStateChanged) -> bool | AnafiMavError | None:
             if message.state == FlyingState.MOTOR_RAMPING:
-                sent.answer.expire_after(RAMPING_TIMEOUT, CommandTimeout(command.NAME, RAMPING_TIMEOUT))
+                sent.answer.expire_after(RAMPING_TIMEOUT, command.NAME)
             elif sent.phase is Phase.REFUSED:
                 return CommandRejected(self._why_on_the_ground("the motors stopped again"))
             return True if sent.phase is Phase.CONFIRMED else None
@@ -225,7 +225,7 @@ class Motors:
 
         answer = self._commander.expect((ardrone3.FlyingStateChanged,), judge)
         seconds = max(timeout, LAND_INSISTS) if rising else timeout
-        answer.expire_after(seconds, CommandTimeout(ardrone3.Landing.NAME, seconds))
+        answer.expire_after(seconds, ardrone3.Landing.NAME)
         try:
             send()
             began = doubtful and await answer.wait_or_quiet(sent[0], ardrone3.Landing.NAME, timeout)
@@ -256,7 +256,7 @@ class Motors:
             return True if message.state in MOTORS_OFF else None
 
         answer = self._commander.expect((ardrone3.FlyingStateChanged,), judge)
-        answer.expire_after(STOP_MOTORS_TIMEOUT, CommandTimeout(ardrone3.Landing.NAME, STOP_MOTORS_TIMEOUT))
+        answer.expire_after(STOP_MOTORS_TIMEOUT, ardrone3.Landing.NAME)
         self._sticks.landings_asked += 1
         try:
             if self._flight.state.flying in TURNING:

@@ -7,7 +7,7 @@ answer, and then its command is withdrawn; `LinkLost` when the link is lost mean
 own: body axes front, right, down; heights above the take-off point.
 
 The promises of the verbs are documented here. Their implementation is in `motors` (up and down),
-`guided_moves` (guided moves), `return_home` (home) and `stick_stream` (PCMDs); common to all of them, and
+`guided_moves` (guided moves, home) and `stick_stream` (PCMDs); common to all of them, and
 therefore here, is above all `hover`.
 """
 
@@ -24,19 +24,18 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveToStatus, Orienta
 from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.drone.element import Reducer
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT, QUIET, Commander, loop_time
-from anafi_mav.drone.piloting.guided_moves import GuidedMoves
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
+from anafi_mav.drone.piloting.guided_moves import GuidedMoves, ReturnHome
 from anafi_mav.drone.piloting.landing import LandingEnd
 from anafi_mav.drone.piloting.motors import Motors
 from anafi_mav.drone.piloting.moves import Displacement, Move, MoveEnd, Moves
-from anafi_mav.drone.piloting.return_home import ReturnHome
 from anafi_mav.drone.piloting.settings import PilotingSettings
 from anafi_mav.drone.piloting.state import REDUCERS, PilotingState
 from anafi_mav.drone.piloting.stick_stream import StickStream
 from anafi_mav.drone.piloting.sticks import Limits, PilotingCommand, percent
-from anafi_mav.drone.sent_commands import Slot
+from anafi_mav.drone.sent_commands import QUIET, Slot
 from anafi_mav.drone.status.home import Home
-from anafi_mav.errors import CommandTimeout, NotSupported
+from anafi_mav.errors import NotSupported
 
 _IN_FLIGHT = frozenset({FlyingState.HOVERING, FlyingState.FLYING})
 
@@ -368,7 +367,7 @@ class Piloting(PilotingSettings):
         try:
             self.hover()
             for answer in answers:
-                answer.expire_after(timeout, CommandTimeout("hover", timeout))
+                answer.expire_after(timeout, "hover")
             for answer in answers:
                 await answer.wait()
             # Of what was given up before it was confirmed no event may speak; but the order to stop has to arrive.

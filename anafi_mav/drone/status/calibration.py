@@ -14,7 +14,7 @@ from anafi_mav.arsdk.messages.common import CalibrationAxis, Sensor
 from anafi_mav.drone.element import Reducer, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.settings import Commanding
-from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout
+from anafi_mav.errors import AnafiMavError, CommandRejected
 
 _REQUIRED, _RECOMMENDED = 1, 2
 
@@ -111,14 +111,13 @@ class Calibration(Commanding[CalibrationState]):
         self._require(self.state.started, "magnetometer calibration")
         if not self.state.started:
             return
-        error = CommandTimeout(common.MagnetoCalibration.NAME, timeout)
 
         def judge(message: Any) -> bool | AnafiMavError | None:
             if self.state.failed:
                 return CommandRejected("the calibration of the magnetometer failed")
             if not self.state.started:
                 return True
-            answer.expire_after(timeout, error)
+            answer.expire_after(timeout, common.MagnetoCalibration.NAME)
             return None
 
         answer = self._commander.expect(
@@ -129,5 +128,5 @@ class Calibration(Commanding[CalibrationState]):
             ),
             judge,
         )
-        answer.expire_after(timeout, error)
+        answer.expire_after(timeout, common.MagnetoCalibration.NAME)
         await answer.wait()

@@ -19,6 +19,10 @@ from anafi_mav.plans.plan import GLOBAL, GLOBAL_INT, MISSION, RELATIVE, RELATIVE
 Version = Literal[1, 2]
 
 HEADER = "QGC WPL 120"
+
+UNSET = "nan"
+"""As in Parrot's own files."""
+
 _HEADER = re.compile(r"QGC WPL \d+")
 
 SET_VIEW_MODE, SET_STILL_MODE = 50000, 50001
@@ -156,7 +160,7 @@ def write(plan: Plan, version: Version) -> tuple[bytes, list[Loss]]:
         losses.append(Loss(f"the fence of {counted(len(plan.zones), 'zone')}"))
     if plan.rally:
         losses.append(Loss(counted(len(plan.rally), "rally point")))
-    return text_of(HEADER, written, current=None), losses + editor_losses(plan)
+    return text_of(HEADER, written, current=None, unset=UNSET), losses + editor_losses(plan)
 
 
 def _held(number: int, item: Item, version: Version, losses: list[Loss]) -> Item | None:

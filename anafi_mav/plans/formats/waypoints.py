@@ -34,6 +34,10 @@ HEADER = "QGC WPL 110"
 
 COLUMNS = 12
 
+UNSET = "NaN"
+"""As .NET spells it. Mission Planner drops a line with any other spelling and loads the others (its FlightPlanner.cs
+reads each with double.Parse, and shows "Line invalid"), Python's readers take all."""
+
 _FENCE = range(mav_enums.MAV_CMD_NAV_FENCE_RETURN_POINT, mav_enums.MAV_CMD_NAV_FENCE_RETURN_POINT + 6)
 _RALLY = (mav_enums.MAV_CMD_NAV_RALLY_POINT,)
 
@@ -78,11 +82,14 @@ def _number(word: str, item: int, source: str) -> float | None:
     return None if math.isnan(value) else value
 
 
-def text_of(header: str, items: list[Item], current: int | None = 0) -> bytes:
-    """A file of these items; `current` is the one that is marked."""
+def text_of(header: str, items: list[Item], current: int | None = 0, unset: str = UNSET) -> bytes:
+    """Return a file of these items.
+
+    `current` is the one that is marked, `unset` stands for a value that is not set.
+    """
     lines = [header]
     for number, item in enumerate(items):
-        numbers = "\t".join(["nan" if value is None else _decimal(value) for value in item.params])
+        numbers = "\t".join([unset if value is None else _decimal(value) for value in item.params])
         head = f"{number}\t{int(number == current)}\t{item.frame}\t{item.command}"
         lines.append(f"{head}\t{numbers}\t{int(item.autocontinue)}")
     return ("\n".join(lines) + "\n").encode()

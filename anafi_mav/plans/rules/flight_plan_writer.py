@@ -50,6 +50,12 @@ SAME_PLACE = 1.0
 RECTILINEAR = 12.0
 """Format of photos (Parrot's flight plan page): MAVLink has no word for it, and this is what the camera begins with."""
 
+HIGHEST = 20_000.0
+"""m, above and below: a height beyond is a number in the wrong field. The highest ground is 9 km above the sea."""
+
+LARGEST_HEADING = 720.0
+"""deg: two turns. A larger heading or angle is a number in the wrong field."""
+
 SHORTEST_INTERVAL, SHORTEST_STEP = 2.0, 1.0
 """s and m between photos (capability messages of the cameras, arsdk camera feature)."""
 
@@ -252,6 +258,8 @@ class FlightPlanWriter:
         value = item.params[6]
         if value is None:
             return None
+        if abs(value) > HIGHEST:
+            self.refuse(f"invalid height of {value:g} m", 7)
         if item.frame in (RELATIVE, RELATIVE_INT):
             return value
         if item.frame in (TERRAIN, TERRAIN_INT):
@@ -302,6 +310,8 @@ class FlightPlanWriter:
 
         MAVSDK's headings are in [-180, 180). The drone's reader is not documented to take a negative one.
         """
+        if heading is not None and abs(heading) > LARGEST_HEADING:
+            self.refuse(f"invalid heading of {heading:g} deg", 4)
         if self.muted:
             return
         if not self._lines:

@@ -6,10 +6,23 @@ from dataclasses import replace
 
 from anafi_mav import mav_enums
 from anafi_mav.plans.plan import DO_JUMP, WAYPOINT, Item, Point
-from anafi_mav.plans.rules.flight_plan_writer import FlightPlanWriter
+from anafi_mav.plans.rules.flight_plan_writer import LARGEST_HEADING, FlightPlanWriter
 from anafi_mav.plans.rules.rule import Fidelity, Rule
 
+LONGEST_WAIT = 3600.0
+"""s. No ANAFI flies for as long; a longer wait is a number in the wrong field, or in another unit."""
+
+WIDEST = 4000.0
+"""m of an acceptance radius: the maximum of the drone's MaxDistance. Wider, an item is reached where it begins."""
+
 # What flies.
+
+
+def _wait(writer: FlightPlanWriter, seconds: float) -> float:
+    """Return the wait of param1; refuse the item when it is none."""
+    if not 0.0 <= seconds <= LONGEST_WAIT:
+        writer.refuse(f"invalid wait of {seconds:g} s", 1)
+    return seconds
 
 
 def _fly(writer: FlightPlanWriter, item: Item, heading: float | None, radius: float | None = None) -> None:
@@ -18,16 +31,15 @@ def _fly(writer: FlightPlanWriter, item: Item, heading: float | None, radius: fl
 
 def _waypoint(writer: FlightPlanWriter, item: Item) -> None:
     hold, radius, beside, heading = item.params[:4]
-    if (hold or 0.0) < 0.0:
-        writer.refuse(f"invalid wait of {hold:g} s", 1)
-    if (radius or 0.0) < 0.0:
+    seconds = _wait(writer, hold or 0.0)
+    if not 0.0 <= (radius or 0.0) <= WIDEST:
         writer.refuse(f"invalid radius of {radius:g} m", 2)
     if not writer.names_place(item):
         writer.say("no place: the drone's position is used")
     if beside:
         writer.say(f"flown over, not passed at {abs(beside):g} m")
     _fly(writer, item, heading, radius)
-    writer.wait(hold or 0.0)
+    writer.wait(seconds)
 
 
 def _loiter(writer: FlightPlanWriter, item: Item) -> None:
@@ -35,9 +47,7 @@ def _loiter(writer: FlightPlanWriter, item: Item) -> None:
 
 
 def _loiter_time(writer: FlightPlanWriter, item: Item) -> None:
-    seconds = item.params[0] or 0.0
-    if seconds < 0.0:
-        writer.refuse(f"invalid wait of {seconds:g} s", 1)
+    seconds = _wait(writer, item.params[0] or 0.0)
     _fly(writer, item, None)
     writer.wait(seconds)
 
@@ -91,13 +101,11 @@ def _delay(writer: FlightPlanWriter, item: Item) -> None:
     seconds = item.params[0]
     if seconds is None or seconds < 0.0:
         writer.refuse("waiting for a time of day is unsupported" if seconds == -1.0 else "no delay", 1)
-    writer.wait(seconds)
+    writer.wait(_wait(writer, seconds))
 
 
 def _condition_delay(writer: FlightPlanWriter, item: Item) -> None:
-    seconds = item.params[0] or 0.0
-    if seconds < 0.0:
-        writer.refuse(f"invalid wait of {seconds:g} s", 1)
+    seconds = _wait(writer, item.params[0] or 0.0)
     if seconds:
         writer.say("the drone waits in place, not on the way to the next waypoint")
     writer.wait(seconds)
@@ -114,8 +122,8 @@ def is_relative(reference: float | None) -> bool:
 def _turn(writer: FlightPlanWriter, item: Item) -> None:
     """Only what the drone looks at then: the gateway turns it."""
     angle, _, way, reference = item.params[:4]
-    if angle is None:
-        writer.refuse("no angle", 1)
+    if angle is None or abs(angle) > LARGEST_HEADING:
+        writer.refuse("no angle" if angle is None else f"invalid angle of {angle:g} deg", 1)
     if reference is not None and not (reference.is_integer() and 0.0 <= reference <= 0xFF):
         writer.refuse(f"invalid reference {reference:g}", 4)
     if way not in (None, -1.0, 0.0, 1.0):

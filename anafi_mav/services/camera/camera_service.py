@@ -67,7 +67,7 @@ class CameraService(Service):
             dialect.MAVLINK_MSG_ID_CAMERA_FOV_STATUS: MessageStream(
                 lambda vehicle, times: camera_messages.fov_status(vehicle, times, current_pose(vehicle.drone))
             ),
-            dialect.MAVLINK_MSG_ID_CAMERA_THERMAL_RANGE: MessageStream(_thermal_range),
+            dialect.MAVLINK_MSG_ID_CAMERA_THERMAL_RANGE: MessageStream(_thermal_range, is_supported=_has_thermal),
         }
 
     def requests(self) -> Mapping[int, Request]:
@@ -261,6 +261,10 @@ class CameraService(Service):
 def _effect_of_zoom(command: Command) -> Effect:
     """A step counts each time; a factor or a rate may be set twice."""
     return Effect.EACH if command.params[0] == dialect.ZOOM_TYPE_STEP else Effect.TARGET
+
+
+def _has_thermal(vehicle: Vehicle) -> bool:
+    return camera_messages.has_thermal(vehicle.drone.identity.model)
 
 
 def _thermal_range(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:

@@ -31,7 +31,7 @@ from anafi_mav.services.definition_link import DefinitionContent
 from anafi_mav.services.files import Query, ServedFile
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.services.paced_sender import PacedSender
-from anafi_mav.services.service import Host, MessageHandler, Service, client_of
+from anafi_mav.services.service import Host, MessageHandler, Service
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.refusal import reason_of
 from anafi_mav.vehicle.base.severity import Severity
@@ -81,7 +81,7 @@ class Write:
     @property
     def key(self) -> tuple[Hashable, str]:
         """Client and setting: a newer write of the same replaces one that waits."""
-        return client_of(self.inbound), self.name
+        return self.inbound.client, self.name
 
 
 class ParamExtService(Service):
@@ -227,7 +227,7 @@ class ParamExtService(Service):
                 yield self._message(place)
                 place += 1
 
-        self._sender.start(inbound.channel, client_of(inbound), messages())
+        self._sender.start(inbound.channel, inbound.client, messages())
 
     def _request_read(self, inbound: Inbound) -> None:
         message = inbound.message

@@ -11,7 +11,7 @@ import math
 from collections.abc import Awaitable, Callable, Mapping
 
 from anafi_mav import texts
-from anafi_mav.drone.events import CalibrationAxis, MagnetoCalibrationStateChanged, Message
+from anafi_mav.drone.events import CalibrationAxis, FlyingState, MagnetoCalibrationStateChanged, Message
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, ProgressPolicy
@@ -20,6 +20,7 @@ from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.flight_task import MAINTENANCE
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.vehicle import Vehicle
 
 _MAGNETOMETER, _HORIZON = 1.0, 2.0
 """param2 and param5 of MAV_CMD_PREFLIGHT_CALIBRATION that can be meant for an ANAFI (MAVLink common.xml)."""
@@ -43,6 +44,17 @@ of that turn, and what to do with the drone in hand. QGroundControl shows the pi
 
 
 Work = Callable[[], Awaitable[None]]
+
+
+def require_standing(vehicle: Vehicle, what: OperatorText) -> None:
+    """Raise `Refused` unless the drone stands with its motors off.
+
+    After a motor cut it may still be falling.
+    """
+    if vehicle.flying_state is FlyingState.EMERGENCY:
+        raise Refused(what, texts.EMERGENCY_STOP)
+    if not vehicle.on_ground or vehicle.drone.piloting.about_to_fly:
+        raise Refused(what, texts.NOT_ON_GROUND)
 
 
 class CalibrationService(Service):
@@ -94,9 +106,7 @@ class CalibrationService(Service):
             raise Refused(texts.CALIBRATION, texts.CALIBRATIONS, lasting=True)
 
     async def _on_ground(self, command: Command, what: OperatorText, work: Work) -> None:
-        vehicle = self.host.vehicle
-        if not vehicle.on_ground or vehicle.drone.piloting.about_to_fly:
-            raise Refused(what, texts.NOT_ON_GROUND)
+        require_standing(self.host.vehicle, what)
         await self._acquire(command)
         await work()
 
@@ -191,8 +201,8 @@ class CalibrationService(Service):
         await self._on_ground(command, texts.RESTART, self._restart)
 
     async def _restart(self) -> None:
-        self.host.text(Severity.NOTICE, texts.DRONE_RESTARTS)
         await self.host.drone.request_reboot()
+        self.host.text(Severity.NOTICE, texts.DRONE_RESTARTS)
         self.host.spawn(self._watch_restart())
 
     async def _watch_restart(self) -> None:

@@ -1,5 +1,8 @@
 """The command protocol's service: runs commands, informs their senders, ends replaced ones.
 
+The aircraft, the camera and its zoom exist once, whichever component a command is addressed to: an action of the camera
+component that moves the aircraft ends older flight commands to the autopilot, and newer ones end it.
+
 The table of actions holds the meaning of a command; `CommandHistory` knows whether it is a new one (both without I/O).
 Rules: conformance R5-R10, C2, MAVLink command.md.
 """
@@ -7,10 +10,12 @@ Rules: conformance R5-R10, C2, MAVLink command.md.
 from __future__ import annotations
 
 import asyncio
+import itertools
 import logging
 from collections.abc import Callable, Coroutine, Hashable, Mapping
 from typing import Any
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from anafi_mav import texts
@@ -20,8 +25,6 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.command.command_log import CommandLog, Refusal
-from anafi_mav.services.command.running_actions import RunningAction, RunningActions
-from anafi_mav.services.command_targets import UnsupportedFrame
 from anafi_mav.services.commands import (
     LATE_PROGRESS_AFTER,
     PROGRESS_AFTER,
@@ -39,7 +42,9 @@ from anafi_mav.services.commands import (
     from_long,
 )
 from anafi_mav.services.flavours import Flavour, flavour_of
-from anafi_mav.services.service import Host, MessageHandler, Query, Service, channel_of, client_of
+from anafi_mav.services.service import Host, MessageHandler, Query, Service, channel_of
+from anafi_mav.vehicle.base.bounds import UnsupportedFrame
+from anafi_mav.vehicle.base.flight_task import FlightAction, FlightActions
 from anafi_mav.vehicle.base.refusal import NotInControl, Refused, Unsupported, text_of
 from anafi_mav.vehicle.base.severity import Severity
 
@@ -51,6 +56,9 @@ SETTLE = 0.1
 They wait for the drone, whose loss they learn at once.
 """
 
+MAX_WAITING = 32
+"""Actions of one group that run one after another: a drone that answers none of them takes seconds for each."""
+
 _Decode = Callable[[Any, Definition, Hashable, Flavour], Command]
 
 _RESULT_BY_ERROR: tuple[tuple[type[AnafiMavError], int], ...] = (
@@ -61,6 +69,68 @@ _RESULT_BY_ERROR: tuple[tuple[type[AnafiMavError], int], ...] = (
     (CommandRejected, dialect.MAV_RESULT_TEMPORARILY_REJECTED),
     (CommandTimeout, dialect.MAV_RESULT_FAILED),
 )
+
+
+class RunningAction(Struct, eq=False):
+    """A running action that changes the vehicle's state."""
+
+    client: Hashable
+    answer: tuple[Inbound, Execution] | None
+    """Client and command to acknowledge; None for messages without acknowledgement."""
+    group: ActionGroup = ActionGroup.FLIGHT
+
+
+class RunningActions:
+    """Running actions of one system, and the histories of its components."""
+
+    def __init__(self, flight: FlightActions | None = None) -> None:
+        """`flight`: the actions of the vehicle, whose control ends those that fly."""
+        self.flight = flight or FlightActions()
+        self.flight.on_begun(self.forget)
+        self.flight.on_replaced(self._supersede)
+        self.tasks: dict[asyncio.Task[None], RunningAction] = {}
+        """In the sequence of their arrival, which is not that of their first steps."""
+        self.histories: list[CommandHistory] = []
+
+    @property
+    def current(self) -> RunningAction | None:
+        """The action that calls; None outside of them."""
+        task = asyncio.current_task()
+        return None if task is None else self.tasks.get(task)
+
+    def add(self, task: asyncio.Task[None], running: RunningAction, *, is_order: bool) -> None:
+        """Note an action that begins."""
+        self.tasks[task] = running
+        self.flight.add(task, FlightAction(running.client, is_order, flies=running.group is ActionGroup.FLIGHT))
+
+    def is_full(self, group: ActionGroup) -> bool:
+        """Return True when a group whose actions run in order takes no further one."""
+        return group.in_order and sum(one.group is group for one in self.tasks.values()) >= MAX_WAITING
+
+    def end_others(self, group: ActionGroup) -> list[asyncio.Task[None]]:
+        """Cancel all actions of a group that are older than the calling one.
+
+        Their senders get CANCELLED. A newer action than the calling one continues: it will replace this one.
+        """
+        if group is ActionGroup.FLIGHT:
+            return self.flight.end_older()
+        task, current = asyncio.current_task(), self.current
+        older = itertools.takewhile(lambda other: other is not task, self.tasks)
+        others = [other for other in older if self.tasks[other].group is group]
+        for other in others:
+            other.cancel()
+        self._supersede(None if current is None else current.client, group)
+        return others
+
+    def _supersede(self, client: Hashable, group: ActionGroup = ActionGroup.FLIGHT) -> None:
+        """Note in all components that an action of this client has replaced those of all others."""
+        for history in self.histories:
+            history.supersede(client, group)
+
+    def forget(self, client: Hashable, group: ActionGroup = ActionGroup.FLIGHT) -> None:
+        """Forget this client's newest action of a group in all components."""
+        for history in self.histories:
+            history.forget(client, group)
 
 
 class CommandService(Service):
@@ -126,7 +196,7 @@ class CommandService(Service):
             return None
         is_long = inbound.message.get_msgId() == dialect.MAVLINK_MSG_ID_COMMAND_LONG
         decode: _Decode = from_long if is_long else from_int
-        return decode(inbound.message, action, client_of(inbound), flavour_of(inbound.channel))
+        return decode(inbound.message, action, inbound.client, flavour_of(inbound.channel))
 
     async def settle(self, limit: float = SETTLE) -> None:
         """Wait until running commands have ended after the link is lost, `limit` s at most.
@@ -195,7 +265,7 @@ class CommandService(Service):
             self._acknowledge(inbound, id, dialect.MAV_RESULT_UNSUPPORTED)
             self._note(inbound, id, dialect.MAV_RESULT_UNSUPPORTED)
             return
-        command = decode(inbound.message, definition, client_of(inbound), flavour_of(inbound.channel))
+        command = decode(inbound.message, definition, inbound.client, flavour_of(inbound.channel))
         if definition is QUERY:
             result = dialect.MAV_RESULT_FAILED
             try:

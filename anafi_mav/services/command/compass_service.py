@@ -16,6 +16,7 @@ from anafi_mav import texts
 from anafi_mav.drone.events import CalibrationAxis
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
+from anafi_mav.services.command.calibration_service import require_standing
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.service import Host, Service
 from anafi_mav.vehicle.base.flight_task import MAINTENANCE
@@ -73,8 +74,7 @@ class CompassService(Service):
         """
         _check_mask(command)
         vehicle = self.host.vehicle
-        if not vehicle.on_ground or vehicle.drone.piloting.about_to_fly:
-            raise Refused(texts.COMPASS_CALIBRATION, texts.NOT_ON_GROUND)
+        require_standing(vehicle, texts.COMPASS_CALIBRATION)
         async with vehicle.control.acquire(MAINTENANCE, by=command.right):
             pass
         self._succeeded = False

@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from anafi_mav import texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.command_targets import height, place
 from anafi_mav.services.commands import (
     EFFECT_OF_MODE,
     Action,
@@ -22,7 +21,7 @@ from anafi_mav.services.commands import (
     effect_of_mode,
 )
 from anafi_mav.services.flavours import flavour_of
-from anafi_mav.services.service import MessageHandler, Service, client_of
+from anafi_mav.services.service import MessageHandler, Service
 from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
@@ -79,6 +78,15 @@ class FlightService(Service):
                 mode=lambda command: command.flavour.mode_of_parameters(command.params[1], command.params[2]),
                 progress=ProgressPolicy.LATE,
             ),
+            dialect.MAV_CMD_NAV_LOITER_UNLIM: Action(
+                lambda command: change_mode(self.host.vehicle, command.mode, command.right),  # its position is ignored
+                location=True,
+                altitude=Altitude.UNUSED,
+                effect=effect_of_mode,
+                mode=lambda command: FlightMode.POSITION,
+                progress=ProgressPolicy.LATE,
+                offered=lambda flavour: flavour.loiter_command,
+            ),
             dialect.MAV_CMD_DO_FLIGHTTERMINATION: Action(
                 self._terminate, location=False, altitude=Altitude.UNUSED, effect=Effect.KILL
             ),
@@ -108,7 +116,7 @@ class FlightService(Service):
         if command.frame is None and relative and not math.isnan(command.z):
             await vehicle.take_off(command.z, command.right)
             return
-        await vehicle.take_off(height(vehicle, command), command.right)
+        await vehicle.take_off(command.height(vehicle), command.right)
 
     async def _reposition(self, command: Command) -> None:
         """Run MAV_CMD_DO_REPOSITION: go to a place, height and heading.
@@ -124,7 +132,7 @@ class FlightService(Service):
             raise Refused(texts.GOTO, texts.PARAM1_SPEED_HEADING, lasting=True)
         if speed > 0.0 and not SLOWEST <= speed <= FASTEST:
             raise Refused(texts.SPEED, texts.SPEED_RANGE.fill(slowest=SLOWEST, fastest=FASTEST), lasting=True)
-        where, ato, heading = place(command), height(vehicle, command), _heading(command)
+        where, ato, heading = command.place(), command.height(vehicle), _heading(command)
         mode = command.flavour.guided_mode
         if where is None and ato is None and heading is None:
             if speed > 0.0:
@@ -152,7 +160,7 @@ class FlightService(Service):
     def _set_mode(self, inbound: Inbound) -> None:
         """SET_MODE has no acknowledgement: the heartbeat shows the mode, a text the refusal."""
         mode: FlightMode | None = flavour_of(inbound.channel).mode_of_number(inbound.message.custom_mode)
-        client, vehicle, now = client_of(inbound), self.host.vehicle, self.host.clock.monotonic()
+        client, vehicle, now = inbound.client, self.host.vehicle, self.host.clock.monotonic()
         is_hold = mode is not None and EFFECT_OF_MODE[mode] is Effect.HOLD
         counted = not is_hold or vehicle.holds.arrive(client, now)
         self.host.run_action(client, change_mode(vehicle, mode, Right(client, Extent.ALL, now, counted)))

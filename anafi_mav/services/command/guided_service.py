@@ -16,11 +16,18 @@ from anafi_mav.drone.events import RthHomeType
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.command_targets import UnsupportedFrame, height, height_in_frame, place
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.flavours import Flavour, flavour_of
-from anafi_mav.services.service import Host, MessageHandler, Service, client_of
-from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST, check_height, check_on_earth, home_height
+from anafi_mav.services.service import Host, MessageHandler, Service
+from anafi_mav.vehicle.base.bounds import (
+    FASTEST,
+    SLOWEST,
+    UnsupportedFrame,
+    check_height,
+    check_on_earth,
+    height_in_frame,
+    home_height,
+)
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
@@ -53,7 +60,7 @@ _ITEM_GOTO, _ITEM_ALTITUDE = 2, 3
 async def _fly_item(host: Host, inbound: Inbound) -> None:
     item, flavour = inbound.message, flavour_of(inbound.channel)
     scale = 1e7 if item.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT else 1.0
-    vehicle, by = host.vehicle, Right(client_of(inbound), Extent.COMMANDED)
+    vehicle, by = host.vehicle, Right(inbound.client, Extent.COMMANDED)
     result = dialect.MAV_MISSION_ERROR
     try:
         ato = height_in_frame(vehicle, item.z, item.frame)
@@ -146,7 +153,7 @@ class GuidedService(Service):
         ArduPilot's older way to send a goto or a height: dronekit's simple_goto, MAVProxy's and Mission Planner's
         change of altitude (conformance D1-D3, item 141).
         """
-        self.host.run_action(client_of(inbound), _fly_item(self.host, inbound))
+        self.host.run_action(inbound.client, _fly_item(self.host, inbound))
 
     async def _change_speed(self, command: Command) -> None:
         """MAV_CMD_DO_CHANGE_SPEED: param1 SPEED_TYPE, param2 m/s.
@@ -234,7 +241,7 @@ class GuidedService(Service):
                 await vehicle.guided.go(task, by=command.right)
             elif task is vehicle.mission and vehicle.mission.paused:
                 await vehicle.set_mode(FlightMode.MISSION, command.right)
-            elif task is None and vehicle.control.paused:
+            elif task is None and vehicle.control.has_pause:
                 vehicle.control.resume()  # setpoints may fly it again
             else:
                 raise Refused(texts.CONTINUE, texts.NOTHING_PAUSED)
@@ -261,10 +268,10 @@ class GuidedService(Service):
             if where is None:
                 raise Refused(texts.HOME, texts.POSITION_UNKNOWN)
         else:
-            where = place(command)
+            where = command.place()
             if where is None:
                 raise Refused(texts.HOME, texts.NO_PLACE, lasting=True)
-            ato = height(vehicle, command, flown=False) or 0.0
+            ato = command.height(vehicle, flown=False) or 0.0
         check_on_earth(where, texts.HOME)
         async with vehicle.home_choice:
             before = home.state.preferred_type

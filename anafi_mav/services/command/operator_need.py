@@ -53,7 +53,7 @@ GIMBAL_COMMANDS = frozenset(
         dialect.MAV_CMD_DO_SET_ROI,
     }
 )
-"""Those that turn the aircraft too are flight tasks, and refused as such by `vehicle.flight_policy`."""
+"""Those that turn the aircraft too are flight tasks, and refused as such by `operator_refusal_of`."""
 
 ACKNOWLEDGEMENTS = frozenset({dialect.MAVLINK_MSG_ID_COMMAND_ACK})
 

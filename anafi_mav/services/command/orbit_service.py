@@ -17,7 +17,6 @@ from anafi_mav.drone import events
 from anafi_mav.drone.piloting.moves import Move, MoveEnd
 from anafi_mav.drone.values import Values
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.command_targets import height, place
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.stream import MessageStream, Times
@@ -149,7 +148,7 @@ class OrbitService(Service, PlainTask):
         orbit = _Orbit(Lap(self._held_back(circle)), vehicle.cruise_speed)
         circle = orbit.lap.circle
         bearing = _bearing(circle.centre, start)
-        off = abs(geo.distance(*circle.centre.point, *here.point) - circle.radius)
+        off = abs(geo.distance(*circle.centre, *here) - circle.radius)
         is_away = off > ON_IT or abs((vehicle.drone.piloting.state.altitude or 0.0) - circle.height) > ON_IT
         if is_away:
             check_place(vehicle, start, start=here)
@@ -171,7 +170,7 @@ class OrbitService(Service, PlainTask):
         vehicle, piloting = self.host.vehicle, self.host.drone.piloting.state
         radius, speed, facing, angle = command.params
         running = self.circle
-        where = place(command) or (None if running is None else running.centre) or vehicle.place
+        where = command.place() or (None if running is None else running.centre) or vehicle.place
         if where is None:
             raise Refused(texts.ORBIT, texts.ORBIT_NO_CENTRE)
         check_on_earth(where, texts.ORBIT)
@@ -187,7 +186,7 @@ class OrbitService(Service, PlainTask):
             angle = math.inf
         if angle < 0.0:
             raise Refused(texts.ORBIT, texts.PARAM4_ORBIT, lasting=True)
-        ato = height(vehicle, command)
+        ato = command.height(vehicle)
         if ato is None:
             ato = piloting.altitude if running is None else running.height
         if ato is None:
@@ -296,5 +295,5 @@ def _facing(behaviour: float) -> Facing:
 
 def _bearing(centre: GeoPoint, place: GeoPoint) -> float:
     """rad, clockwise from north, of a place seen from a centre."""
-    north, east = geo.offset(*centre.point, *place.point)
+    north, east = geo.offset(*centre, *place)
     return math.atan2(east, north)

@@ -23,7 +23,7 @@ from anafi_mav.services.files import FileError, FileRefused, FileTree, Folder, Q
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.ftp.ftp import FtpServer, Wait, protected
 from anafi_mav.services.paced_sender import PacedSender
-from anafi_mav.services.service import Host, MessageHandler, Request, Service, channel_of, client_of
+from anafi_mav.services.service import Host, MessageHandler, Request, Service, channel_of
 from anafi_mav.vehicle.base.severity import Severity
 
 logger = logging.getLogger(__name__)
@@ -111,7 +111,7 @@ class FtpService(Service):
     # FTP.
 
     def _receive(self, inbound: Inbound) -> None:
-        who = client_of(inbound)
+        who = inbound.client
         files = _ClientFiles(self._tree(flavour_of(inbound.channel)), self._files, inbound, self.host)
         answer = self._server.receive(who, bytes(inbound.message.payload), files, inbound.now)
         if isinstance(answer, Wait):

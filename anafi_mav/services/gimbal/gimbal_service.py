@@ -20,7 +20,6 @@ from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.command_targets import height, place
 from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.dropped_inputs import InputStream
 from anafi_mav.services.flavours import Flavour, flavour_of
@@ -29,7 +28,7 @@ from anafi_mav.services.gimbal.control import NO_CLIENT, Answer, ClientId, Gimba
 from anafi_mav.services.gimbal.motion import GimbalMotion
 from anafi_mav.services.gimbal.roi import RegionOfInterest
 from anafi_mav.services.gimbal.targets import Frames, GimbalTarget
-from anafi_mav.services.service import LOOK_EVERY, Host, MessageHandler, Service, client_of
+from anafi_mav.services.service import LOOK_EVERY, Host, MessageHandler, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.geo_point import GeoPoint
@@ -323,10 +322,10 @@ class GimbalService(Service):
             except AnafiMavError as error:
                 self._drop(inbound, reason_of(error))
             else:
-                self.host.use_input(client_of(inbound), InputStream.GIMBAL)
+                self.host.use_input(inbound.client, InputStream.GIMBAL)
 
     def _drop(self, inbound: Inbound, reason: OperatorText) -> None:
-        self.host.drop_input(client_of(inbound), InputStream.GIMBAL, reason)
+        self.host.drop_input(inbound.client, InputStream.GIMBAL, reason)
 
     # Regions of interest.
 
@@ -340,12 +339,12 @@ class GimbalService(Service):
         await self._look_at_place(command)
 
     async def _look_at_place(self, command: Command) -> None:
-        where = place(command)
+        where = command.place()
         if where is None:
             raise Refused(texts.ROI, texts.NO_PLACE, lasting=True)
         if command.frame is None and command.flavour.relative_long_regions:
             command = replace(command, frame=dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT)
-        await self._look(command, where, height(self.host.vehicle, command, flown=False) or 0.0)
+        await self._look(command, where, command.height(self.host.vehicle, flown=False) or 0.0)
 
     async def _look(self, command: Command, where: GeoPoint, ato: float) -> None:
         self._require_control(command.client)
@@ -381,7 +380,7 @@ class GimbalService(Service):
         is_none = kind == dialect.MAV_ROI_NONE or math.isnan(kind)
         if not is_none and kind != dialect.MAV_ROI_LOCATION:
             raise Refused(texts.ROI, texts.ROI_KINDS, lasting=True)
-        if (is_none and place(command) is None) or (command.x == 0.0 and command.y == 0.0):
+        if (is_none and command.place() is None) or (command.x == 0.0 and command.y == 0.0):
             self._require_control(command.client)
             await self._roi.stop()
         else:
@@ -484,7 +483,7 @@ class GimbalService(Service):
             where = GeoPoint(message.input_a / 1e7, message.input_b / 1e7)
             self._mount_place = inbound, where, message.input_c / 100.0
             if self._mount_look is None or self._mount_look.done():
-                self._mount_look = self.host.run_action(client_of(inbound), self._look_for_mount())
+                self._mount_look = self.host.run_action(inbound.client, self._look_for_mount())
         elif self._mount_mode == dialect.MAV_MOUNT_MODE_MAVLINK_TARGETING:
             angles = {
                 Axis.PITCH: message.input_a / 100.0,
@@ -509,16 +508,16 @@ class GimbalService(Service):
                 if not self._control.allows(client):
                     raise Refused(texts.ROI, self._objection(client))
                 if not self._roi.is_locked_on(where, ato):
-                    region = self._roi.prepare(Right(client_of(inbound), Extent.COMMANDED))
+                    region = self._roi.prepare(Right(inbound.client, Extent.COMMANDED))
                     vehicle = self.host.vehicle
                     if not self._roi.is_active and (vehicle.mode not in HOVERING or vehicle.overridable):
                         raise Refused(texts.ROI, texts.DRONE_FLIES)
                     await self._motion.rest()
                     await self._roi.look_at(region, where, ato)
-                self.host.use_input(client_of(inbound), InputStream.REGION)
+                self.host.use_input(inbound.client, InputStream.REGION)
         except AnafiMavError as error:
             if inbound is not None:
-                self.host.drop_input(client_of(inbound), InputStream.REGION, reason_of(error))
+                self.host.drop_input(inbound.client, InputStream.REGION, reason_of(error))
         finally:
             if self._mount_look is task:
                 self._mount_look = self._mount_place = None

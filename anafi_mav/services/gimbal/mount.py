@@ -72,5 +72,5 @@ def point(latitude: float, longitude: float) -> GeoPoint | None:
 
 def direction(here: GeoPoint, there: GeoPoint, climb: float) -> tuple[float, float]:
     """Return bearing from north and elevation (rad) of a straight path that climbs so far (m)."""
-    north, east = geo.offset(*here.point, *there.point)
+    north, east = geo.offset(*here, *there)
     return math.atan2(east, north), math.atan2(climb, math.hypot(north, east))

@@ -101,7 +101,7 @@ class RegionOfInterest(PlainTask):
             return False  # a newer start is under way
         if not self.holds_gimbal or target is None:
             return False
-        apart = geo.distance(target.latitude, target.longitude, *where.point)
+        apart = geo.distance(target.latitude, target.longitude, *where)
         return math.hypot(apart, target.altitude - ato) < SAME_PLACE
 
     @property
@@ -302,7 +302,7 @@ class RegionOfInterest(PlainTask):
         if is_lost and not self._is_lost:
             self._host.text(Severity.WARNING, texts.ROI_LOST.fill(system=self._system))
         self._is_lost = is_lost
-        moved = geo.distance(*seen.place.point, *self._looked.place.point)
+        moved = geo.distance(*seen.place, *self._looked.place)
         if now - self._looked.at >= UPDATE_EVERY and math.hypot(moved, seen.amsl - self._looked.amsl) >= MOVED:
             self._looked = SystemPosition(seen.place, seen.amsl, now)
             self._update = self._host.spawn(self._look_again(region, seen))

@@ -17,7 +17,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import Flavour, flavour_of
-from anafi_mav.services.service import Host, Query, Service, client_of
+from anafi_mav.services.service import Host, Query, Service
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.failsafe_settings import warnings_of
@@ -95,7 +95,7 @@ class BannerService(Service):
         self._note(inbound)
 
     def _note(self, inbound: Inbound) -> None:
-        client = client_of(inbound)
+        client = inbound.client
         last = self._heard.pop(client, None)
         self._heard[client] = inbound.now, inbound.channel
         if len(self._heard) > MAX_CLIENTS:

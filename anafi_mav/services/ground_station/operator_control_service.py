@@ -2,7 +2,7 @@
 
 For clients of endpoints with `operator_control`; for the others both do not exist, because stations of before 2026 take
 CONTROL_STATUS for a damaged frame. `vehicle.operator_control` decides. The role that a message needs is in
-`operator_need`, that of a flight task in `vehicle.flight_policy`.
+`operator_need`, that of a flight task in `operator_refusal_of`.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ class OperatorControlService(Service):
     def _hear(self, inbound: Inbound) -> None:
         """Note where a station is. An observer has no role, whatever its system id is."""
         channel, system = inbound.channel, inbound.sysid
-        if channel.access is Access.OBSERVE or (self._control.is_free and not channel.options.operator_control):
+        if channel.access is Access.OBSERVE or not (self._control.operator or channel.options.operator_control):
             return
         place = (channel, system)
         self._places.pop(place, None)

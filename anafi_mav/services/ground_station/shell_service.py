@@ -12,7 +12,7 @@ from collections.abc import Callable, Hashable, Mapping
 from anafi_mav import __version__
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.service import Host, MessageHandler, Service, client_of
+from anafi_mav.services.service import Host, MessageHandler, Service
 
 PIECE = 70
 """Bytes that one SERIAL_CONTROL carries."""
@@ -95,7 +95,7 @@ class ShellService(Service):
         message = inbound.message
         if message.device != dialect.SERIAL_CONTROL_DEV_SHELL or message.flags & dialect.SERIAL_CONTROL_FLAG_REPLY:
             return
-        client = client_of(inbound)
+        client = inbound.client
         typed = self._begun.pop(client, b"") + bytes(message.data[: min(message.count, PIECE)])
         *lines, rest = typed.replace(b"\r", b"\n").split(b"\n")
         if rest:

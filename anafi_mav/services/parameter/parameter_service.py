@@ -42,7 +42,7 @@ from anafi_mav.services.parameter.parameter_table_ardupilot import ARDUPILOT_NAM
 from anafi_mav.services.parameter.parameter_table_fence import FENCE_NATIVE
 from anafi_mav.services.parameter.parameter_table_follow import FOLLOW_NATIVE
 from anafi_mav.services.parameter.parameter_table_px4 import PX4_NAMES
-from anafi_mav.services.service import Host, MessageHandler, Service, client_of
+from anafi_mav.services.service import Host, MessageHandler, Service
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import FlightSettings
 from anafi_mav.vehicle.base.refusal import reason_of
@@ -351,7 +351,7 @@ class ParameterService(Service):
             for index in range(len(listed)):
                 yield listed.message(index)
 
-        self._sender.start(inbound.channel, client_of(inbound), messages())
+        self._sender.start(inbound.channel, inbound.client, messages())
 
     def _request_read(self, inbound: Inbound) -> None:
         if self._storing.locked():  # a value that is read has to be one that is stored
@@ -383,7 +383,7 @@ class ParameterService(Service):
         flavour = flavour_of(inbound.channel)
         name = name_of(message.param_id)
         if name == HASH_NAME and flavour.bytewise:
-            self._sender.stop(inbound.channel, client_of(inbound))
+            self._sender.stop(inbound.channel, inbound.client)
             return
         listed = self._lists[flavour.name]
         index = listed.index.get(name)
@@ -412,9 +412,9 @@ class ParameterService(Service):
 
         What a client says again while it still waits takes the old one's place.
         """
-        client = client_of(inbound)
+        client = inbound.client
         for place, (waiting, other, _) in enumerate(self._waiting):
-            if other is parameter and client_of(waiting) == client:
+            if other is parameter and waiting.client == client:
                 self._waiting[place] = (inbound, parameter, value)
                 return
         if len(self._waiting) < MAX_WAITING:

@@ -93,11 +93,11 @@ class FenceMirror:
         setting = state.max_distance
         if setting is None or state.geofence is None or not setting.min <= circle.radius <= setting.max:
             return True, None, None
-        middle = vehicle.home.point if circle.centre is None and vehicle.home is not None else circle.centre
+        middle = vehicle.home if circle.centre is None and vehicle.home is not None else circle.centre
         centre = vehicle.geofence_centre
         if centre is None or middle is None:
             return False, None, None
-        away = geo.distance(*centre.point, *middle)
+        away = geo.distance(*centre, *middle)
         wanders = vehicle.on_ground and centre == vehicle.place
         limit = FAR if wanders and self._remembered() is not None else NEAR
         return (True, circle.radius, None) if away <= limit else (True, None, away)

@@ -22,7 +22,7 @@ from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.plan.fence_mirror import FenceMirror
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.stream import MessageStream, Times
-from anafi_mav.vehicle.base.geo_point import GeoPoint, point_of
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, reason_of
 from anafi_mav.vehicle.base.requester import Source
@@ -123,12 +123,12 @@ class FenceService(Service):
         # A plan and an orbit were judged before; they turn.
         own_way = vehicle.mode in (FlightMode.MISSION, FlightMode.ORBIT) or self._ends_inside
         return Sight(
-            None if place is None else place.point,
+            place,
             now - self._located,
             velocity,
             state.altitude,
             None if state.max_altitude is None else state.max_altitude.current,
-            None if home is None else home.point,
+            home,
             airborne=not vehicle.on_ground and vehicle.flying_state is not None,
             flying=vehicle.in_air and vehicle.mode is not FlightMode.RETURN,
             steering=not own_way and state.plan != PlayingState.PLAYING,
@@ -149,7 +149,7 @@ class FenceService(Service):
         if end is None:
             return False
         try:
-            self._watch.check_place(end.point, point_of(vehicle.home), point_of(vehicle.place))
+            self._watch.check_place(end, vehicle.home, vehicle.place)
         except OutsideFence:
             return False
         return True

@@ -19,7 +19,7 @@ from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import HEADED, NORTH, Item, Loss
 from anafi_mav.plans.translation.translate import FaultKind, TranslationReport, examine
 from anafi_mav.services.flavours import PX4, Flavour
-from anafi_mav.services.plan.mission_items import from_wire
+from anafi_mav.services.plan.item_messages import from_wire
 from anafi_mav.services.plan.plan_transfer import PlanKind
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.fence.plan_items import PlanFault, PlanItem

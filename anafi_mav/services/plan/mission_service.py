@@ -20,7 +20,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, effect_of_mode
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.plan.mission_kind import offset
-from anafi_mav.services.service import Host, MessageHandler, Service, client_of
+from anafi_mav.services.service import Host, MessageHandler, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
@@ -151,7 +151,7 @@ class MissionService(Service):
 
         A repetition does not restart one that is under way: MAVSDK sends it every 0.5 s until it is answered.
         """
-        client = client_of(inbound)
+        client = inbound.client
         item = _ours(inbound.message.seq, client)
         self._sent = {}
         choice = self._choice

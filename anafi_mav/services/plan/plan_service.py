@@ -28,7 +28,7 @@ from anafi_mav.services.plan.mission_kind import MissionKind
 from anafi_mav.services.plan.plan_protocol import MESSAGES, MissionProtocol
 from anafi_mav.services.plan.plan_transfer import Changed, Commit, Effect, Peer, PlanKind, Reply, Say
 from anafi_mav.services.plan.rally_kind import RallyKind
-from anafi_mav.services.service import Host, MessageHandler, Service, client_of
+from anafi_mav.services.service import Host, MessageHandler, Service
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, PlanFault, PlanItem
@@ -125,7 +125,7 @@ class PlanService(Service):
         operators = self.host.vehicle.operators
         is_refused = operators.objection(inbound.sysid, Need.COMMAND) is not None
         return _ChannelPeer(
-            client_of(inbound),
+            inbound.client,
             inbound.sysid,
             inbound.compid,
             flavour_of(inbound.channel),
@@ -242,7 +242,7 @@ class PlanService(Service):
         """Home as an item; all zeros while it is not known."""
         vehicle = self.host.vehicle
         home = vehicle.home
-        x, y = (0, 0) if home is None else map(units.deg_e7, home.point)
+        x, y = (0, 0) if home is None else map(units.deg_e7, home)
         z = vehicle.height.amsl(0.0)
         return PlanItem(
             dialect.MAV_CMD_NAV_WAYPOINT, dialect.MAV_FRAME_GLOBAL, (0.0, 0.0, 0.0, 0.0), x, y, 0.0 if z is None else z

@@ -97,7 +97,7 @@ class RallyService(Service):
             inside = zones.margin((point.latitude, point.longitude), home).metres >= 0.0
             return inside and point not in self._rejected
 
-        return self._rally.choose(vehicle.place.point, home, vehicle.height.takeoff_amsl, self._chosen, usable)
+        return self._rally.choose(vehicle.place, home, vehicle.height.takeoff_amsl, self._chosen, usable)
 
     def _may_choose(self) -> bool:
         """Return True if the drone can have a custom home, and has none of another controller."""

@@ -12,7 +12,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.dropped_inputs import InputStream
 from anafi_mav.services.flavours import flavour_of
-from anafi_mav.services.service import Host, MessageHandler, Service, client_of
+from anafi_mav.services.service import Host, MessageHandler, Service
 from anafi_mav.services.setpoint.stick_intent import StickIntent
 from anafi_mav.services.setpoint.stick_messages import RcChannels, manual_sticks
 from anafi_mav.vehicle.manual_flight import Sticks
@@ -45,12 +45,12 @@ class ManualControlService(Service):
     def _manual_control(self, inbound: Inbound) -> None:
         sticks = manual_sticks(inbound.message)
         if isinstance(sticks, str):
-            self.host.drop_input(client_of(inbound), InputStream.STICKS, sticks)
+            self.host.drop_input(inbound.client, InputStream.STICKS, sticks)
         elif sticks is not None:
             self._fly(inbound, sticks)
 
     def _override(self, inbound: Inbound) -> None:
-        client, now = client_of(inbound), self.host.clock.monotonic()
+        client, now = inbound.client, self.host.clock.monotonic()
         before, at = self._channels.pop(client, (RcChannels(), -math.inf))
         channels = (before if now - at < SILENCE else RcChannels()).after(inbound.message)
         if isinstance(channels, str):
@@ -65,7 +65,7 @@ class ManualControlService(Service):
 
     def _fly(self, inbound: Inbound, sticks: Sticks) -> None:
         """Pass sticks on; those that a person means and that are not flown are reported."""
-        client = client_of(inbound)
+        client = inbound.client
         is_meant = self._intent.is_meant(client, sticks, inbound.now)
         reason = self.host.input_objection(inbound)
         if reason is None:

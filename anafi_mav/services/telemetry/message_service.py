@@ -342,9 +342,13 @@ class MessageService(Service):
     def _is_streamed(self, channel: Channel, id: int) -> bool:
         """Return True for a message that a channel gets by default."""
         stream = self._table[id]
-        if id in flavour_of(channel).unstreamed or not (channel.can_stream(id) and _has(channel, stream)):
+        if id in flavour_of(channel).unstreamed or not (channel.can_stream(id) and stream.is_offered(channel.options)):
             return False
         return not stream.spared or channel.bytes_per_second is None or channel.bytes_per_second >= SMALL_LINE
+
+    def _exists(self, channel: Channel, stream: MessageStream) -> bool:
+        """Return True for a message that exists for clients of this channel and for this drone."""
+        return stream.is_offered(channel.options) and stream.is_supported(self.host.vehicle)
 
     def _data_stream(self, inbound: Inbound) -> None:
         """REQUEST_DATA_STREAM, from clients of flavours with `data_streams`."""
@@ -381,7 +385,7 @@ class MessageService(Service):
         if (request := self._requests.get(int(id))) is not None and id == int(id):
             return request(inbound, command)
         stream = self._table.get(int(id)) if id == int(id) else None
-        if stream is None or not _has(inbound.channel, stream):
+        if stream is None or not self._exists(inbound.channel, stream):
             return dialect.MAV_RESULT_UNSUPPORTED
         if not inbound.channel.can_stream(int(id)):
             return dialect.MAV_RESULT_DENIED
@@ -401,7 +405,7 @@ class MessageService(Service):
     def _set_interval(self, inbound: Inbound, command: Command) -> int:
         id, interval = command.params[0], command.params[1]
         stream = self._table.get(int(id)) if math.isfinite(id) and id == int(id) else None
-        if stream is None or not _has(inbound.channel, stream):
+        if stream is None or not self._exists(inbound.channel, stream):
             return dialect.MAV_RESULT_UNSUPPORTED
         if not inbound.channel.can_stream(int(id)):  # what is accepted would have no effect
             return dialect.MAV_RESULT_DENIED
@@ -434,7 +438,7 @@ class MessageService(Service):
         if not 0 <= id <= 0xFFFF or id != int(id):
             return dialect.MAV_RESULT_DENIED
         microseconds = 0
-        if int(id) in self._table and _has(inbound.channel, self._table[int(id)]):
+        if int(id) in self._table and self._exists(inbound.channel, self._table[int(id)]):
             asked = self._intervals.interval(inbound.channel, int(id))
             source = self._source(inbound.channel, int(id))
             if asked is not None and inbound.channel.pace is not None:
@@ -469,8 +473,3 @@ def _affected(
     events = tuple(kind for kind in affected if isinstance(kind, type))
     affected.update((id, (id,)) for id, _ in updates)
     return events, affected
-
-
-def _has(channel: Channel, stream: MessageStream) -> bool:
-    """Return True for a message that exists for clients of this channel."""
-    return stream.is_offered(channel.options)

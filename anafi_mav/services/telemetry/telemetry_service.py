@@ -13,7 +13,9 @@ from collections.abc import Mapping
 from anafi_mav import texts
 from anafi_mav.drone import events
 from anafi_mav.drone.events import Message
-from anafi_mav.services.service import Host, Service
+from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.node import Inbound
+from anafi_mav.services.service import Host, MessageHandler, Service
 from anafi_mav.services.stream import MessageStream
 from anafi_mav.services.telemetry import telemetry_anafi, telemetry_flight, telemetry_link, telemetry_status
 from anafi_mav.vehicle.base.severity import Severity
@@ -43,6 +45,20 @@ class TelemetryService(Service):
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._position_is_old = False
+
+    def messages(self) -> Mapping[int, MessageHandler]:
+        return {dialect.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN: self._keep_origin}
+
+    def _keep_origin(self, inbound: Inbound) -> None:
+        """SET_GPS_GLOBAL_ORIGIN: refuse it with a text, and answer with the origin in force.
+
+        The local frame counts from the take-off point. MAVLink has GPS_GLOBAL_ORIGIN as the answer whether the origin
+        changes or not (common.xml), by which a client sees that it did not.
+        """
+        host = self.host
+        host.text(Severity.WARNING, texts.ORIGIN_KEPT, inbound.channel)
+        if (origin := telemetry_flight.gps_global_origin(host.vehicle, host.times())) is not None:
+            host.send(origin, inbound.channel)
 
     def link_down(self) -> None:
         self._position_is_old = False

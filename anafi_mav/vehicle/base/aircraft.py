@@ -24,7 +24,7 @@ from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.control import Control
 from anafi_mav.vehicle.base.flight_task import Needs
 from anafi_mav.vehicle.base.flying import AIRBORNE, ON_GROUND
-from anafi_mav.vehicle.base.geo_point import GeoPoint, point_of
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.height import HeightReference
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.move_heading import MoveHeading
@@ -267,7 +267,7 @@ class Aircraft(ABC):
         """The reason why the fence keeps the drone on the ground, in a sentence; None without one."""
         if self.on_ground:
             try:
-                self.fence.check_place(point_of(self.place), point_of(self.home))
+                self.fence.check_place(self.place, self.home)
             except OutsideFence as error:
                 return error.reason
         return None
@@ -292,6 +292,10 @@ class Aircraft(ABC):
 
         A landing or return continues unless `by` may end it.
         """
+
+    @abstractmethod
+    def note_landing_command(self) -> None:
+        """Note that a landing is about to be sent: it is a client's, not the drone's own."""
 
     @abstractmethod
     async def terminate(self, by: By) -> None:

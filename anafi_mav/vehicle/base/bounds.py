@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 
-from anafi_mav import geo, texts
+from anafi_mav import geo, mav_enums, texts
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
-from anafi_mav.vehicle.base.geo_point import GeoPoint, point_of
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.height import ESTIMATE_FLOOR
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
@@ -38,6 +38,16 @@ Lower targets are refused, never clamped, unless the drone is as low already (`l
 FARTHEST = 4000.0
 """m from the drone's centre. No setting of an ANAFI reaches farther (maximum of its MaxDistance); a place beyond is a
 mistake, also while the drone's own geofence is off."""
+
+_AMSL_FRAMES = (None, mav_enums.MAV_FRAME_GLOBAL, mav_enums.MAV_FRAME_GLOBAL_INT)
+_RELATIVE_FRAMES = (mav_enums.MAV_FRAME_GLOBAL_RELATIVE_ALT, mav_enums.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+
+
+class UnsupportedFrame(Refused):
+    """A place in a frame we cannot resolve."""
+
+    def __init__(self, frame: int | None) -> None:
+        super().__init__(texts.POSITION, texts.FRAME_UNSUPPORTED.fill(frame=frame), lasting=True)
 
 
 def lowest_height(vehicle: Aircraft) -> float:
@@ -99,6 +109,24 @@ def check_estimate(vehicle: Aircraft, ato: float) -> None:
         raise Refused(texts.HEIGHT, texts.NEAR_ESTIMATE.fill(height=ato, lowest=ESTIMATE_FLOOR))
 
 
+def height_in_frame(vehicle: Aircraft, z: float, frame: int | None, *, amsl: bool = False, flown: bool = True) -> float:
+    """Return the height above take-off (m) of `z` in a MAV_FRAME (None: AMSL).
+
+    `amsl`: z is AMSL even where the frame is relative. `flown`: the drone is to fly at this height. Raises `Refused`,
+    `UnsupportedFrame`.
+    """
+    if not math.isfinite(z):
+        raise Refused(texts.HEIGHT, texts.NOT_A_NUMBER, lasting=True)
+    if frame in _AMSL_FRAMES or (amsl and frame in _RELATIVE_FRAMES):
+        ato = amsl_to_ato(vehicle, z)
+        if flown:
+            check_estimate(vehicle, ato)
+        return ato
+    if frame in _RELATIVE_FRAMES:
+        return z
+    raise UnsupportedFrame(frame)
+
+
 def home_height(vehicle: Aircraft, ato: float) -> float:
     """Return the height (m above take-off) of a custom home: at least that of the take-off.
 
@@ -135,7 +163,7 @@ def check_place(vehicle: Aircraft, place: GeoPoint, *, start: GeoPoint | None = 
         if centre is not None:
             _check_geofence(vehicle, distance)
     try:
-        vehicle.fence.check_place(point_of(place), point_of(home), point_of(start))
+        vehicle.fence.check_place(place, home, start)
     except OutsideFence as error:
         raise Refused(texts.GOTO, error.reason, lasting=error.lasting) from error
 

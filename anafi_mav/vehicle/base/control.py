@@ -36,8 +36,15 @@ from anafi_mav.vehicle.base.control_machine import (
     Step,
     step,
 )
-from anafi_mav.vehicle.base.flight_actions import FlightAction, FlightActions
-from anafi_mav.vehicle.base.flight_task import FlightTask, Needs, Preparation, TaskRules, lasting_needs
+from anafi_mav.vehicle.base.flight_task import (
+    FlightAction,
+    FlightActions,
+    FlightTask,
+    Needs,
+    Preparation,
+    TaskRules,
+    lasting_needs,
+)
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, text_of
 from anafi_mav.vehicle.base.requester import By, Source, client_of
@@ -122,6 +129,14 @@ class Control:
         return self._situation.next
 
     @property
+    def next_below(self) -> FlightTask | None:
+        """The hovering mode that a pending request leads to; None without one, and for Hold."""
+        now = self._situation
+        if now.pending is None:
+            return None
+        return now.below if now.pending.keeps_below else now.pending.below
+
+    @property
     def successor(self) -> FlightTask | None:
         """The task that follows the active one."""
         return self._situation.successor
@@ -151,6 +166,14 @@ class Control:
         A command or another mode ends it.
         """
         return self._situation.holds_streams
+
+    @property
+    def has_pause(self) -> bool:
+        """True while a pause is in force that `resume` ends.
+
+        Not while a request is pending, which may begin another one.
+        """
+        return self._situation.is_paused and self._situation.pending is None
 
     @property
     def is_settled(self) -> bool:

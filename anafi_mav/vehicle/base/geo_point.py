@@ -2,21 +2,11 @@
 
 from __future__ import annotations
 
-import msgspec
+from typing import NamedTuple
 
 
-class GeoPoint(msgspec.Struct, frozen=True):
+class GeoPoint(NamedTuple):
     """A point on the map, deg."""
 
     latitude: float
     longitude: float
-
-    @property
-    def point(self) -> tuple[float, float]:
-        """Latitude and longitude."""
-        return self.latitude, self.longitude
-
-
-def point_of(place: GeoPoint | None) -> tuple[float, float] | None:
-    """Latitude and longitude, where there is a place."""
-    return None if place is None else place.point

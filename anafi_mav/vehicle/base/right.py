@@ -1,4 +1,4 @@
-"""The right of a client to end a landing or a return.
+"""The right of a client to end a landing or a return. No I/O.
 
 Handlers of client messages pass it to `Vehicle.hold`, `set_mode` and the like. What the gateway does by itself
 (station loss, fence, silence of setpoints, end of a mission, its own end) has none, and so never ends either. A flight
@@ -12,7 +12,15 @@ from collections.abc import Hashable
 
 from msgspec import Struct
 
-from anafi_mav.vehicle.base.clients import system_of
+
+def system_of(client: Hashable) -> int | None:
+    """Return the MAVLink system id of a `Command.client`; None for any other value.
+
+    The gateway itself is such a value, too.
+    """
+    if isinstance(client, tuple) and len(client) == 3 and isinstance(client[1], int):
+        return client[1]
+    return None
 
 
 class Extent(enum.Enum):

@@ -48,9 +48,8 @@ from anafi_mav.vehicle.mission.effects import (
     Suspend,
     Work,
 )
-from anafi_mav.vehicle.mission.files import FilesOnDrone
 from anafi_mav.vehicle.mission.machine import PROOF, MissionMachine, State
-from anafi_mav.vehicle.mission.path import check_path, lay_out
+from anafi_mav.vehicle.mission.path import FilesOnDrone, check_path, lay_out
 from anafi_mav.vehicle.mission.payload_state import payload_after
 from anafi_mav.vehicle.mission.record import MissionRecord
 from anafi_mav.vehicle.mission.steps import fly_step

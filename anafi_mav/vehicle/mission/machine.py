@@ -852,7 +852,7 @@ class MissionMachine:
 def _is_at(target: WayPoint, report: DroneReport) -> bool:
     if report.place is None or report.ato is None:
         return False
-    away = math.hypot(geo.distance(*report.place.point, *target.place.point), report.ato - target.ato)
+    away = math.hypot(geo.distance(*report.place, *target.place), report.ato - target.ato)
     return away <= target.radius + GPS_MARGIN
 
 

@@ -1,23 +1,26 @@
-"""Turns a mission into files, from the drone's position on, and checks their path.
+"""Turns a mission into files, from the drone's position on; checks and uploads them.
 
-The check reads the lines of the files, because those are flown.
+The check reads the lines of the files, because those are flown. A file is uploaded once, and known by its content.
 """
 
 from __future__ import annotations
 
 import asyncio
+import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from anafi_mav import mav_enums, texts
-from anafi_mav.errors import PlanError
+from anafi_mav.drone.automatic.flight_plan import FlightPlan
+from anafi_mav.errors import CommandRejected, PlanError
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import Cursor, FlightPlanFile, GatewayStep, Start, translate
 from anafi_mav.units import DEG_PER_RAD
 from anafi_mav.vehicle.base.aircraft import Aircraft
-from anafi_mav.vehicle.base.bounds import check_estimate, check_limits, check_place
+from anafi_mav.vehicle.base.bounds import LOWEST, check_estimate, check_limits, check_place
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.mission.texts import FIRST_LABEL
 
 BREATH = 20
@@ -25,6 +28,9 @@ BREATH = 20
 
 ACCEPTANCE = 5.0
 """m around a way point that names no radius (Parrot's flight plan page)."""
+
+MAX_FILES = 16
+"""Files that are remembered; the drone keeps more, and one that is forgotten is uploaded again."""
 
 _AMSL_FRAMES = (mav_enums.MAV_FRAME_GLOBAL, mav_enums.MAV_FRAME_GLOBAL_INT)
 
@@ -118,17 +124,23 @@ def way_points(leg: FlightPlanFile, after: int = -1) -> Iterator[WayPoint]:
 async def check_path(vehicle: Aircraft, parts: Sequence[FlightPlanFile | GatewayStep], after: int) -> None:
     """Raise `Refused` if a way point, or the straight way to it, is where the drone may not be.
 
-    `after` is the line of the first file after which it is flown.
+    `after` is the line of the first file after which it is flown. A text warns of the lowest way point below the height
+    at which an ANAFI hovers by itself, as PX4 does below home: over a slope that falls it is meant, elsewhere it is the
+    ground.
     """
-    where, seen = vehicle.place, 0
+    where, seen, lowest = vehicle.place, 0, None
     for part in parts:
         if isinstance(part, FlightPlanFile):
             for point in way_points(part, after):
                 _check(vehicle, where, point)
                 where, seen = point.place, seen + 1
+                lowest = point if lowest is None or point.ato < lowest.ato else lowest
                 if seen % BREATH == 0:
                     await asyncio.sleep(0)
         after = -1
+    if lowest is not None and lowest.ato < LOWEST:
+        item = lowest.item + FIRST_LABEL
+        vehicle.text(Severity.WARNING, texts.MISSION_LOW.fill(item=item, height=lowest.ato))
 
 
 def _check(vehicle: Aircraft, start: GeoPoint | None, point: WayPoint) -> None:
@@ -137,3 +149,52 @@ def _check(vehicle: Aircraft, start: GeoPoint | None, point: WayPoint) -> None:
         check_limits(vehicle, point.ato)
     except Refused as error:
         raise Refused(texts.ITEM.fill(number=point.item + FIRST_LABEL), error.reason, lasting=True) from error
+
+
+class FilesOnDrone:
+    """The flight-plan files that were uploaded to one drone."""
+
+    def __init__(self, plan: FlightPlan) -> None:
+        self._plan = plan
+        self._names: dict[bytes, str] = {}
+        """By a digest of what is in them, oldest first."""
+        self._newest: tuple[FlightPlanFile, str, Sequence[Item]] | None = None
+        """With the mission that it was made of."""
+
+    async def beginning_with(self, leg: FlightPlanFile, mission: Sequence[Item]) -> tuple[FlightPlanFile, str, int]:
+        """Return the file on the drone that continues with this leg of a mission.
+
+        Returns the file, its name, and the line before the leg. It is uploaded if needed. An Ai can begin in the
+        middle of the newest file, when the leg is the end of that file. The other models, and legs before which a
+        setting was changed that still holds, get a file of their own. `mission` is the very object that the leg is
+        of: the file of another mission has the same lines for other items, so it is never continued in its middle.
+
+        A file of which a start may still begin is uploaded again: the drone's reports name the file alone.
+        """
+        if self._newest is not None and self._plan.starts_anywhere:
+            whole, name, of = self._newest
+            line = len(whole.origins) - len(leg.origins) - 1
+            if of is mission and line >= 0 and _ends_with(whole, line + 1, leg) and await self._has(name):
+                return whole, name, line
+        digest = hashlib.sha256(leg.content).digest()
+        name = self._names.pop(digest, "")
+        if not name or not await self._has(name):
+            name = await self._plan.upload(leg.content)
+        self._names[digest] = name
+        while len(self._names) > MAX_FILES:
+            del self._names[next(iter(self._names))]
+        self._newest = leg, name, mission
+        return leg, name, -1
+
+    async def _has(self, name: str) -> bool:
+        try:
+            await self._plan.get(name)
+        except CommandRejected:
+            return False
+        return not self._plan.is_undecided(name)  # a start may have been withdrawn meanwhile
+
+
+def _ends_with(whole: FlightPlanFile, line: int, leg: FlightPlanFile) -> bool:
+    """From this line on it is the leg: the same text, which stands for the same items."""
+    same = whole.origins[line:] == leg.origins and whole.done[line:] == leg.done
+    return same and lines_of(whole)[line:] == lines_of(leg)

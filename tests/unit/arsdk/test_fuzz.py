@@ -14,8 +14,7 @@ from support.arsdk_fuzz import throw
 from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.link import handshake
-from anafi_mav.arsdk.link.frame import VERSIONS, decode_frames
-from anafi_mav.arsdk.link.packing import MAX_COMMAND
+from anafi_mav.arsdk.link.frame import MAX_COMMAND, VERSIONS, decode_frames
 from anafi_mav.arsdk.link.transport import Role
 from anafi_mav.errors import RemoteProtocolError
 

@@ -116,4 +116,4 @@ def test_list_of_tokens_that_the_router_has_not_completed_is_requested_again() -
     zenohs.lists = [[late]] * 3
     session.list_tokens("*/drone")
     perform(queue, zenohs)  # and with one that never answers it ends
-    assert (zenohs.lists, reported[2:]) == ([], [TokensListed(is_complete=False)])
+    assert (zenohs.lists, reported[2:]) == ([], [TokensListed()])

@@ -55,6 +55,41 @@ def test_observer_reads_a_foreign_system_under_its_own_name() -> None:
     assert party.got("drone") == [("HEARTBEAT", 200, 190), ("PARAM_REQUEST_LIST", 200, 190)]
 
 
+@pytest.mark.parametrize(
+    "message",
+    [
+        *(
+            command(number)
+            for number in (
+                dialect.MAV_CMD_DO_SET_PARAMETER,
+                dialect.MAV_CMD_PREFLIGHT_SET_SENSOR_OFFSETS,
+                dialect.MAV_CMD_FIXED_MAG_CAL_YAW,
+                dialect.MAV_CMD_FLASH_BOOTLOADER,
+            )
+        ),
+        dialect.MAVLink_param_map_rc_message(FOREIGN, 1, b"ATC_RAT_RLL_P", -1, 1, 0.1, 1.0, 0.0, 1.0),
+        dialect.MAVLink_can_frame_message(FOREIGN, 1, 0, 8, 1, bytes(8)),
+        file_request(dialect.MAV_FTP_OPCODE_CREATEFILE),
+        file_request(dialect.MAV_FTP_OPCODE_WRITEFILE),
+        file_request(dialect.MAV_FTP_OPCODE_OPENFILEWO),
+    ],
+)
+def test_flyer_without_maintenance_changes_no_setting_of_a_foreign_system(message: Any) -> None:
+    party = Party()
+    party.send("drone", DRONE, (FOREIGN, 1))
+    party.send("flyer", LAND, (255, 190))
+    party.send("flyer", message, (255, 190), seq=1)
+    assert party.got("drone") == [("COMMAND_LONG", 255, 190)]
+    assert party.node.counters()["refused_access"] == 1
+
+
+def test_flyer_uploads_plans_to_our_own_system() -> None:
+    party = Party()
+    upload = dialect.MAVLink_file_transfer_protocol_message(0, OURS, 1, bytes((0, 0, 0, 6)).ljust(251, b"\0"))
+    party.send("flyer", upload, (255, 190))
+    assert party.node.counters()["refused_access"] == 0
+
+
 def test_observers_copy_does_not_stop_a_pilots_command() -> None:
     party = Party()
     party.send("drone", DRONE, (FOREIGN, 1))

@@ -43,9 +43,9 @@ def test_unknown_client_that_proves_itself_takes_a_known_place() -> None:
     held.add("b", 1.0, known=False)
     held.add("c", 2.0, known=False)
     assert held.is_full(known=False)
-    assert not held.is_known("b")
+    assert held.heard("b", 2.5)
     held.add("b", 3.0, known=True)
-    assert held.is_known("b")
+    assert not held.heard("b", 3.5)
     assert held.is_full(known=True)
     assert not held.is_full(known=False)
     assert held.replaceable(4.0, known=True) is None  # neither for one that has not proved itself
@@ -57,6 +57,6 @@ def test_idle_clients_are_those_beyond_the_limit() -> None:
     assert held.idle(31.5) == ["a", "b"]
     held.heard("a", 31.0)
     assert held.idle(31.5) == ["b"]
-    held.heard("stranger", 31.0)
+    assert not held.heard("stranger", 31.0)
     assert "stranger" not in held
     assert table("a", idle_limit=0.0).idle(1e9) == []

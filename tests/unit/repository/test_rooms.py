@@ -47,7 +47,7 @@ GUARDED = {"lxml", "pymavlink"}
 CORES = [
     *("endpoint_options.py", "geo.py", "mav_enums.py", "units.py", "config/schema.py", "plans"),
     *("arsdk/codec", "arsdk/messages", "arsdk/video", "arsdk/mux/mux.py"),
-    *("arsdk/link/frame.py", "arsdk/link/handshake.py", "arsdk/link/packing.py", "arsdk/link/transport.py"),
+    *("arsdk/link/frame.py", "arsdk/link/handshake.py", "arsdk/link/transport.py"),
     *(
         "mavlink/access.py",
         "mavlink/address_proof.py",
@@ -67,7 +67,7 @@ CORES = [
     "fabric/system_state.py",
     *("relay/admission.py", "relay/dialogue.py", "relay/digest.py", "relay/feed.py", "relay/uri_host.py"),
     *("sim/autopilot/firmware.py", "sim/autopilot/flight.py", "sim/world/scramble.py"),
-    *("vehicle/base/clients.py", "vehicle/base/control_machine.py", "vehicle/base/height.py"),
+    *("vehicle/base/control_machine.py", "vehicle/base/height.py", "vehicle/base/right.py"),
     *("vehicle/link_loss.py", "vehicle/base/modes.py", "vehicle/base/requester.py"),
     "vehicle/base/move_heading.py",
     *("vehicle/base/roll_sign.py", "vehicle/base/severity.py", "vehicle/offboard/silence.py"),

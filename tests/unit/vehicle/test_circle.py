@@ -22,7 +22,7 @@ def circle(direction: int = 1, facing: Facing = Facing.CENTRE, angle: float | No
 def at(north: float, east: float) -> MotionEstimate:
     """A drone that is so far from the centre."""
     motion = MotionEstimate()
-    motion.on_place(*CENTRE.point)
+    motion.on_place(*CENTRE)
     motion.north, motion.east = north, east
     return motion
 
@@ -83,19 +83,19 @@ def test_lap_without_a_position_has_no_demand() -> None:
 
 
 def test_the_nearest_point_of_the_circle() -> None:
-    start = entry(circle(), GeoPoint(*geo.destination(*CENTRE.point, 0.0, -50.0)))
-    assert geo.offset(*CENTRE.point, *start.point) == pytest.approx((0.0, -20.0), abs=0.01)
+    start = entry(circle(), GeoPoint(*geo.destination(*CENTRE, 0.0, -50.0)))
+    assert geo.offset(*CENTRE, *start) == pytest.approx((0.0, -20.0), abs=0.01)
     start = entry(circle(), CENTRE)
-    assert geo.offset(*CENTRE.point, *start.point) == pytest.approx((20.0, 0.0), abs=0.01)
+    assert geo.offset(*CENTRE, *start) == pytest.approx((20.0, 0.0), abs=0.01)
 
 
 def test_the_outline_is_on_the_circle() -> None:
     points = outline(circle())
     assert len(points) == 33
     assert points[0] == points[-1]
-    assert {round(geo.distance(*CENTRE.point, *point.point), 1) for point in points} == {20.0}
+    assert {round(geo.distance(*CENTRE, *point), 1) for point in points} == {20.0}
     # 32 pieces of 2 * 20 m * sin(pi / 32) each.
-    pieces = {round(geo.distance(*a.point, *b.point), 2) for a, b in pairwise(points)}
+    pieces = {round(geo.distance(*a, *b), 2) for a, b in pairwise(points)}
     assert pieces == {3.92}
 
 

@@ -12,7 +12,6 @@ from anafi_mav.vehicle.base.flight_task import DISARM, HAND_LAUNCH, LAND, MOTOR_
 from anafi_mav.vehicle.base.refusal import NotInControl
 from anafi_mav.vehicle.base.requester import By, Source
 from anafi_mav.vehicle.base.right import Extent, Right
-from anafi_mav.vehicle.flight_policy import operator_refusal_of
 from anafi_mav.vehicle.manual_flight import ManualFlight
 from anafi_mav.vehicle.operator_control import (
     MAX_SHOWN,
@@ -26,6 +25,7 @@ from anafi_mav.vehicle.operator_control import (
     OperatorControl,
     RequestOutcome,
     State,
+    operator_refusal_of,
 )
 from anafi_mav.vehicle.return_end import ReturnEnd
 

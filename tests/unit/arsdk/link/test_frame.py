@@ -7,8 +7,18 @@ from collections import deque
 import pytest
 
 from anafi_mav.arsdk.codec import wire
-from anafi_mav.arsdk.link.frame import Frame, FrameType, decode_frames, decode_varint, encode_frame, encode_varint
-from anafi_mav.arsdk.link.packing import Unpacker, Waiting, pack, with_length
+from anafi_mav.arsdk.link.frame import (
+    Frame,
+    FrameType,
+    Unpacker,
+    Waiting,
+    decode_frames,
+    decode_varint,
+    encode_frame,
+    encode_varint,
+    pack,
+    with_length,
+)
 from anafi_mav.arsdk.messages import ardrone3, common
 from anafi_mav.errors import LocalProtocolError
 

@@ -9,8 +9,7 @@ from support.faulty_wire import Faults, FaultyWire
 
 from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.codec.value_events import unpacked
-from anafi_mav.arsdk.link.frame import Frame, FrameType, decode_frames, encode_frame
-from anafi_mav.arsdk.link.packing import with_length
+from anafi_mav.arsdk.link.frame import Frame, FrameType, decode_frames, encode_frame, with_length
 from anafi_mav.arsdk.link.transport import (
     MAX_QUEUED,
     MAX_QUEUED_NOACK,

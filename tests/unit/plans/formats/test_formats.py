@@ -277,6 +277,18 @@ def test_heading_of_zero_is_not_set_in_a_file_without_headings(written: list[str
     assert [item.params[3] for item in plan.items] == [*read, 0.0]
 
 
+def test_unset_value_is_spelled_as_its_readers_take_it() -> None:
+    """.NET, Mission Planner's, knows NaN alone: with another spelling it drops the line and flies the others."""
+    plan = Plan((waypoint(0, 0, 20.0), waypoint(1, 0, 20.0, 0.0, 0.0, 0.0, 90.0)), Point(LAT, LON))
+    assert [item.params[3] for item in plan.items] == [None, 90.0]
+    data, losses = waypoints.write(plan)
+    words = [line.split(b"\t") for line in data.splitlines()[2:]]
+    assert [line[7] for line in words] == [b"NaN", b"90.0"]
+    assert (waypoints.read(data.decode(), "x"), losses) == (plan, [])
+    drone, _ = parrot.write(plan, 2)
+    assert [line.split(b"\t")[7] for line in drone.splitlines()[1:]] == [b"nan", b"90.0"]
+
+
 def test_plan_with_headings_north_keeps_them_through_the_waypoint_format() -> None:
     plan = Plan((waypoint(0, 0, 20.0, 0.0, 0.0, 0.0, 0.0), waypoint(1, 0, 20.0, 0.0, 0.0, 0.0, 0.0)), Point(LAT, LON))
     data, losses = waypoints.write(plan)

@@ -14,7 +14,6 @@ from anafi_mav.drone import Drone
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Node
 from anafi_mav.services import commands, system
-from anafi_mav.services.command_targets import height
 from anafi_mav.services.commands import (
     Action,
     ActionGroup,
@@ -65,6 +64,7 @@ ROWS: dict[str, tuple[bool, Altitude, object, ProgressPolicy]] = {
     "GIMBAL_REQUEST_AXIS_CALIBRATION": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.PROMPT),
     "MISSION_START": (False, Altitude.UNUSED, effect_of_mode, ProgressPolicy.PROMPT),
     "NAV_LAND": (True, Altitude.UNUSED, Effect.LAND, ProgressPolicy.PROMPT),
+    "NAV_LOITER_UNLIM": (True, Altitude.UNUSED, effect_of_mode, ProgressPolicy.LATE),
     "NAV_RETURN_TO_LAUNCH": (False, Altitude.UNUSED, Effect.RETURN, ProgressPolicy.PROMPT),
     "NAV_TAKEOFF": (True, Altitude.BY_FRAME, Effect.IRREVOCABLE, ProgressPolicy.PROMPT),
     "PREFLIGHT_CALIBRATION": (False, Altitude.UNUSED, Effect.CHANGE, ProgressPolicy.FINAL_ONLY),
@@ -258,7 +258,7 @@ class _Refused(Service):
 @pytest.mark.parametrize(
     ("id", "row", "reason"),
     [
-        (dialect.MAV_CMD_NAV_LOITER_UNLIM, PLAIN, "MAV_CMD 17: MAVLink says True of its location, the row False"),
+        (dialect.MAV_CMD_NAV_LOITER_TO_ALT, PLAIN, "MAV_CMD 31: MAVLink says True of its location, the row False"),
         (
             dialect.MAV_CMD_DO_SET_SERVO,
             Action(_nothing, location=True, altitude=Altitude.UNUSED, effect=Effect.CHANGE),
@@ -293,9 +293,9 @@ async def test_row_contradicting_another_or_mavlink_is_refused(
 
 
 async def test_query_with_a_location_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    wrong = type("Wrong", (_Refused,), {"rows": {}, "asked": (dialect.MAV_CMD_NAV_LOITER_UNLIM,)})
+    wrong = type("Wrong", (_Refused,), {"rows": {}, "asked": (dialect.MAV_CMD_NAV_LOITER_TO_ALT,)})
     monkeypatch.setattr(system, "AUTOPILOT_SERVICES", (*system.AUTOPILOT_SERVICES, wrong))
-    with pytest.raises(ValueError, match="MAV_CMD 17: MAVLink says True of its location"):
+    with pytest.raises(ValueError, match="MAV_CMD 31: MAVLink says True of its location"):
         await make_system()
 
 
@@ -303,4 +303,4 @@ def test_height_of_a_command_without_altitude_raises() -> None:
     definition = Definition(location=True, altitude=Altitude.UNUSED, effect=Effect.CHANGE)
     vehicle: Any = None
     with pytest.raises(ValueError, match="its row says that it has no height"):
-        height(vehicle, Command(21, definition, (NAN, NAN, NAN, NAN), 48.0, 2.0, 10.0, None))
+        Command(21, definition, (NAN, NAN, NAN, NAN), 48.0, 2.0, 10.0, None).height(vehicle)

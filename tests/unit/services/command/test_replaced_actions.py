@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from anafi_mav.services.command.command_service import CommandService
-from anafi_mav.services.command.running_actions import MAX_WAITING, RunningAction, RunningActions
+from anafi_mav.services.command.command_service import MAX_WAITING, CommandService, RunningAction, RunningActions
 from anafi_mav.services.commands import ActionGroup
 
 

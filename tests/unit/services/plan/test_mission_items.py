@@ -10,8 +10,7 @@ from support.plan_samples import FLIGHT, LAT, LON, action, plans, waypoint
 
 from anafi_mav import mav_enums
 from anafi_mav.plans.plan import MISSION, RELATIVE, Item, Plan
-from anafi_mav.services.plan.item_messages import item_int, item_of
-from anafi_mav.services.plan.mission_items import as_carried, from_wire, to_wire
+from anafi_mav.services.plan.item_messages import as_carried, from_wire, item_int, item_of, to_wire
 from anafi_mav.vehicle.fence.plan_items import UNSET, PlanItem, has_place
 
 

@@ -10,7 +10,7 @@ from support.simulated import connected
 from anafi_mav import mav_enums
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import FlightPlanFile, Start, translate
-from anafi_mav.vehicle.mission.files import FilesOnDrone
+from anafi_mav.vehicle.mission.path import FilesOnDrone
 from anafi_mav.vehicle.mission.progress import MissionProgress
 
 

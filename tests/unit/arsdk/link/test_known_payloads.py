@@ -10,8 +10,8 @@ from support.values import arrived
 from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.codec.value_events import Values, receive, unpacked
 from anafi_mav.arsdk.codec.wire import Message
-from anafi_mav.arsdk.link.frame import VERSIONS
-from anafi_mav.arsdk.link.packing import MAX_OF_SIZE, KnownPayloads, Unpacker, with_length
+from anafi_mav.arsdk.link.frame import VERSIONS, Unpacker, with_length
+from anafi_mav.arsdk.link.known_payloads import MAX_OF_SIZE, KnownPayloads
 from anafi_mav.arsdk.messages import ardrone3, camera, common, gimbal
 
 FRAMES = (gimbal.FrameOfReference.RELATIVE,) * 3
