@@ -14,6 +14,7 @@ from anafi_mav.drone import MoveEnd, Position
 from anafi_mav.texts import Subject
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import check_height, check_place
+from anafi_mav.vehicle.base.control import Condition
 from anafi_mav.vehicle.base.flight_task import Hover, Needs, PlainTask, Preparation, TaskRules
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
@@ -146,29 +147,21 @@ class GuidedFlight:
             return
         if here is None:
             raise Refused(texts.GOTO, texts.NO_FIX)
-        if ato is None:
-            if present is None:
-                raise Refused(texts.GOTO, texts.HEIGHT_UNKNOWN)
-            ato = present
-        else:
-            check_height(vehicle, ato)
-        if place is None:
-            place = self._standing or here if self.goto is None else self.goto.place
-        else:
-            check_place(vehicle, place, start=here)
-        await self.go(Goto(place, ato, yaw, speed, mode), by=by, checked=True)
+        if (target := present if ato is None else ato) is None:
+            raise Refused(texts.GOTO, texts.HEIGHT_UNKNOWN)
+        standing = self._standing or here if self.goto is None else self.goto.place
+        goto = Goto(place or standing, target, yaw, speed, mode)
+        await self.go(goto, by=by, condition=lambda: self.check(place, ato))
 
-    async def go(self, goto: Goto, *, by: By, checked: bool = False) -> None:
+    async def go(self, goto: Goto, *, by: By, condition: Condition | None = None) -> None:
         """Fly to a place, or change the move to it. Returns when the drone is on its way.
 
-        `checked`: the place was checked just now, or is the drone's own position, which needs no check.
+        `condition` checks what the client has set of place and height; None: the place.
         """
-        vehicle, control = self._vehicle, self._vehicle.control
-        if not checked:
-            check_place(vehicle, goto.place, start=vehicle.place)
-        before, epoch = self.goto, control.epoch
+        control, before, epoch = self._vehicle.control, self.goto, self._vehicle.control.epoch
+        condition = condition or (lambda: self.check(goto.place, None))
         try:
-            async with control.acquire(goto, by=by, below=Hover(goto.mode)) as grant:
+            async with control.acquire(goto, by=by, below=Hover(goto.mode), condition=condition) as grant:
                 grant.begin()
                 await self.move(goto)
         except BaseException:
@@ -203,9 +196,10 @@ class GuidedFlight:
         Returns at the end of the move: a moveBy reports nothing before. The height is the barometer's, and the drone
         may drift sideways as it does when it hovers without a fix.
         """
-        vehicle = self._vehicle
-        check_height(vehicle, ato)
-        async with vehicle.control.acquire(Hover(mode), by=by, rules=_rules_of_offset(texts.GOTO)) as grant:
+        vehicle, rules = self._vehicle, _rules_of_offset(texts.GOTO)
+        async with vehicle.control.acquire(
+            Hover(mode), by=by, rules=rules, condition=lambda: check_height(vehicle, ato)
+        ) as grant:
             grant.begin()
             state = vehicle.drone.piloting.state
             if state.altitude is None:

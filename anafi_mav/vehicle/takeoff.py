@@ -138,11 +138,11 @@ class Takeoff(PlainTask):
         vehicle, client = self._vehicle, by.client
         if vehicle.armed and not vehicle.on_ground:
             return
-        vehicle.require_ready()
         if vehicle.settings.hand_launch:
-            async with vehicle.control.acquire(HAND_LAUNCH, by=by):
+            async with vehicle.control.acquire(HAND_LAUNCH, by=by, condition=vehicle.require_ready):
                 await vehicle.drone.piloting.hand_launch()
             return
+        vehicle.require_ready()
         self._enter(step(self._situation, Event.ARM, client=client, until=_after(AUTO_DISARM)))
         vehicle.changed()
         if not self._start_when_armed(by):
@@ -211,26 +211,26 @@ class Takeoff(PlainTask):
         """
         vehicle = self._vehicle
         height = vehicle.settings.takeoff_height if ato is None else ato
-        check_height(vehicle, height)
-        if not vehicle.on_ground:
-            raise Refused(texts.TAKEOFF, self._airborne)
-        vehicle.require_ready()
-        if not self.armed:
-            async with vehicle.control.acquire(self, by=by):  # what lifts off while it waits is replaced now
+        is_armed = self.armed
+
+        def condition() -> None:
+            check_height(vehicle, height)
+            if not vehicle.on_ground:
+                raise Refused(texts.TAKEOFF, self._airborne)
+            vehicle.require_ready()
+            if is_armed and not self.armed:
+                raise Refused(texts.TAKEOFF, texts.ARMING_EXPIRED)
+
+        if not is_armed:
+            # What lifts off while it waits is replaced now.
+            async with vehicle.control.acquire(self, by=by, condition=condition):
                 waiting = WaitingTakeoff(height, by.client, _after(ARM_WAIT))
                 self._enter(step(self._situation, Event.REQUEST, attempt=waiting))
             self._start_when_armed(by)
             return
-        async with vehicle.control.acquire(self, by=by, below=self._below, rules=_RISES):
-            if not self.armed:
-                raise Refused(texts.TAKEOFF, texts.ARMING_EXPIRED)
-            await self._lift_off()
+        async with vehicle.control.acquire(self, by=by, below=self._below, rules=_RISES, condition=condition):
+            await self.launch()
         self._start(self._rise(height, by))
-
-    async def launch(self) -> None:
-        """Take off to the drone's own height, for setpoints; returns when the drone confirmed it."""
-        self._vehicle.require_ready()
-        await self._lift_off()
 
     async def abort(self, by: By) -> None:
         """Disarm a drone that stands, land one that is about to leave the ground.
@@ -310,8 +310,8 @@ class Takeoff(PlainTask):
 
     # Taking off.
 
-    async def _lift_off(self) -> None:
-        """The drone's own take-off.
+    async def launch(self) -> None:
+        """Take off to the drone's own height; returns when the drone confirmed it.
 
         Until it has succeeded or failed, the armed state does not lapse.
         """
@@ -331,7 +331,7 @@ class Takeoff(PlainTask):
         try:
             if lifts_off:
                 control.check(self, by)
-                await self._lift_off()
+                await self.launch()
                 control.adopt(self, below=self._below)
             climbs = True
             self._enter(step(self._situation, Event.CLIMB))

@@ -353,18 +353,10 @@ class Vehicle(Aircraft):
 
     async def return_home(self, by: By) -> None:
         """Fly home by the drone's own return. A landing goes on unless `by` may end it."""
-        if self.on_ground or self.flying_state is FlyingState.USERTAKEOFF:  # in a hand, where no return may wait
-            raise Refused(texts.RETURN, self.activity)
         if self.return_end.shown:
             return  # it waits above home or lands there, and would climb and fly home once more
-        if lands := self.landing:
-            self._require_endable(self.return_end, by)
-            if self.drone.home.state.rth == RthState.UNAVAILABLE:  # the landing would be ended for nothing
-                raise Refused(texts.RETURN, texts.RETURN_UNAVAILABLE)
-        async with self.control.acquire(self.return_end, by=by):
-            if (lands or self.landing) and await self.drone.piloting.settle_landing():
-                self._require_endable(self.return_end, by)
-                await self._end_landing(by)
+        async with self.control.acquire(self.return_end, by=by, condition=lambda: self._require_return(by)):
+            await self._end_settled_landing(self.return_end, by)
             self._initiators.return_commanded(self._clock.monotonic())
             attempt = self.return_end.command()
             try:
@@ -373,6 +365,18 @@ class Vehicle(Aircraft):
                 self.return_end.fail(attempt)
                 raise
         self.return_end.announce(attempt, system_of(client_of(by)))
+
+    def _require_return(self, by: By) -> None:
+        """Raise `Refused` when the drone stands, or lands and `by` may not end that.
+
+        A drone that is held for a launch stands too: no return may wait there.
+        """
+        if self.on_ground or self.flying_state is FlyingState.USERTAKEOFF:
+            raise Refused(texts.RETURN, self.activity)
+        if self.landing:
+            self._require_endable(self.return_end, by)
+            if self.drone.home.state.rth == RthState.UNAVAILABLE:  # the landing would be ended for nothing
+                raise Refused(texts.RETURN, texts.RETURN_UNAVAILABLE)
 
     async def hold(self, mode: FlightMode, by: By, *, chosen: bool = False, pause: bool = False) -> None:
         """Stop and hover. A landing or return goes on, and this is refused, unless `by` may end it.
@@ -383,11 +387,12 @@ class Vehicle(Aircraft):
         pauses = pause or (self.control.paused and mode is self.mode)
         hover = Hover(mode, client_of(by) if chosen else None, self._paused_task if pauses else None)
         task = self.manual if mode is FlightMode.POSITION else hover
-        self._require_endable(task, by)
         own = self.returning_by_itself
         rising = self.drone.piloting.about_to_fly
         starts = self.flying_state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF)
-        async with self.control.acquire(task, by=by, pauses=pauses) as grant:
+        async with self.control.acquire(
+            task, by=by, pauses=pauses, condition=lambda: self._require_endable(task, by)
+        ) as grant:
             if not self.on_ground or rising:
                 await self._stop(task, by, own=own)
             grant.begin(pauses=pauses and (rising or not self.on_ground))
@@ -451,10 +456,8 @@ class Vehicle(Aircraft):
         if not self.landing or self.on_ground:
             await self.takeoff.take_off(ato, by)
             return
-        self._require_endable(self.takeoff, by)
-        async with self.control.acquire(Hover(), by=by):
-            if await self.drone.piloting.settle_landing():
-                await self._end_landing(by, take_off=True)
+        async with self.control.acquire(Hover(), by=by, condition=lambda: self._require_endable(self.takeoff, by)):
+            await self._end_settled_landing(self.takeoff, by, take_off=True)
             if self.on_ground:
                 raise Refused(texts.LANDING, texts.ALREADY_LANDED, form=texts.NOT_ABORTED)
 
@@ -559,8 +562,7 @@ class Vehicle(Aircraft):
         Returns at once when the drone neither lands nor returns.
         """
         if self.descends:
-            self._require_endable(task, by)
-            async with self.control.acquire(Hover(), by=by):
+            async with self.control.acquire(Hover(), by=by, condition=lambda: self._require_endable(task, by)):
                 await self._stop(task, by)
 
     async def _stop(self, task: FlightTask, by: By, *, own: bool = False) -> None:
@@ -569,8 +571,6 @@ class Vehicle(Aircraft):
         `own`: the drone returned by itself when the command arrived. A return that it begins afterwards goes on.
         """
         piloting, home, right = self.drone.piloting, self.drone.home, right_of(by)
-        if self.landing:  # it may have begun during the wait for what flew
-            self._require_endable(task, by)
         await self._end_landing(by)
         announced = None if right is None else self._announced_for(task, right)
         if own and right is not None and self.returning_by_itself:
@@ -578,11 +578,10 @@ class Vehicle(Aircraft):
             await piloting.cancel_return_home(even_its_own=True)
             self._return_aborted(right, reason)
         await piloting.stop()
+        self._require_endable(task, by)  # what began meanwhile
         # One asked for through another controller, or before the link was lost. Raises when it is the drone's own.
         await piloting.cancel_return_home()
-        if await piloting.settle_landing() or self.landing:  # one that began meanwhile
-            self._require_endable(task, by)
-            await self._end_landing(by)
+        if await self._end_settled_landing(task, by):  # one that began meanwhile
             await piloting.stop()
         if announced is not None and right is not None:
             await self._answer_announced(announced, right)
@@ -633,6 +632,13 @@ class Vehicle(Aircraft):
             self.flight_facts = replace(self.flight_facts, aborted_return=None)
         elif aborted is not None and aborted.due(self, now):
             aborted.report(self, now)
+
+    async def _end_settled_landing(self, task: FlightTask, by: By, *, take_off: bool = False) -> bool:
+        """End a landing, also one that a withdrawn command has begun; return True if there is one."""
+        if lands := await self.drone.piloting.settle_landing() or self.landing:
+            self._require_endable(task, by)
+            await self._end_landing(by, take_off=take_off)
+        return lands
 
     async def _end_landing(self, by: By, *, take_off: bool = False) -> None:
         """End the landing that the drone flies; at once when it flies none."""

@@ -86,7 +86,7 @@ def over_socket(address: tuple[str, int], answers: Answers) -> None:
     while True:
         try:
             data = line.recv(2048)
-        except ConnectionRefusedError:  # nobody listens yet
+        except ConnectionRefusedError:  # no one listens yet
             continue
         if (answer := answers.to(data)) is not None:
             line.send(answer)

@@ -40,7 +40,7 @@ def machine() -> str:
 
 
 def loopback() -> str:
-    """A loopback address that nobody is likely to use."""
+    """A loopback address that no one is likely to use."""
     return f"127.{random.randint(64, 126)}.{random.randint(1, 250)}.{random.randint(1, 100)}"
 
 

@@ -3,7 +3,7 @@
     .venv/bin/python tests/bench/heartbeat.py [SECONDS]
 
 The drone hovers in Offboard. Each of four clients, at an endpoint of its own, sends a setpoint and a command that is
-not supported 50 times a second; only the first one's setpoints fly. Once a second somebody at the first one's endpoint
+not supported 50 times a second; only the first one's setpoints fly. Once a second a person at the first one's endpoint
 sends a burst of random and damaged frames besides. Clients, gateway and simulator are three processes. A gap is that
 between two heartbeats of the vehicle as a client reads them, a delay that from a client's send to its COMMAND_ACK.
 
@@ -35,7 +35,7 @@ BURST, DATAGRAM = 500, 20
 """Frames a second that make no sense, and in one datagram, which stays below 1500 bytes on the average."""
 
 NOBODYS, IDS = 50_000, 1000
-"""A range of command numbers that MAVLink does not use: an answer is told from the next one's."""
+"""A range of command numbers that MAVLink does not use: each answer differs from the next one's."""
 
 LATE = 0.02
 """s from which this script has gone on too late: a turn of its own."""

@@ -22,7 +22,7 @@ from anafi_mav.services.plan.plan_requests import REQUEST_EVERY, asked_for
 
 LIMIT, HALF_SECOND = 5, 0.5
 ROUNDS = 40
-"""Of which nobody needs all: an item that has not come after five seconds is given up by the gateway."""
+"""Of which no one needs all: an item that has not come after five seconds is abandoned by the gateway."""
 
 Steps = Callable[[int], Sequence[int]]
 """What the n-th request of an item asks for, relative to it."""

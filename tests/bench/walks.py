@@ -424,7 +424,7 @@ def main() -> int:
     from anafi_mav.arsdk.link import watchdog
 
     class Loop(virtual_time.Loop):
-        """Tells the tracer of its iterations."""
+        """Notifies the tracer of its iterations."""
 
         def __init__(self) -> None:
             super().__init__()

@@ -1,4 +1,4 @@
-"""What the programs written against dronekit share: a wait for what the vehicle tells, and a line for each step."""
+"""What the programs written against dronekit share: a wait for what the vehicle reports, and a line for each step."""
 
 from __future__ import annotations
 

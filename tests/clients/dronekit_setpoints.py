@@ -25,7 +25,7 @@ def repeated(do: Callable[[], None], seconds: float, name: str, engage: Callable
     """A program's own loop, as the examples of dronekit have it; after some time, until the test has looked.
 
     `engage` is what makes the drone listen. Where the machine held this program up, the drone hovers and listens no
-    more: so it is said again, and what is flown by then has to settle anew. It is said at the beginning in any case:
+    more: so it is said again, and what is flown by then has to settle again. It is said at the beginning in any case:
     the machine may have stood still since the last setpoint of what came before.
     """
     do()

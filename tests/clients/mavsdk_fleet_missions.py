@@ -57,7 +57,7 @@ async def fly(number: int, system: Any, path: Path) -> None:
 
 async def main(url: str, paths: list[Path]) -> None:
     async with ground_station() as mavsdk:
-        # In this order: it is told of systems that are new from when it listens.
+        # In this order: it is notified of systems that are new from when it listens.
         found, _ = await asyncio.gather(systems(mavsdk, len(paths)), mavsdk.add_any_connection(url))
         flights = [fly(number, found[number], path) for number, path in enumerate(paths, start=1)]
         try:

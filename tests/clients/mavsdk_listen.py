@@ -1,4 +1,4 @@
-"""MAVSDK's telemetry, info, shell and log_files plugins, unmodified: writes what each tells, a JSON line at a time.
+"""MAVSDK's telemetry, info, shell and log_files plugins, unmodified: writes what each reports, a JSON line at a time.
 
 python mavsdk_listen.py URL
 """
@@ -132,7 +132,7 @@ async def main(url: str) -> None:
         shell = ShellAsync(drone)
         answers = shell.subscribe_receive()
         answer = asyncio.ensure_future(answers.__anext__())
-        await asyncio.sleep(0.2)  # MAVSDK asks for an answer only once it has somebody to hand it to
+        await asyncio.sleep(0.2)  # MAVSDK asks for an answer only once it has a receiver for it
         await shell.send("version", Device.SHELL)
         say("shell", (await asyncio.wait_for(answer, 5.0)).data)
 

@@ -1,4 +1,4 @@
-"""A long mission by MAVSDK's plugin mission_raw, up and, if it is told to, down again.
+"""A long mission by MAVSDK's plugin mission_raw, up and, with "both", down again.
 
     mavsdk_lossy.py URL COUNT up|both
 

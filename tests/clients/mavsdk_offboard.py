@@ -36,7 +36,7 @@ M = 1.0 / 111_226.0
 
 
 STEP, STANDSTILL = 0.1, 0.3
-"""s of a wait, and of one in which the machine stood still: what is flown by then has to settle anew."""
+"""s of a wait, and of one in which the host stalled: what is flown by then has to settle again."""
 
 
 async def unbroken(seconds: float, flight: Callable[[], int | None]) -> None:
@@ -59,7 +59,7 @@ SETTLED = 3
 class Pilot:
     """Flies by setpoints, and begins again where the machine has held this program up for half a second.
 
-    The drone hovers then, in mode Hold, and MAVSDK forgets the setpoint: at the first heartbeat that tells another mode
+    The drone hovers then, in mode Hold, and MAVSDK forgets the setpoint: at the first heartbeat with another mode
     than Offboard three seconds after the last start. One may come between a setpoint and the start that follows.
     """
 
@@ -67,7 +67,7 @@ class Pilot:
         self._plugin, self._telemetry = plugin, telemetry
         self._wanted: Callable[[], Awaitable[None]] | None = None
         self._turn = asyncio.Lock()
-        """Of whoever sets or starts: what is started is what was set last."""
+        """Of the program that sets or starts: what is started is what was set last."""
         self._there = False
         self._resumed = 0
         self._staying: asyncio.Future[None] | None = None
@@ -221,16 +221,16 @@ async def follow(system: Any) -> None:
     await until(telemetry.subscribe_flight_mode(), lambda mode: mode.name == "FOLLOW_ME")
     say("following", await plugin.is_active())
     clock = asyncio.get_running_loop().time
-    north, on_time, told = 10.0, 0, 0
-    while told < 9 or on_time < SETTLED:
+    north, on_time, observed = 10.0, 0, 0
+    while observed < 9 or on_time < SETTLED:
         begun = clock()
         await plugin.set_target_location(TargetLocation(HOME[0] + north * M, HOME[1], HOME[2], 1.5, 0.0, 0.0))
         await asyncio.sleep(1.0)
         north += 1.5
         # Where the machine stood still the drone went on, and the target of this program did not.
         on_time = on_time + 1 if clock() - begun < 1.0 + STANDSTILL else 0
-        if told or (north > 20.0 and on_time >= SETTLED):
-            told += 1
+        if observed or (north > 20.0 and on_time >= SETTLED):
+            observed += 1
             say("target" if on_time >= SETTLED else "late target", north)
     await held("following")
     await plugin.stop()

@@ -164,7 +164,7 @@ async def test_documented_simulator_starts_and_ends(folder: Path, command: Comma
 
 
 async def test_documented_commands_for_a_vehicle_end_well(folder: Path) -> None:
-    """One after the other, as somebody would type them who reads on."""
+    """One after the other, as a person would type them who reads on."""
     address = loopback()
     config = f"""
         endpoints: ["tcpin://{address}:5760"]

@@ -26,7 +26,7 @@ async def test_dronekit_on_the_ground_gets_each_answer_once(tmp_path: Path) -> N
         await script.line(lambda line: line == "end", timeout=120.0)
         said = [line for line in script.lines if line.split(" ", 1)[0] in WORDS]
         assert said == [
-            "home None",  # told when it is requested, as ArduCopter does
+            "home None",  # reported when it is requested, as ArduCopter does
             "mission_float True ftp True",
             "garbage None",
             "channels 18 int",

@@ -30,8 +30,8 @@ BAD = 0.25
 MAVSDKS_TRIES = 3
 """By the way MAVSDK counts, 97.7 % of such uploads succeed, and 99.9 % cannot, whatever the vehicle does: it says its
 first message five times, and once in a thousand uploads all five are lost. Nor is it patient: the half seconds without
-a request that it counts go on while the gateway waits for a processor. An upload that it has given up, and said so, is
-begun anew, as its user would. tests/bench/lossy_uploads.py has the figures."""
+a request that it counts go on while the gateway waits for a processor. An upload that it has abandoned, and said so, is
+begun again, as its user would. tests/bench/lossy_uploads.py has the figures."""
 
 MAVSDKS_OWN = 0.05
 """What MAVSDK's own test of lossy transfers loses. It asks for an item five times, so 99.6 % of such downloads succeed,
@@ -58,9 +58,9 @@ async def holds_what_mavsdk_sent(w: World, count: int) -> None:
 async def test_conf_061_items_by_mavsdk_on_a_bad_link(count: int) -> None:
     async with world(udp=True) as w, lossy_link((w.address, UDP_PORT), BAD) as link:
         lines = await by_mavsdk(w, link, count, "up")
-        told = [line for line in lines if line.startswith("tried")]
-        assert told[-1] == "tried upload done"
-        assert len(told) <= MAVSDKS_TRIES
+        observed = [line for line in lines if line.startswith("tried")]
+        assert observed[-1] == "tried upload done"
+        assert len(observed) <= MAVSDKS_TRIES
         link.check(count)
         await holds_what_mavsdk_sent(w, count)
 

@@ -59,7 +59,7 @@ async def test_connect_look_and_fly(tmp_path: Path) -> None:
         endpoints: ["tcpin://{address}:5760"]
         drones: [{{name: alpha, sysid: 1, sim: {{address: {loopback()}, home: {list(HOME)}, speed: 3}}}}]
     """
-    # HOME: no start-up script of whoever runs the tests.
+    # HOME: no start-up script of the user who runs the tests.
     words = (sys.executable, "-u", MAVPROXY, f"--master=tcp:{address}:5760", f"--state-basedir={tmp_path}")
     async with (
         product(tmp_path, config) as p,

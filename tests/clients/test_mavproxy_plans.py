@@ -52,9 +52,9 @@ async def listed(mavproxy: Process, what: str, how: str = "list") -> list[int]:
 
 
 async def changed(w: World, kind: int, command: str, mavproxy: Process) -> list[Any]:
-    """Type a command that changes a list; what another client reads once the vehicle has told that it has changed.
+    """Type a command that changes a list; what another client reads once the vehicle has reported that it has changed.
 
-    Not sooner: who uploads while somebody else downloads is refused, and MAVProxy does not try again.
+    Not sooner: who uploads while another client downloads is refused, and MAVProxy does not try again.
     """
     before = ids(await w.client.wait("MISSION_CURRENT"))[kind]
     mark = w.client.mark()
@@ -91,7 +91,7 @@ async def test_conf_119_fence_and_rally(flavour: str, tmp_path: Path) -> None:
             await mavproxy.line(lambda line: "online system 1" in line)
             await mavproxy.line(lambda line: re.search(r"Received \d+ parameters", line) is not None, timeout=30.0)
 
-            # A fence: from a file, told of, listed, disabled, enabled, cleared.
+            # A fence: from a file, reported, listed, disabled, enabled, cleared.
             fence = [*square(PLACE, 50.0), circle(PLACE, 5.5, inclusion=False)]
             since = len(mavproxy.lines)
             command = f"fence load {waypoint_file(tmp_path / 'fence.txt', fence)}"
@@ -110,7 +110,7 @@ async def test_conf_119_fence_and_rally(flavour: str, tmp_path: Path) -> None:
             (home,) = await changed(w, FENCE, "fence addhomecircle 70", mavproxy)
             assert (home.command, home.param1) == (5005, 70.0)
 
-            # Rally points; somebody else's are listed, too.
+            # Rally points; another client's are listed, too.
             points = [rally(PLACE, 20.0), rally((PLACE[0] + 0.001, PLACE[1]), 25.0)]
             command = f"rally load {waypoint_file(tmp_path / 'rally.txt', points)}"
             assert same(await changed(w, RALLY, command, mavproxy), points)

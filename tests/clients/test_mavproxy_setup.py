@@ -68,7 +68,7 @@ async def setup(w: World, mavproxy: Process, flavour: str, folder: Path) -> None
 @both
 async def test_conf_114_mavproxy_param_and_ftp(flavour: str, tmp_path: Path) -> None:
     async with world(flavour=flavour) as w:
-        # HOME: no start-up script of whoever runs the tests.
+        # HOME: no start-up script of the user who runs the tests.
         words = (sys.executable, "-u", MAVPROXY, f"--master=tcp:{w.address}:5760", f"--state-basedir={tmp_path}")
         async with program(*words, stdin=asyncio.subprocess.PIPE, env={"HOME": str(tmp_path)}) as mavproxy:
             await setup(w, mavproxy, flavour, tmp_path)

@@ -53,7 +53,7 @@ async def test_conf_116_a_mission_of_mavsdks_own_kind() -> None:
 
 @both
 async def test_conf_116_raw_missions(flavour: str) -> None:
-    """What QGroundControl has stored is imported, uploaded and read back; somebody else's upload is told."""
+    """What QGroundControl has stored is imported, uploaded and read back; another client's upload is reported."""
     async with world(flavour=flavour, web=True) as w, program(*script(w, *SAMPLES)) as mavsdk:
         await mavsdk.line(lambda line: line == "yours", timeout=120.0)
         found = {name: words for name, *words in map(str.split, mavsdk.said("import"))}

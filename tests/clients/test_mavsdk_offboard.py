@@ -95,7 +95,7 @@ LEVEL = (0, 0, 0, 0)
 
 
 def sticks(w: World, since: float) -> list[tuple[int, ...]]:
-    """Roll, pitch, yaw and gaz that the drone was told from then on."""
+    """Roll, pitch, yaw and gaz that the drone was commanded from then on."""
     return [
         tuple(entry.args[axis] for axis in ("roll", "pitch", "yaw", "gaz")) for entry in heard(w, "PCMD", since=since)
     ]

@@ -46,8 +46,8 @@ async def test_conf_116_mavsdk_param_ftp_metadata_events(flavour: str, tmp_path:
             name = "rth.set_min_altitude" if flavour == "px4" else "ardrone3.PilotingSettings.MaxAltitude"
             # Once for each time that MAVSDK said it, which it does again when there is no answer for half a second; all
             # but one, which is refused.
-            told = [list(entry.args.values()) for entry in w.commands(name)]
-            assert told in [[[41.5]] * number for number in range(1, sets_of(script))]
+            observed = [list(entry.args.values()) for entry in w.commands(name)]
+            assert observed in [[[41.5]] * number for number in range(1, sets_of(script))]
             assert script.said("whole") == ["4001" if flavour == "px4" else "2000"]
             assert len(script.said("refused")) == 1
 

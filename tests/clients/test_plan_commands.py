@@ -1,4 +1,4 @@
-"""`anafi-mav plan upload` and `download` as they are called: with the gateway, and with a vehicle of somebody else."""
+"""`anafi-mav plan upload` and `download` as they are called: with the gateway, and with another vehicle."""
 
 from __future__ import annotations
 
@@ -132,8 +132,8 @@ async def test_a_plan_is_flown_and_followed(tmp_path: Path) -> None:
         assert flight.process.returncode == 0, str(flight)
         lines = flight.lines
         assert lines.index("mission: 9 items on system 1") < lines.index("arming")
-        told = [line for line in lines if line.startswith(("at ", "done: "))]
-        assert [line for line in told if line.startswith("done: ")] == [
+        observed = [line for line in lines if line.startswith(("at ", "done: "))]
+        assert [line for line in observed if line.startswith("done: ")] == [
             "done: item 0 NAV_TAKEOFF",
             "done: item 1 DO_CHANGE_SPEED",
             "done: item 2 NAV_WAYPOINT",
@@ -144,7 +144,7 @@ async def test_a_plan_is_flown_and_followed(tmp_path: Path) -> None:
             "done: item 7 NAV_WAYPOINT",
             "done: item 8 NAV_RETURN_TO_LAUNCH",
         ]
-        assert told.count("at item 4 IMAGE_START_CAPTURE") == 3
+        assert observed.count("at item 4 IMAGE_START_CAPTURE") == 3
         assert lines[-1] == "mission complete"
         # The drone's own word: a photo each time round.
         items = [entry["args"]["command"] for entry in p.entries("plan", "item")]

@@ -1,4 +1,4 @@
-"""The messages of our own dialect over a real socket: what the simulated drone told is what they say."""
+"""The messages of our own dialect over a real socket: what the simulated drone reported is what they say."""
 
 from __future__ import annotations
 
@@ -53,11 +53,19 @@ async def test_anafi_messages_go_to_the_requester_only() -> None:
 
 async def test_flight_status() -> None:
     async with world(speed=1.0) as w:
-        told = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_FLIGHT_STATUS)
-        assert told.flying_state == dialect.ANAFI_FLYING_STATE_LANDED
-        assert (told.steady, told.plan, told.alert) == (1, dialect.ANAFI_PLAN_STATE_STOPPED, dialect.ANAFI_ALERT_NONE)
-        assert (told.wind, told.vibration, told.icing) == (0, 0, 255)  # the simulated one says nothing of ice
-        assert (told.hover_warnings, told.forced_landing_in) == (0, 255)
+        observed = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_FLIGHT_STATUS)
+        assert observed.flying_state == dialect.ANAFI_FLYING_STATE_LANDED
+        assert (observed.steady, observed.plan, observed.alert) == (
+            1,
+            dialect.ANAFI_PLAN_STATE_STOPPED,
+            dialect.ANAFI_ALERT_NONE,
+        )
+        assert (observed.wind, observed.vibration, observed.icing) == (
+            0,
+            0,
+            255,
+        )  # the simulated one says nothing of ice
+        assert (observed.hover_warnings, observed.forced_landing_in) == (0, 255)
         await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_FLIGHT_STATUS)
         for event in (
             ardrone3.WindStateChanged(ardrone3.WarningLevel.WARNING),
@@ -68,12 +76,12 @@ async def test_flight_status() -> None:
             ardrone3.ForcedLandingAutoTrigger(ardrone3.ForcedLandingReason.DEFECTIVE_SENSOR, 0),
         ):
             w.drone.inject(event)
-        told = await w.client.wait("ANAFI_FLIGHT_STATUS", lambda m: m.forced_landing != 0)
-        assert (told.wind, told.icing) == (1, 2)
-        assert told.hover_warnings == dialect.ANAFI_HOVER_WARNING_TOO_HIGH
-        assert (told.motor_error, told.motors) == (2, 4)
-        assert told.alert == dialect.ANAFI_ALERT_TOO_MUCH_ANGLE
-        assert (told.forced_landing, told.forced_landing_in) == (dialect.ANAFI_FORCED_LANDING_SENSOR, 0)
+        observed = await w.client.wait("ANAFI_FLIGHT_STATUS", lambda m: m.forced_landing != 0)
+        assert (observed.wind, observed.icing) == (1, 2)
+        assert observed.hover_warnings == dialect.ANAFI_HOVER_WARNING_TOO_HIGH
+        assert (observed.motor_error, observed.motors) == (2, 4)
+        assert observed.alert == dialect.ANAFI_ALERT_TOO_MUCH_ANGLE
+        assert (observed.forced_landing, observed.forced_landing_in) == (dialect.ANAFI_FORCED_LANDING_SENSOR, 0)
         # Repeated, it is true at the time of sending.
         again = await w.client.wait("ANAFI_FLIGHT_STATUS")
         last = await w.client.wait("ANAFI_FLIGHT_STATUS")
@@ -82,39 +90,45 @@ async def test_flight_status() -> None:
 
 async def test_home() -> None:
     async with world() as w:
-        told = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_HOME)
-        assert (told.min_altitude, told.hovering_altitude) == (20.0, 10.0)
-        assert told.preferred_type == w.drone.firmware.settings["home_type"]
-        assert told.state == dialect.ANAFI_RETURN_STATE_AVAILABLE
-        assert told.trigger_in == 65535
+        observed = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_HOME)
+        assert (observed.min_altitude, observed.hovering_altitude) == (20.0, 10.0)
+        assert observed.preferred_type == w.drone.firmware.settings["home_type"]
+        assert observed.state == dialect.ANAFI_RETURN_STATE_AVAILABLE
+        assert observed.trigger_in == 65535
         await w.take_off(8.0)
-        told = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_HOME)
+        observed = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_HOME)
         home = w.drone.log.find("event", "ardrone3.GPSSettingsState.HomeChanged")[-1].args
-        assert (told.latitude, told.longitude) == (round(home["latitude"] * 1e7), round(home["longitude"] * 1e7))
-        assert told.type in (dialect.ANAFI_HOME_TYPE_TAKEOFF, dialect.ANAFI_HOME_TYPE_PILOT)
+        assert (observed.latitude, observed.longitude) == (
+            round(home["latitude"] * 1e7),
+            round(home["longitude"] * 1e7),
+        )
+        assert observed.type in (dialect.ANAFI_HOME_TYPE_TAKEOFF, dialect.ANAFI_HOME_TYPE_PILOT)
         w.drone.inject(rth.RthAutoTrigger(rth.AutoTriggerReason.BATTERY_CRITICAL_SOON, 17))
         w.drone.inject(rth.HomeReachability(rth.RthHomeReachability.CRITICAL))
         await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_HOME)
-        told = await w.client.wait("ANAFI_HOME", lambda m: m.reachability == dialect.ANAFI_REACHABILITY_CRITICAL)
-        assert (told.trigger, told.trigger_in) == (dialect.ANAFI_RETURN_TRIGGER_BATTERY, 17)
+        observed = await w.client.wait("ANAFI_HOME", lambda m: m.reachability == dialect.ANAFI_REACHABILITY_CRITICAL)
+        assert (observed.trigger, observed.trigger_in) == (dialect.ANAFI_RETURN_TRIGGER_BATTERY, 17)
         assert (await w.client.command(stock.MAV_CMD_NAV_RETURN_TO_LAUNCH)).result == ACCEPTED
-        told = await w.client.wait("ANAFI_HOME", lambda m: m.state == dialect.ANAFI_RETURN_STATE_IN_PROGRESS)
-        assert told.reason == dialect.ANAFI_RETURN_REASON_USER_REQUEST
+        observed = await w.client.wait("ANAFI_HOME", lambda m: m.state == dialect.ANAFI_RETURN_STATE_IN_PROGRESS)
+        assert observed.reason == dialect.ANAFI_RETURN_REASON_USER_REQUEST
 
 
 async def test_checklist() -> None:
     async with world() as w:
         await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CHECKLIST)
         w.drone.faults.magneto_required = True
-        told = await w.client.wait("ANAFI_CHECKLIST", lambda m: m.checks_failed)
-        assert told.checks_failed == dialect.ANAFI_CHECK_MAGNETO_CALIBRATION
-        assert told.checks_told & told.checks_failed
+        observed = await w.client.wait("ANAFI_CHECKLIST", lambda m: m.checks_failed)
+        assert observed.checks_failed == dialect.ANAFI_CHECK_MAGNETO_CALIBRATION
+        assert observed.checks_reported & observed.checks_failed
         on, off = alarms.State.ON, alarms.State.OFF
         w.drone.inject(alarms.Alarms(alarms.Type.HORIZONTAL_GEOFENCE_REACHED, on, FIRST))
         w.drone.inject(alarms.Alarms(alarms.Type.MAGNETO_PERTURBATION, off, LAST))
-        told = await w.client.wait("ANAFI_CHECKLIST", lambda m: m.alarms_raised)
-        assert told.alarms_raised == dialect.ANAFI_ALARM_HORIZONTAL_GEOFENCE
-        assert told.alarms_told == dialect.ANAFI_ALARM_HORIZONTAL_GEOFENCE | dialect.ANAFI_ALARM_MAGNETO_PERTURBATION
+        observed = await w.client.wait("ANAFI_CHECKLIST", lambda m: m.alarms_raised)
+        assert observed.alarms_raised == dialect.ANAFI_ALARM_HORIZONTAL_GEOFENCE
+        assert (
+            observed.alarms_reported
+            == dialect.ANAFI_ALARM_HORIZONTAL_GEOFENCE | dialect.ANAFI_ALARM_MAGNETO_PERTURBATION
+        )
 
 
 async def test_link() -> None:
@@ -122,24 +136,24 @@ async def test_link() -> None:
         await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_LINK)
         w.drone.inject(common.LinkSignalQuality(0x83))  # quality 3, perturbed
         w.drone.inject(wifi.RssiChanged(-67))
-        told = await w.client.wait("ANAFI_LINK", lambda m: m.rssi == -67)
-        assert told.quality == 3
-        assert told.flags == dialect.ANAFI_LINK_FLAGS_TOLD | dialect.ANAFI_LINK_FLAGS_PERTURBED
-        assert told.goodput == 0xFFFFFFFF  # the live video alone tells it
+        observed = await w.client.wait("ANAFI_LINK", lambda m: m.rssi == -67)
+        assert observed.quality == 3
+        assert observed.flags == dialect.ANAFI_LINK_FLAGS_TOLD | dialect.ANAFI_LINK_FLAGS_PERTURBED
+        assert observed.goodput == 0xFFFFFFFF  # the live video alone reports it
 
 
 @pytest.mark.parametrize("model", ["4k", "ai"])
 async def test_camera_exposure_and_intrinsics(model: str) -> None:
     async with world(model=model) as w:
-        told = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE)
-        assert (told.camera, told.source) == (0, dialect.ANAFI_EXPOSURE_SOURCE_STEPS)
-        assert told.ev == 0.0
-        assert told.zoom == pytest.approx(1.0)
-        assert math.isnan(told.awb_r_gain)
+        observed = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE)
+        assert (observed.camera, observed.source) == (0, dialect.ANAFI_EXPOSURE_SOURCE_STEPS)
+        assert observed.ev == 0.0
+        assert observed.zoom == pytest.approx(1.0)
+        assert math.isnan(observed.awb_r_gain)
         if model == "4k":
             await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE)
             w.drone.inject(camera.ZoomLevel(0, 2.5))
-            told = await w.client.wait("ANAFI_CAMERA_EXPOSURE", lambda m: m.zoom == 2.5)
+            observed = await w.client.wait("ANAFI_CAMERA_EXPOSURE", lambda m: m.zoom == 2.5)
         lens = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_INTRINSICS)
         width, fx = {"4k": (1280, 953.87), "ai": (1920, 1505.94)}[model]
         assert (lens.width, lens.fx) == (width, pytest.approx(fx))
@@ -155,26 +169,26 @@ async def test_video_runs_while_a_stream_needs_its_metadata(model: str) -> None:
         if w.drone.rtsp_port is None:
             pytest.skip(w.drone.rtsp_problem)
         await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_LINK)
-        told = await w.client.wait("ANAFI_LINK")
-        assert told.goodput == 0xFFFFFFFF
+        observed = await w.client.wait("ANAFI_LINK")
+        assert observed.goodput == 0xFFFFFFFF
         video = w.gateway.systems[0].drone.video
         assert not video.state.playing
         await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE)
         frame = dialect.ANAFI_EXPOSURE_SOURCE_FRAME
-        told = await w.client.wait("ANAFI_CAMERA_EXPOSURE", lambda m: m.source == frame, timeout=12.0)
+        observed = await w.client.wait("ANAFI_CAMERA_EXPOSURE", lambda m: m.source == frame, timeout=12.0)
         # The simulated camera's numbers: ms on the wire, rad on the wire.
-        assert 0.0 < told.exposure_time < 0.1
-        assert 25 <= told.iso <= 6400
-        assert 0.5 < told.awb_r_gain < 4.0
-        assert 0.5 < told.awb_b_gain < 4.0
-        assert told.hfov == pytest.approx({"4k": 69.0, "ai": 68.0}[model], abs=0.5)
-        assert 30.0 < told.vfov < told.hfov
+        assert 0.0 < observed.exposure_time < 0.1
+        assert 25 <= observed.iso <= 6400
+        assert 0.5 < observed.awb_r_gain < 4.0
+        assert 0.5 < observed.awb_b_gain < 4.0
+        assert observed.hfov == pytest.approx({"4k": 69.0, "ai": 68.0}[model], abs=0.5)
+        assert 30.0 < observed.vfov < observed.hfov
         lens = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_INTRINSICS)
         assert (lens.source, lens.camera) == (dialect.ANAFI_INTRINSICS_SOURCE_STREAM, 0)
         assert (lens.width, lens.cx) == {"4k": (1280, pytest.approx(642.81)), "ai": (1920, pytest.approx(997.28))}[
             model
         ]
-        assert 2 * math.degrees(math.atan(lens.width / 2 / lens.fx)) == pytest.approx(told.hfov, abs=0.1)
+        assert 2 * math.degrees(math.atan(lens.width / 2 / lens.fx)) == pytest.approx(observed.hfov, abs=0.1)
         if model == "4k":
             radio = await w.client.wait("ANAFI_LINK", lambda m: m.goodput != 0xFFFFFFFF)
             assert radio.goodput == video.state.frame.metadata.wifi.goodput * 1000
@@ -182,8 +196,8 @@ async def test_video_runs_while_a_stream_needs_its_metadata(model: str) -> None:
         assert (await w.client.command(stock.MAV_CMD_SET_MESSAGE_INTERVAL, exposure, -1)).result == ACCEPTED
         while video.state.playing:
             await w.client.wait("ANAFI_LINK")
-        told = await ask(w.client, exposure)
-        assert (told.source, math.isnan(told.awb_r_gain)) == (dialect.ANAFI_EXPOSURE_SOURCE_STEPS, True)
+        observed = await ask(w.client, exposure)
+        assert (observed.source, math.isnan(observed.awb_r_gain)) == (dialect.ANAFI_EXPOSURE_SOURCE_STEPS, True)
 
 
 async def test_no_skycontroller() -> None:
@@ -206,9 +220,9 @@ async def test_skycontroller() -> None:
         assert status.battery in (0, 1, 2)
         assert 0 < status.battery_remaining <= 100
         assert status.serial_number
-        told = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_INPUT)
-        assert told.grabbed_axes == 0
-        assert told.axes == [-128] * 6
+        observed = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_INPUT)
+        assert observed.grabbed_axes == 0
+        assert observed.axes == [-128] * 6
 
 
 @pytest.mark.parametrize(
@@ -230,14 +244,14 @@ async def test_where_the_skycontroller_points(angles: tuple[float, float, float]
 
 async def test_skycontroller_sticks_are_reported_while_a_program_flies() -> None:
     """Each is moved as little as a hand that rests on it does: the program goes on."""
-    told = {YAW: 4, THROTTLE: -7, ROLL: -5, PITCH: 10}
+    observed = {YAW: 4, THROTTLE: -7, ROLL: -5, PITCH: 10}
     places = {YAW: 0, THROTTLE: 1, ROLL: 2, PITCH: 3}  # ANAFI_AXIS, by its bits
     async with world(skycontroller=3, speed=1.0) as w:
         await w.take_off()
         await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CONTROLLER_INPUT, 0.05)
         async with streaming(w.client, attitude(pitch=-0.1)):
             await engage(w.client, "px4")
-            for axis, percent in told.items():
+            for axis, percent in observed.items():
                 at_hand(w).stick(axis, percent)
                 inputs = await w.client.wait(
                     "ANAFI_CONTROLLER_INPUT", lambda m, p=percent, a=axis: m.axes[places[a]] == p

@@ -1,4 +1,4 @@
-"""COMMAND_CANCEL: what is called off does not happen, and what happens is not said to be called off."""
+"""COMMAND_CANCEL: what is cancelled does not happen, and what happens is not said to be cancelled."""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ async def test_conf_086_photo_is_reported_with_file(flavour: str, model: str) ->
 
 
 @pytest.mark.parametrize("model", ["4k", "ai"])
-async def test_conf_086_refused_and_unannounced_photos_are_told_apart(model: str) -> None:
+async def test_conf_086_refused_and_unannounced_photos_are_distinguished(model: str) -> None:
     """The pilot's button is refused while a client's photo is taken; later one has no report but its media."""
     async with world(model=model, web=True) as w:
         await enter(w.client, PHOTO)

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import somebody_else, watched
+from support.fault_scenarios import another_controller, watched
 from support.flavours import both
 from support.mav import NAN, Client
 from support.plans import ACCEPTED as TAKEN
@@ -117,7 +117,7 @@ async def said(client: Client, words: str, *, since: int = 0, timeout: float = 5
 
 
 async def bits(client: Client, present: bool, enabled: bool, healthy: bool | None) -> None:
-    """SYS_STATUS tells of the fence; its health may be left open."""
+    """SYS_STATUS reports the fence; its health may be left open."""
     await client.wait(
         "SYS_STATUS",
         lambda m: (
@@ -285,7 +285,7 @@ async def test_conf_076_floor_counts_in_a_flight_that_began_without_a_link_once_
         w.drone.faults.mute = True
         await w.client.silence("HEARTBEAT", 2.0)
         for message, state in ((ardrone3.Landing(), "landed"), (ardrone3.TakeOff(), "hovering")):
-            somebody_else(w, message)
+            another_controller(w, message)
             await w.drone.wait_log(lambda e, to=state: e.name == "flying" and e.args["to"] == to, 40.0)
         mark = w.client.mark()
         w.drone.faults.mute = False
@@ -507,7 +507,7 @@ SWITCH = "ardrone3.PilotingSettings.NoFlyOverMaxDistance"
 
 
 def own_fence(w: World) -> tuple[float, int]:
-    """The radius of the drone's own geofence, and whether it is on: what it was told last."""
+    """The radius of the drone's own geofence, and whether it is on: what it was commanded last."""
     settings = w.drone.firmware.settings
     return settings.number("max_distance"), int(settings["geofence"])
 
@@ -769,7 +769,7 @@ async def test_conf_077_home_set_while_a_rally_point_counts_stays() -> None:
 
 
 async def test_conf_077_home_set_just_before_landing_stays() -> None:
-    """Nobody has looked at it before the drone stands."""
+    """No one has looked at it before the drone stands."""
     async with world() as w:
         await put(w, "RTL_TYPE", 1)
         assert (await upload(w.client, [rally(around(PLACE, (30.0, 0.0))[0], 20.0)], RALLY)).type == TAKEN

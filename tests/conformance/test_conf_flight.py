@@ -128,7 +128,7 @@ async def test_armed_state_without_takeoff_expires(flavour: str) -> None:
         # A heartbeat is due at once when the bit changes, and a second later in any case.
         assert AUTO_DISARM <= time.monotonic() - began < AUTO_DISARM + 1.2
         await w.client.wait("STATUSTEXT", lambda m: m.text == "Disarmed: no takeoff", since=mark)
-        # Nobody is armed any more: a take-off waits again instead of beginning.
+        # No one is armed any more: a take-off waits again instead of beginning.
         assert (await w.client.command(TAKE_OFF, -1, NAN, NAN, NAN)).result == ACCEPTED
         await w.client.wait("HEARTBEAT")
         assert w.commands("ardrone3.Piloting.TakeOff") == []

@@ -65,7 +65,7 @@ async def write(w: World, name: str, value: float, kind: int = 9) -> None:
 
 @both
 async def test_conf_107_a_target_leads(flavour: str) -> None:
-    """It walks to the north-east; the drone comes behind it, as high and as far as it is told, and looks at it."""
+    """It walks to the north-east; the drone comes behind it, as high and as far as commanded, and looks at it."""
     async with world(speed=1.0, flavour=flavour) as w:
         await w.take_off(8.0)
         allow_speed(w)

@@ -86,7 +86,7 @@ async def test_conf_111_timesync_and_ping(flavour: str) -> None:
             first.send(dialect.MAVLink_ping_message(123456 + number, number, 0, 0))
             pong = await first.wait("PING", lambda m, n=number: m.seq == n, since=mark)
             assert (pong.time_usec, pong.target_system, pong.target_component) == (123456 + number, 255, 190)
-        first.send(dialect.MAVLink_timesync_message(5, 600))  # somebody's answer
+        first.send(dialect.MAVLink_timesync_message(5, 600))  # another client's answer
         first.send(dialect.MAVLink_ping_message(1, 77, 1, 1))  # and another
         await first.heartbeat(lambda beat: True)
         assert not [m for _, m in first.since(mark, "PING") if m.seq == 77]
@@ -98,10 +98,10 @@ async def test_conf_111_timesync_and_ping(flavour: str) -> None:
 
 async def test_conf_111_system_time() -> None:
     async with world() as w:
-        told = await w.client.wait("SYSTEM_TIME")
-        assert told.time_unix_usec / 1e6 == pytest.approx(time.time(), abs=0.5)
+        observed = await w.client.wait("SYSTEM_TIME")
+        assert observed.time_unix_usec / 1e6 == pytest.approx(time.time(), abs=0.5)
         attitude = await w.client.wait("ATTITUDE")
-        assert 0 <= attitude.time_boot_ms - told.time_boot_ms < 1500
+        assert 0 <= attitude.time_boot_ms - observed.time_boot_ms < 1500
 
 
 @both

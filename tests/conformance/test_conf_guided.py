@@ -390,10 +390,10 @@ async def test_conf_083_set_home(flavour: str, frame: int | None) -> None:
         ack = await w.client.command(SET_HOME, 0, frame=frame, x=NORTH_60[0], y=NORTH_60[1], z=z)
         assert ack.result == ACCEPTED
         near = 40 if frame is None else 1  # 1e-7 deg; a COMMAND_LONG has single precision
-        told = await w.client.wait(
+        observed = await w.client.wait(
             "HOME_POSITION", lambda m: abs(m.latitude - round(NORTH_60[0] * 1e7)) <= near, since=mark, timeout=1.0
         )
-        assert abs(told.longitude - round(NORTH_60[1] * 1e7)) <= near
+        assert abs(observed.longitude - round(NORTH_60[1] * 1e7)) <= near
         (custom,) = sent(w, "rth.set_custom_location")
         assert custom["altitude"] == pytest.approx(3.0, abs=0.01)
 

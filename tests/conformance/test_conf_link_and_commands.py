@@ -88,7 +88,7 @@ async def test_conf_004_first_heartbeat_of_a_connection_is_the_autopilots() -> N
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 async def test_conf_009_camera_answers_for_itself(flavour: str) -> None:
-    """It refuses what it does not have; the autopilot answers for component 0, and nobody for one that is absent."""
+    """It refuses what it does not have; the autopilot answers for component 0, and no one for one that is absent."""
     async with world(flavour=flavour) as w:
         for command in (TAKE_OFF, SET_MODE, dialect.MAV_CMD_DO_WINCH):
             mark = w.client.mark()
@@ -164,7 +164,7 @@ async def test_conf_009_unsupported_at_once(flavour: str) -> None:
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 async def test_conf_009_other_components_are_not_ours(flavour: str) -> None:
-    """Nobody answers for components that do not exist: a second camera, a gimbal device."""
+    """No one answers for components that do not exist: a second camera, a gimbal device."""
     async with world(flavour=flavour) as w:
         mark = w.client.mark()
         for component in (101, 154, 190):
@@ -279,7 +279,7 @@ async def test_conf_016_version_number() -> None:
 @pytest.mark.parametrize("flavour", FLAVOURS)
 async def test_conf_017_arm(flavour: str) -> None:
     async with world(flavour=flavour) as w:
-        # The change is told at once; arming what is armed changes nothing, so its heartbeat is the next regular one.
+        # The change is sent at once; arming what is armed changes nothing, so its heartbeat is the next regular one.
         for limit in (1.0, 1.5):
             mark = w.client.mark()
             assert (await w.client.command(ARM, 1)).result == ACCEPTED

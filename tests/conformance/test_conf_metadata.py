@@ -260,7 +260,7 @@ async def test_conf_127_run_prearm_checks(flavour: str) -> None:
 
 
 async def test_a_write_does_not_make_the_metadata_stale() -> None:
-    """Ranges are told once for a connection: a client's cache stays good while values change."""
+    """Ranges are reported once for a connection: a client's cache stays good while values change."""
     async with world() as w:
         before = (await requested(w.client, 397, "COMPONENT_METADATA")).file_crc
         await write(w.client, "ANF_MAX_ALT", 60.0)

@@ -62,7 +62,7 @@ async def test_conf_049_073_mission_from_the_ground_is_flown_completely(flavour:
         assert reached(w) == [0, 1, 2, 3, 4]
         assert flown(w)[-3:] == ["waypoint", "condition_delay", "return_to_launch"]
         await mode(w, w.modes.returning, since=mark)
-        # It stays complete, and nothing of it is told again.
+        # It stays complete, and nothing of it is reported again.
         await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.idle, timeout=40.0)
         await state(w, COMPLETE)
         assert reached(w) == [0, 1, 2, 3, 4]
@@ -89,7 +89,7 @@ async def test_conf_073_other_ends(flavour: str, end: str) -> None:
 
 @both
 async def test_conf_027_059_mode_mission_by_every_way(flavour: str) -> None:
-    """It is offered when there is a mission; asked for again while it is flown it changes nothing, whoever asks."""
+    """It is offered when there is a mission; asked for again in flight, by any client, it changes nothing."""
     async with world(flavour=flavour, web=True) as w:
         other = await w.connect(254)
         number = MISSION_MODE[flavour]
@@ -392,7 +392,7 @@ async def test_conf_072_repeated_set_current_starts_the_file_once(flavour: str) 
 
 @both
 async def test_conf_072_a_reset_in_flight_keeps_the_item(flavour: str) -> None:
-    """param1 -1, param2 1: a mission without loops is flown on as it is, and begins anew only after its end."""
+    """param1 -1, param2 1: a mission without loops is flown on as it is, and begins again only after its end."""
     async with world(flavour=flavour, web=True) as w:
         await put(w, ROUND)
         await start(w)

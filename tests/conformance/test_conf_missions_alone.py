@@ -64,7 +64,7 @@ async def lost_and_back(w: World, *, noticed: bool = False) -> None:
 
 
 async def test_conf_122_the_drone_flies_on_while_the_link_is_lost() -> None:
-    """Afterwards it is the same system, home and mission, it is active, and nothing was told that was not flown."""
+    """Afterwards it is the same system, home and mission, it is active, and nothing was reported that was not flown."""
     async with world(web=True, speed=1.5) as w:
         await put(w, FAR)
         assert (await write(w.client, "ANF_MIS_RTH", 0, INT32)).param_id == "ANF_MIS_RTH"
@@ -87,7 +87,7 @@ async def test_conf_122_the_drone_flies_on_while_the_link_is_lost() -> None:
 
 
 async def test_conf_122_the_drone_returns_when_the_link_is_lost() -> None:
-    """The factory's setting: what it does is told at the start, and the mission is paused afterwards."""
+    """The factory's setting: what it does is reported at the start, and the mission is paused afterwards."""
     async with world(web=True, speed=1.5) as w:
         await put(w, FAR)
         await start(w)
@@ -125,7 +125,7 @@ def kept(folder: Path) -> list[Any]:
 
 
 async def written(folder: Path, item: int) -> None:
-    """Until it is on the disk that this item of the mission is flown. Nobody tells: it is another process's file."""
+    """Until it is on the disk that this item of the mission is flown. It is another process's file."""
     limit = time.monotonic() + 30.0
     while not any(record["origins"][record["line"] + 1] == item for record in kept(folder)):
         assert time.monotonic() < limit, f"item {item} is never written to {folder}"
@@ -170,7 +170,7 @@ async def test_conf_122_killed_gateway_recognises_the_drones_plan(tmp_path: Path
 @pytest.mark.parametrize("returns", [0, 1])
 @pytest.mark.parametrize("model", ["4k", "ai"])
 async def test_conf_122_gateway_shutdown_pauses_the_mission(model: str, returns: int) -> None:
-    """Also of a drone that would fly it on without a link: it is told to pause, hovers, and flies home as it does
+    """Also of a drone that would fly it on without a link: it is commanded to pause, hovers, and flies home as it does
     without anybody."""
     drone, address = loopback(), loopback()
     spec = DroneSpec(model=model, address=drone, home=HOME, http_port=WEB_PORT)
@@ -257,7 +257,7 @@ async def test_gateway_flies_items_between_two_files() -> None:
 
 @pytest.mark.parametrize("returns", [0, 1])
 async def test_items_of_the_gateway_are_not_flown_without_it(returns: int) -> None:
-    """The drone may fly its first file to the end while the link is lost; the turn behind it is nobody's then."""
+    """The drone may fly its first file to the end while the link is lost; the turn behind it is no one's then."""
     async with world(web=True, speed=1.5) as w:
         await put(w, [takeoff(6.0), way(40.0, 0.0, 6.0), TURN, way(40.0, 10.0, 6.0)])
         await write(w.client, "ANF_MIS_RTH", returns, INT32)

@@ -1,5 +1,5 @@
 """Conformance items 66 and 74: missions and what befalls them in the moments between: after a start is asked for
-and before the drone says that it flies, between two files, and when somebody else goes on with what was paused.
+and before the drone says that it flies, between two files, and when another client goes on with what was paused.
 
 What is flown is taken from the simulator's own log.
 """
@@ -13,7 +13,7 @@ import time
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import somebody_else
+from support.fault_scenarios import another_controller
 from support.flavours import both
 from support.missions import (
     ACTIVE,
@@ -59,7 +59,7 @@ async def asked_for(w: World, items: list[Item]) -> int:
     return mark
 
 
-def tells_of_its_plan(w: World) -> None:
+def reports_its_plan(w: World) -> None:
     w.drone.faults.untold = frozenset()
     w.drone.firmware.flight_plan.report_stopped()  # whatever it is
 
@@ -79,7 +79,7 @@ async def test_conf_011_049_slow_mission_start_sends_no_early_progress(flavour: 
         assert w.client.since(mark, "COMMAND_ACK") == []
         for _ in range(2):
             assert (await w.client.wait("COMMAND_ACK")).result == dialect.MAV_RESULT_IN_PROGRESS
-        tells_of_its_plan(w)
+        reports_its_plan(w)
         await w.client.wait("COMMAND_ACK", lambda ack: ack.result == dialect.MAV_RESULT_ACCEPTED, since=mark)
         at, results = zip(*[(at, ack.result) for at, ack in w.client.since(mark, "COMMAND_ACK")], strict=True)
         assert 2.4 < at[0] - began < 3.0
@@ -91,7 +91,7 @@ async def test_conf_011_049_slow_mission_start_sends_no_early_progress(flavour: 
 @both
 @pytest.mark.parametrize("how", ["another", "one item", "cleared"])
 async def test_conf_074_other_mission_uploaded_during_start_ends_the_start(flavour: str, how: str) -> None:
-    """The start is answered with a refusal, the drone is told to stop and hovers, and the mode is not Mission."""
+    """The start is answered with a refusal, the drone is commanded to stop and hovers, and the mode is not Mission."""
     async with world(flavour=flavour, web=True) as w:
         mark = await asked_for(w, CORNERS)
         w.drone.faults.untold = frozenset()
@@ -159,7 +159,7 @@ async def test_conf_074_same_mission_uploaded_during_start_changes_nothing(flavo
         mark = await asked_for(w, turned)
         await put(w, turned)
         await said(w, "continues at item 1", since=mark)
-        tells_of_its_plan(w)
+        reports_its_plan(w)
         ack = await w.client.wait(
             "COMMAND_ACK", lambda m: m.command == dialect.MAV_CMD_MISSION_START and m.result != 5, since=mark
         )
@@ -192,7 +192,7 @@ async def test_conf_074_same_mission_uploaded_during_a_failed_start_is_new(flavo
         await mode(w, w.modes.hold, since=mark)
 
 
-# Between two files, and by somebody else.
+# Between two files, and by another client.
 
 
 async def test_conf_074_mission_paused_before_a_file_resumes_after_flown_items() -> None:
@@ -224,7 +224,7 @@ async def test_conf_074_mission_paused_before_a_file_resumes_after_flown_items()
 
 
 def turned(w: World) -> int:
-    """How often the drone was told to turn where it is."""
+    """How often the drone was commanded to turn where it is."""
     moves = (e.args for e in w.drone.log if e.kind == "command" and e.name.rpartition(".")[2] == "moveBy")
     return sum(abs(args["dPsi"]) > 1.0 for args in moves)
 
@@ -232,7 +232,7 @@ def turned(w: World) -> int:
 @both
 @pytest.mark.parametrize("after", ["the same again", "another item"])
 async def test_conf_074_mission_resumed_by_another_controller_is_followed(flavour: str, after: str) -> None:
-    """Paused, and uploaded once more or begun elsewhere next: the drone flies our file, so that is what is told."""
+    """Paused, and uploaded once more or begun elsewhere next: the drone flies our file, so that is what is reported."""
     async with world(flavour=flavour, web=True) as w:
         await on_the_way(w, 2)
         assert (await w.client.command(mav_enums.MAV_CMD_DO_REPOSITION, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
@@ -245,7 +245,7 @@ async def test_conf_074_mission_resumed_by_another_controller_is_followed(flavou
             ack = await w.client.command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, 1 + first(w), 0)
             assert ack.result == dialect.MAV_RESULT_ACCEPTED
         (begun,) = w.commands("common.Mavlink.Start")
-        somebody_else(w, common.Start(begun.args["filepath"], common.MavlinkType.FLIGHT_PLAN))
+        another_controller(w, common.Start(begun.args["filepath"], common.MavlinkType.FLIGHT_PLAN))
         await said(w, "resumed by another controller", since=mark)
         await state(w, ACTIVE, seq=2, since=mark)
         await mode(w, MISSION_MODE[flavour], since=mark)
@@ -260,6 +260,6 @@ async def test_conf_074_plan_of_another_mission_is_reported() -> None:
         await put(w, [way(0.0, 9.0, 6.0)])
         mark = w.client.mark()
         await w.drone.wait_log(lambda e: e.name == "plan" and e.args["state"] == "paused", 10.0)
-        somebody_else(w, common.Start(begun.args["filepath"], common.MavlinkType.FLIGHT_PLAN))
+        another_controller(w, common.Start(begun.args["filepath"], common.MavlinkType.FLIGHT_PLAN))
         await said(w, "Drone flies a plan that is not", since=mark)
         await state(w, NOT_STARTED, since=w.client.mark())

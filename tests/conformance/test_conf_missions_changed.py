@@ -141,13 +141,13 @@ async def test_conf_074_the_same_mission_again_disturbs_nothing(flavour: str) ->
             assert (await upload(client, listed, MISSION)).type == ACCEPTED
             await said(w, "continues at item 3", since=mark)
         assert pauses(w) == before
-        told = await state(w, ACTIVE, seq=2, since=w.client.mark())
+        observed = await state(w, ACTIVE, seq=2, since=w.client.mark())
         await state(w, COMPLETE, since=mark)
         assert len(w.commands("common.Mavlink.Start")) == heard == 1
         assert pauses(w) == [*before, "stopped"]
         assert [e.args["index"] for e in w.drone.log if e.name == "item"] == [0, 1, 2, 3, 4]
         assert reached(w) == [0, 1, 2, 3]
-        assert whole(told).mission_id == whole(await state(w, COMPLETE)).mission_id != 0
+        assert whole(observed).mission_id == whole(await state(w, COMPLETE)).mission_id != 0
         await settled(w, (0.0, 14.0, 6.0))
 
 
@@ -176,7 +176,7 @@ async def test_conf_074_same_mission_uploaded_after_its_end_is_new(flavour: str)
 @both
 @pytest.mark.parametrize("how", ["another", "one item", "cleared"])
 async def test_conf_074_other_mission_uploaded_in_flight_stops_the_flown_one(flavour: str, how: str) -> None:
-    """The drone is paused, hovers where it is, and flies nothing of either until somebody says so."""
+    """The drone is paused, hovers where it is, and flies nothing of either until a person says so."""
     async with world(flavour=flavour, web=True) as w:
         await on_the_way(w, 2)
         mark = w.client.mark()
@@ -268,8 +268,8 @@ async def test_conf_074_item_selected_after_upload_belongs_to_new_mission(flavou
         await up_to_the_last_item(w, OTHER_WAY)
         chosen = first(w) + 3
         w.client.send(dialect.MAVLink_mission_set_current_message(1, 1, chosen))
-        told = await w.client.wait("MISSION_CURRENT", lambda m: m.seq == chosen, since=mark)
-        assert whole(told).total == len(OTHER_WAY)  # home is not one of them
+        observed = await w.client.wait("MISSION_CURRENT", lambda m: m.seq == chosen, since=mark)
+        assert whole(observed).total == len(OTHER_WAY)  # home is not one of them
 
 
 async def test_conf_074_mission_armed_during_its_upload_is_the_new_one() -> None:

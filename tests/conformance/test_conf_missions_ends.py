@@ -1,6 +1,6 @@
 """Conformance items 73 and 74: how plans end whose drone does not say that it has executed their last line.
 
-Parrot does not write down whether a plan that lands or returns tells its last line before it stops. The simulator does;
+Parrot does not write down whether a plan that lands or returns reports its last line before it. The simulator does;
 here it does not, and what is its own end and what is not has to be seen from what the drone does then.
 """
 
@@ -59,8 +59,8 @@ def waited(w: World) -> None:
     w.drone.faults.untold = frozenset({common.MissionItemExecuted.NAME})
 
 
-def told_after(w: World, entry: Any) -> list[str]:
-    """What the drone was told to do after that."""
+def observed_after(w: World, entry: Any) -> list[str]:
+    """What the drone was commanded to do after that."""
     return [e.name for e in w.drone.log if e.kind == "command" and e.t > entry.t]
 
 
@@ -90,7 +90,7 @@ async def test_conf_073_mission_completes_when_its_end_is_not_reported(flavour: 
         assert reached(w) == [0, 1, 2, 3]
         await mode(w, w.modes.land if last is LAND else w.modes.returning, since=mark)
         await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark, timeout=40.0)
-        assert told_after(w, entry) == (
+        assert observed_after(w, entry) == (
             [] if last is LAND else ["ardrone3.Piloting.Landing"]
         )  # above home: ANF_RTL_END
         lines = [e.args["idx"] for e in w.drone.log if e.name == common.MissionItemExecuted.NAME]
@@ -118,7 +118,7 @@ async def test_conf_073_last_line_reported_after_the_end_completes_the_mission()
 @both
 @pytest.mark.parametrize("last", [LAND, RTL], ids=["land", "return"])
 async def test_conf_074_plan_stopped_before_its_landing_is_paused(flavour: str, last: Item) -> None:
-    """Somebody else stops it there and the drone hovers: nothing has landed or returned, so nothing is complete."""
+    """Another client stops it there and the drone hovers: nothing has landed or returned, so nothing is complete."""
     async with world(flavour=flavour, web=True) as w:
         stop = w.drone.firmware.flight_plan.stop
         mark, entry = await to_the_last_line(w, last, lambda: stop(hover=True))
@@ -126,7 +126,7 @@ async def test_conf_074_plan_stopped_before_its_landing_is_paused(flavour: str, 
         await said(w, "Mission paused at item 4: stopped by the drone", since=mark)
         await mode(w, w.modes.idle, since=mark)
         assert reached(w) == [0, 1, 2]
-        assert told_after(w, entry) == []
+        assert observed_after(w, entry) == []
         assert w.drone.pose.up > 5.0
 
 
@@ -137,7 +137,7 @@ async def test_conf_074_battery_return_at_last_line_is_not_the_plans(flavour: st
         await state(w, PAUSED, seq=3, since=mark)
         await mode(w, w.modes.returning, since=mark)
         assert reached(w) == [0, 1, 2]
-        assert told_after(w, entry) == []
+        assert observed_after(w, entry) == []
 
 
 # A last line that is a way point or a wait (S8).

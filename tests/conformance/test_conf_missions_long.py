@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import somebody_else
+from support.fault_scenarios import another_controller
 from support.missions import (
     ACTIVE,
     COMPLETE,
@@ -63,13 +63,13 @@ def visits(w: World, *places: tuple[float, float]) -> str:
 
 
 def files(w: World) -> list[str]:
-    """The files that the drone was told to fly, in their order."""
+    """The files that the drone was commanded to fly, in their order."""
     starts = [*w.commands("common.Mavlink.Start"), *w.commands("flight_plan.start_at_v2")]
     return [e.args.get("filepath") or e.args["flightplan_id"] for e in sorted(starts, key=lambda e: e.t)]
 
 
 def rounds(items: Sequence[int]) -> None:
-    """What was told as reached is up, and then turn for turn."""
+    """What was reported as reached is up, and then turn for turn."""
     assert items[0] == 0
     for place, item in enumerate(items[1:]):
         assert item == TURN[place % len(TURN)], (place, items[max(place - 3, 0) : place + 5])
@@ -99,11 +99,11 @@ async def test_a_loop_without_end_is_flown_file_after_file(model: str, cuts: int
         mark = w.client.mark()
         await state(w, ACTIVE, seq=1, since=mark, timeout=60.0)
         assert files(w)[cuts + 1 :] == [files(w)[cuts]], "the same file goes on"
-        told = reached(w)
-        rounds(told)
+        observed = reached(w)
+        rounds(observed)
         await w.drone.wait_log(lambda e: e.kind == "pose", since=w.drone.log[-1].t)  # the log's last pose is older
-        assert told.count(JUMP) >= 4 * cuts
-        assert visits(w, A, B) == "AB" * told.count(2)
+        assert observed.count(JUMP) >= 4 * cuts
+        assert visits(w, A, B) == "AB" * observed.count(2)
         assert (
             await w.client.command(mav_enums.MAV_CMD_DO_SET_MISSION_CURRENT, LAST, 0)
         ).result == dialect.MAV_RESULT_ACCEPTED
@@ -126,7 +126,7 @@ async def test_long_loop_is_flown_the_requested_number_of_rounds() -> None:
         mark = w.client.mark()
         assert (await w.client.command(mav_enums.MAV_CMD_DO_REPOSITION, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, PAUSED, seq=2, since=mark)
-        somebody_else(w, common.Stop())
+        another_controller(w, common.Stop())
         await w.drone.wait_log(lambda e: e.name == "plan" and e.args["state"] == "stopped", since=paused(w))
         assert (await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, COMPLETE, since=mark, timeout=200.0)
@@ -136,12 +136,12 @@ async def test_long_loop_is_flown_the_requested_number_of_rounds() -> None:
 
 
 def paused(w: World) -> float:
-    """When the drone was told to pause last."""
+    """When the drone was commanded to pause last."""
     return float(w.commands("common.Mavlink.Pause")[-1].t)
 
 
 async def test_ai_resumes_inside_file_after_jumps_and_item_changes() -> None:
-    """Where what is left to fly is the end of the file that it has; the counts of a loop that is chosen begin anew."""
+    """Where what is left to fly is the end of the file that it has; the counts of a loop that is chosen begin again."""
     async with world(web=True, model="ai") as w:
         jump = Item(mav_enums.MAV_CMD_DO_JUMP, 0.0, 0.0, p1=1.0, p2=2.0, frame=2)
         await put(w, [takeoff(6.0), way(*A, 6.0), way(*B, 6.0), jump, way(*C, 6.0)])
@@ -175,8 +175,8 @@ async def test_ai_skips_an_unreachable_way_point() -> None:
         await put(w, [takeoff(6.0), way(8.0, 0.0, 6.0), way(60.0, 0.0, 6.0), way(*C, 6.0)])
         await start(w)
         await state(w, ACTIVE, seq=2, since=0)
-        somebody_else(w, ardrone3.MaxDistance(20.0))
-        somebody_else(w, ardrone3.NoFlyOverMaxDistance(1))
+        another_controller(w, ardrone3.MaxDistance(20.0))
+        another_controller(w, ardrone3.NoFlyOverMaxDistance(1))
         skipped = await w.drone.wait_log(lambda e: e.name == "flight_plan.waypoint_skipped", timeout=30.0)
         await said(w, "item 3 skipped: out of reach")
         await state(w, COMPLETE, since=0)

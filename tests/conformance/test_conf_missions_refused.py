@@ -87,11 +87,11 @@ REASONS: dict[Part, tuple[Callable[[World], None], str]] = {
 """What goes wrong in the drone, and what is said of it."""
 
 LOOKED_AT = (Part.MAVLINK_FILE, Part.WAYPOINTS_BEYOND_GEOFENCE)
-"""The drone says so only when it is told to start."""
+"""The drone says so only when it is commanded to start."""
 
 
-async def told(w: World, part: Part, ok: bool, since: float) -> None:
-    """Wait until the drone has told of a component."""
+async def observed(w: World, part: Part, ok: bool, since: float) -> None:
+    """Wait until the drone has reported a component."""
     await w.drone.wait_log(
         lambda e: e.name == COMPONENT and e.args == {"component": part, "State": int(ok)}, since=since
     )
@@ -110,7 +110,7 @@ async def test_conf_049_mission_refused_by_the_drone_names_its_reason(part: Part
         since = now()
         fail(w)
         if part not in LOOKED_AT:
-            await told(w, part, False, since)
+            await observed(w, part, False, since)
         number = MISSION_MODE[flavour]
         mode = (dialect.MAV_CMD_DO_SET_MODE, 1, *((number,) if flavour == "ardupilot" else (4, 4)))
         for asked, command in enumerate([(dialect.MAV_CMD_MISSION_START, 0, 0), mode], 1):
@@ -119,7 +119,7 @@ async def test_conf_049_mission_refused_by_the_drone_names_its_reason(part: Part
             assert ack.result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
             await said(w.client, reason, mark)
             assert f"Mission refused by drone: {reason}" in texts(w.client, mark)
-            await told(w, part, False, since)
+            await observed(w, part, False, since)
             refused = w.drone.log.find("event", common.StartingErrorEvent.NAME)
             assert len(refused) == asked, "the drone was asked, and has refused"
             await w.client.heartbeat(lambda beat: beat.custom_mode != number, since=w.client.mark())
@@ -129,7 +129,7 @@ async def test_conf_049_mission_refused_by_the_drone_names_its_reason(part: Part
         since = now()
         mend(w)
         if part not in LOOKED_AT:
-            await told(w, part, True, since)
+            await observed(w, part, True, since)
         assert (await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, ACTIVE, since=0)
 

@@ -98,9 +98,9 @@ async def test_conf_057_current_mode(flavour: str) -> None:
         mark = w.client.mark()
         parameters = (1, 3, 0) if flavour == "px4" else (1, hold)
         assert (await w.client.command(SET_MODE, *parameters)).result == ACCEPTED
-        told = await w.client.wait("CURRENT_MODE", lambda m: m.custom_mode == hold, since=mark, timeout=1.0)
-        assert told.standard_mode == dialect.MAV_STANDARD_MODE_POSITION_HOLD
-        assert told.intended_custom_mode == hold
+        observed = await w.client.wait("CURRENT_MODE", lambda m: m.custom_mode == hold, since=mark, timeout=1.0)
+        assert observed.standard_mode == dialect.MAV_STANDARD_MODE_POSITION_HOLD
+        assert observed.intended_custom_mode == hold
         beat = await w.client.heartbeat(lambda beat: True)
         assert beat.custom_mode == hold
         # It is announced once, and repeated rarely: stations that do not know it count each as lost.

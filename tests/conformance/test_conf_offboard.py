@@ -44,7 +44,7 @@ SET_MODE, GOTO = mav_enums.MAV_CMD_DO_SET_MODE, mav_enums.MAV_CMD_DO_REPOSITION
 NAN = math.nan
 
 HOVER_WITHIN = 0.5
-"""s after the last setpoint within which the drone has been told to hover (the issue)."""
+"""s after the last setpoint within which the drone has been commanded to hover (the issue)."""
 
 
 STEERS = local(VELOCITY_ONLY, v=(2.0, 0.0, 0.0))
@@ -722,7 +722,7 @@ async def test_setpoints_have_one_pilot(flavour: str) -> None:
             assert heard(w, "moveTo") == []
 
 
-# What is being flown is told back.
+# What is being flown is reported back.
 
 
 async def test_flown_setpoint_is_reported_as_position_target() -> None:
@@ -762,9 +762,9 @@ async def test_goto_is_reported_as_position_target() -> None:
         await w.take_off()
         place = geo.destination(*HOME[:2], 30.0, -10.0)
         assert (await w.client.command(GOTO, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=9.0)).result == 0
-        told = await w.client.wait("POSITION_TARGET_GLOBAL_INT")
-        assert (told.lat_int / 1e7, told.lon_int / 1e7) == pytest.approx(place, abs=1e-6)
-        assert told.alt == pytest.approx(9.0)
+        observed = await w.client.wait("POSITION_TARGET_GLOBAL_INT")
+        assert (observed.lat_int / 1e7, observed.lon_int / 1e7) == pytest.approx(place, abs=1e-6)
+        assert observed.alt == pytest.approx(9.0)
         near = await w.client.wait("POSITION_TARGET_LOCAL_NED")
         assert (near.x, near.y, near.z) == pytest.approx((30.0, -10.0, -9.0), abs=0.1)
 

@@ -90,9 +90,9 @@ async def test_conf_079_execution_status(flavour: str) -> None:
         ack = await w.client.command(ORBIT, -10.0, 2.0, 5, NAN, frame=GLOBAL, x=CENTRE[0], y=CENTRE[1], z=z)
         assert ack.result == ACCEPTED
         for _ in range(3):
-            told = await w.client.wait("ORBIT_EXECUTION_STATUS", timeout=1.0)
-        assert (told.radius, told.frame, told.z) == (-10.0, GLOBAL, pytest.approx(z, abs=0.1))
-        assert (told.x, told.y) == (round(CENTRE[0] * 1e7), round(CENTRE[1] * 1e7))
+            observed = await w.client.wait("ORBIT_EXECUTION_STATUS", timeout=1.0)
+        assert (observed.radius, observed.frame, observed.z) == (-10.0, GLOBAL, pytest.approx(z, abs=0.1))
+        assert (observed.x, observed.y) == (round(CENTRE[0] * 1e7), round(CENTRE[1] * 1e7))
         assert w.client.since(mark, "ORBIT_EXECUTION_STATUS")
         assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, w.modes.hold)).result == ACCEPTED
         mark = w.client.mark()

@@ -267,7 +267,7 @@ async def test_the_ai_avoids_obstacles_by_parameter() -> None:
 
 @pytest.mark.parametrize("model", ["4k", "thermal", "usa", "ai"])
 async def test_model_has_the_parameters_of_its_documentation(model: str) -> None:
-    """docs/parameters.md tells which models have a parameter; the drone's own events decide."""
+    """docs/parameters.md lists which models have a parameter; the drone's own events decide."""
     async with world(model=model) as w:
         names = {name for name in await fetch(w.client) if name.startswith("ANF_")}
     assert names == {one.name for one in NATIVE_NAMES if one.models == "all" or model in one.models.split(", ")}
@@ -285,7 +285,7 @@ async def test_two_flavours_see_one_value() -> None:
 
 
 async def test_value_changed_by_the_drone_is_pushed() -> None:
-    """Somebody else, say Parrot's app on the same Skycontroller, changes a setting: the drone's event is all we see."""
+    """Another client, as Parrot's app on the same Skycontroller, changes a setting: only the drone's event shows it."""
     async with world() as w:
         mark = w.client.mark()
         w.drone.firmware.receive(ardrone3.MaxTilt(18.0), asyncio.get_running_loop().time())
@@ -518,7 +518,7 @@ async def test_nav_dll_act_is_executed_at_link_loss(action: int, mode: int, comm
         await onlooker.wait("STATUSTEXT", lambda m: "No ground station for 2 s" in m.text, timeout=5.0)
         await onlooker.heartbeat(lambda beat: beat.custom_mode == mode, since=mark)
         await w.drone.wait_log(lambda entry: entry.kind == "command" and entry.name == command, 5.0)
-        # It is done once, and the ground station's return is told.
+        # It is done once, and the ground station's return is reported.
         w.client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
         await onlooker.wait("STATUSTEXT", lambda m: "is back" in m.text)
         assert len(w.commands(command)) == 1

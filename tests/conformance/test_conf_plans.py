@@ -65,7 +65,7 @@ PLACE = (HOME[0], HOME[1])
 
 
 def a_plan(kind: int, size: int = 10, shift: float = 0.0) -> list[Item]:
-    """Good items that can be told from those of another size or shift; far away, so that the drone may fly."""
+    """Good items that can be distinguished from those of another size or shift; far away, so that the drone may fly."""
     if kind == MISSION:
         return mission(HOME, size, shift)
     if kind == RALLY:
@@ -584,7 +584,7 @@ async def test_conf_122_plans_outlive_the_gateway(tmp_path: Path) -> None:
         (file,) = (tmp_path / "state" / "anafi-mav").glob("*.json")
         async with gateway(drone, str(tmp_path / "elsewhere")) as client:
             assert (await count(client, RALLY)).count == 0
-        # A file that somebody has spoiled: one line, and it is still there.
+        # A file that a person has spoiled: one line, and it is still there.
         file.write_bytes(b"{]")
         async with gateway(drone) as client:
             text = await client.wait("STATUSTEXT", lambda m: "put aside" in m.text or m.chunk_seq == 0, since=0)

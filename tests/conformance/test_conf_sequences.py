@@ -268,10 +268,10 @@ async def test_conf_120_mission_planner_writes_and_reads_a_mission() -> None:
         for seq, item in enumerate(items):
             mark = client.mark()
             client.send(dialect.MAVLink_mission_request_int_message(1, 1, seq, 0))
-            told = await to_us(client, ("MISSION_ITEM_INT",), mark, 2.5)
-            assert told.seq == seq
+            observed = await to_us(client, ("MISSION_ITEM_INT",), mark, 2.5)
+            assert observed.seq == seq
             if seq:  # home is the vehicle's own
-                assert content(told) == pytest.approx(item.content)
+                assert content(observed) == pytest.approx(item.content)
         client.send(dialect.MAVLink_mission_ack_message(1, 1, 0, 0))
         assert not [m for _, m in client.since(0, "STATUSTEXT") if m.severity <= dialect.MAV_SEVERITY_WARNING]
 
@@ -333,7 +333,7 @@ async def test_conf_156_the_standard_flavour() -> None:
 
 
 async def test_conf_121_two_vehicles_and_two_ground_stations() -> None:
-    """Each asks another vehicle the same things at the same time; nobody hears an answer that is not theirs."""
+    """Each asks another vehicle the same things at the same time; no one hears an answer that is not theirs."""
     address, places = loopback(), [loopback(), loopback()]
     config = Config(
         endpoints=(f"tcpin://{address}:5760", f"tcpin://{address}:5761?flavour=ardupilot"),

@@ -48,7 +48,7 @@ VIDEO = ["ANAFI_LINK", "ANAFI_CAMERA_EXPOSURE"]
 
 MOTION = ["ATTITUDE", "ATTITUDE_QUATERNION", "GLOBAL_POSITION_INT", "LOCAL_POSITION_NED", "ALTITUDE", "VFR_HUD"]
 MOTION += ["DISTANCE_SENSOR", "RANGEFINDER", "ODOMETRY"]
-"""The drone tells what they are made of five times a second."""
+"""The drone reports what they are made of five times a second."""
 
 SLOW = ["GPS_RAW_INT"]
 """And this once a second."""
@@ -71,11 +71,11 @@ async def rates(client: Client, names: list[str], seconds: float) -> dict[str, f
 
 
 async def interval(client: Client, name: str) -> float:
-    """s, as MESSAGE_INTERVAL tells it; 0 unsupported, -1e-6 off."""
+    """s, as MESSAGE_INTERVAL reports it; 0 unsupported, -1e-6 off."""
     mark = client.mark()
     assert (await client.command(GET, IDS[name])).result == ACCEPTED
-    told = await client.wait("MESSAGE_INTERVAL", lambda m: m.message_id == IDS[name], since=mark)
-    return float(told.interval_us) / 1e6
+    observed = await client.wait("MESSAGE_INTERVAL", lambda m: m.message_id == IDS[name], since=mark)
+    return float(observed.interval_us) / 1e6
 
 
 async def set_all(client: Client, names: list[str], microseconds: float) -> None:
@@ -109,7 +109,7 @@ async def test_conf_108_the_lower_of_request_and_source(flavour: str) -> None:
 
 
 async def test_conf_108_fast_source_is_thinned_out_to_the_newest_values() -> None:
-    """What leaves is the newest, with its own time; nothing is told twice."""
+    """What leaves is the newest, with its own time; nothing is reported twice."""
     async with world(speed=1.0, telemetry_rate=30.0) as w:
         names = ["ATTITUDE", "GLOBAL_POSITION_INT"]
         await set_all(w.client, names, 100_000)
@@ -160,8 +160,8 @@ async def test_message_of_a_new_row_leaves_at_default_interval(monkeypatch: pyte
         assert await rates(w.client, ["NAMED_VALUE_FLOAT"], 6.0) == {"NAMED_VALUE_FLOAT": pytest.approx(2.0, rel=0.2)}
         assert await interval(w.client, "NAMED_VALUE_FLOAT") == pytest.approx(0.5)
         await set_all(w.client, ["NAMED_VALUE_FLOAT"], 50_000)
-        told = await rates(w.client, ["NAMED_VALUE_FLOAT"], 4.0)
-        assert told == {"NAMED_VALUE_FLOAT": pytest.approx(5.0, rel=0.2)}  # each attitude, and no more than those
+        observed = await rates(w.client, ["NAMED_VALUE_FLOAT"], 4.0)
+        assert observed == {"NAMED_VALUE_FLOAT": pytest.approx(5.0, rel=0.2)}  # each attitude, and no more than those
         assert (await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, IDS["NAMED_VALUE_FLOAT"])).result == ACCEPTED
 
 
@@ -176,8 +176,8 @@ async def test_conf_109_message_interval(flavour: str) -> None:
             assert (await w.client.command(GET, impossible)).result == DENIED
         mark = w.client.mark()  # and by REQUEST_MESSAGE, as the message's own description has it
         assert (await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, 244, IDS["BATTERY_STATUS"])).result == ACCEPTED
-        told = await w.client.wait("MESSAGE_INTERVAL", since=mark)
-        assert (told.message_id, told.interval_us) == (IDS["BATTERY_STATUS"], 1_000_000)
+        observed = await w.client.wait("MESSAGE_INTERVAL", since=mark)
+        assert (observed.message_id, observed.interval_us) == (IDS["BATTERY_STATUS"], 1_000_000)
 
 
 def ask_streams(client: Client, group: int, rate: int, *, start: bool = True) -> None:

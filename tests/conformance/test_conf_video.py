@@ -112,14 +112,14 @@ async def test_conf_091_each_uri_opens_once_its_stream_is_shown(model: str) -> N
         client, other = w.clients
         streams = await informed(client)
         for stream in [*streams[1:], streams[0]]:
-            mark, told = client.mark(), other.mark()
+            mark, observed = client.mark(), other.mark()
             before = [one.uri for one in await informed(client) if one.flags & RUNNING]
             status, reason = await refusal(stream.uri)
             assert (status, "alpha shows its" in reason) == (503, True)
             # Neither that nor its refusal has changed what is shown.
             assert [one.uri for one in await informed(client) if one.flags & RUNNING] == before
             assert await show(client, stream.stream_id) == ACCEPTED
-            for station, since in ((client, mark), (other, told)):
+            for station, since in ((client, mark), (other, observed)):
                 await station.wait(
                     "VIDEO_STREAM_STATUS",
                     lambda m, id=stream.stream_id: m.stream_id == id and m.flags & RUNNING,
@@ -147,7 +147,7 @@ async def test_conf_137_thermal_stream_follows_the_thermal_camera() -> None:
             await w.client.wait(
                 "VIDEO_STREAM_STATUS", lambda m: m.stream_id == thermal.stream_id and m.flags & RUNNING, since=mark
             )
-            # Its viewers are told that nothing more comes.
+            # Its viewers are notified that nothing more comes.
             await eye.until(lambda: any(isinstance(one, Goodbye) for one in eye.reports))
             assert await viewing.reader.read() == b""
         assert (await refusal(visible.uri))[0] == 503

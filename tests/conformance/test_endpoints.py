@@ -72,7 +72,7 @@ async def land(client: Client) -> None:
 
 
 def has_flown(drone: SimulatedDrone, place: tuple[float, float], height: float) -> None:
-    """By the simulator's own log: these orders in this order, and it was there when it was told to land."""
+    """By the simulator's own log: these orders in this order, and it was there when it was commanded to land."""
     orders = [entry for entry in drone.log if entry.kind == "command" and entry.name.startswith("ardrone3.Piloting.")]
     names = [entry.name.removeprefix("ardrone3.Piloting.") for entry in orders]
     assert [name for name in names if name in ("TakeOff", "moveTo", "Landing")] == ["TakeOff", "moveTo", "Landing"]
@@ -116,7 +116,7 @@ async def test_a_flight_over_tcp_with_two_clients() -> None:
 
 
 async def test_a_flight_over_udp_both_ways_round() -> None:
-    """Orders over `udpin`; whoever listens where `udpout` sends sees them obeyed."""
+    """Orders over `udpin`; a client that listens where `udpout` sends sees them obeyed."""
     host = loopback()
     watcher = await UdpClient(254).open(host)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
@@ -177,7 +177,7 @@ def arsdk_garbage(seed: int) -> Iterator[bytes]:
 
 
 def open_ports() -> set[tuple[str, str, int]]:
-    """(protocol, address, port) of each IPv4 socket of this process that somebody else could send to."""
+    """(protocol, address, port) of each IPv4 socket of this process that another client could send to."""
     mine = set()
     for entry in Path("/proc/self/fd").iterdir():
         with suppress(FileNotFoundError):  # the one that reads this folder
@@ -350,7 +350,7 @@ async def test_garbage_on_every_mavlink_port() -> None:
         over_udp = await UdpClient(252).open(stranger, (host, port))
         await throw(over_udp.send_raw, mavlink_garbage(2))
         await watch.unchanged("garbage_bytes", "bad_checksums")
-        assert not over_udp.received  # whoever sends nothing true is no peer
+        assert not over_udp.received  # a sender of nothing true is no peer
 
         watch = Watch(g, drone, client)
         await throw(peer.send_raw, mavlink_garbage(3))

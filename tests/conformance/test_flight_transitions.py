@@ -18,9 +18,9 @@ from support.fault_scenarios import (
     FAILED,
     IN_PROGRESS,
     REJECTED,
+    another_controller,
     goto,
     results,
-    somebody_else,
     watched,
 )
 from support.mav import NAN
@@ -121,7 +121,7 @@ async def test_ground_session_does_not_fly_after_the_pilots_takeoff() -> None:
         async with streaming(w.client, NORTH):
             await engage(w.client, "px4")
             mark = w.client.mark()
-            somebody_else(w, ardrone3.TakeOff())
+            another_controller(w, ardrone3.TakeOff())
             await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 15.0)
             await said(w.client, "Offboard ended: takeoff by another controller", mark)
             await watched(1.5)
@@ -191,7 +191,7 @@ async def test_landing_at_home_ended_elsewhere_ends_in_the_heartbeat() -> None:
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landing", 40.0)
         await watched(6.0)
         mark = w.client.mark()
-        somebody_else(w, ardrone3.TakeOff())
+        another_controller(w, ardrone3.TakeOff())
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 5.0)
         await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, since=mark)
 
@@ -223,7 +223,7 @@ async def test_hold_during_a_fence_action_replaces_the_action(action: int) -> No
         await w.take_off(10.0)
         w.drone.faults.down = w.drone.faults.up = Impairment(delay=0.3)
         mark = w.client.mark()
-        somebody_else(w, ardrone3.MoveBy(24.0, 0.0, 0.0, 0.0))
+        another_controller(w, ardrone3.MoveBy(24.0, 0.0, 0.0, 0.0))
         await said(w.client, "too fast for", mark)
         assert (await w.client.command(SET_MODE, 1, 4, 3, timeout=8.0)).result == ACCEPTED
         w.drone.faults.down = w.drone.faults.up = Impairment()
@@ -336,7 +336,7 @@ async def begin_mission(w: World) -> None:
 
 
 async def begin_move_of_other_controller(w: World) -> None:
-    somebody_else(w, ardrone3.MoveTo(*geo.destination(*HOME[:2], 200.0, 0.0), 10.0, 0, 0.0))
+    another_controller(w, ardrone3.MoveTo(*geo.destination(*HOME[:2], 200.0, 0.0), 10.0, 0, 0.0))
 
 
 @pytest.mark.parametrize("begin", [begin_goto, begin_mission, begin_move_of_other_controller])

@@ -73,7 +73,7 @@ MOTION = {
 
 
 def motions(w: World, since: float) -> list[str]:
-    """What the drone was told to do after a moment of the log."""
+    """What the drone was commanded to do after a moment of the log."""
     return [
         entry.name
         for entry in w.drone.log
@@ -150,7 +150,7 @@ def message_id(frame: bytes) -> int | None:
 
 
 class Mistakes(logging.Handler):
-    """Errors that somebody logged: an exception that was caught is one all the same."""
+    """Errors in the log: an exception that was caught is one all the same."""
 
     def __init__(self) -> None:
         super().__init__(logging.ERROR)
@@ -263,7 +263,7 @@ MAY_FLY: dict[str, dict[int, str]] = {
 (ArduPilot copter-commands-in-guided-mode.rst)."""
 
 STIRRED = 0.5
-"""m that nobody notices in the air."""
+"""m that no one notices in the air."""
 
 
 @pytest.mark.parametrize("times", TIMES)
@@ -372,7 +372,7 @@ async def test_mission_commands_with_invalid_numbers_are_answered(flavour: str, 
         await put(w, ROUND)
         began = w.drone.log[-1].t
         for id in (dialect.MAV_CMD_MISSION_START, dialect.MAV_CMD_DO_SET_MISSION_CURRENT):
-            await each(w, id, began, lambda p: False)  # nobody arms
+            await each(w, id, began, lambda p: False)  # no one arms
         assert w.drone.flying_state.name == "LANDED"
         assert mistakes == []
 

@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import ACCEPTED, GOTO, IN_PROGRESS, REJECTED, goto, heard, somebody_else, until
+from support.fault_scenarios import ACCEPTED, GOTO, IN_PROGRESS, REJECTED, another_controller, goto, heard, until
 from support.mav import NAN
 from support.setpoints import POSITION_ONLY, earth, engage, said, streaming, texts
 from support.world import HOME, World, world
@@ -47,7 +47,7 @@ async def test_goto_after_one_that_has_failed_is_flown_once_and_answered_when_se
     async with world(speed=1.0) as w:
         await on_its_way(w)
         mark = w.client.mark()
-        somebody_else(w, ardrone3.CancelMoveTo())
+        another_controller(w, ardrone3.CancelMoveTo())
         await said(w.client, "Goto ended: ", mark)
         for _ in range(2):
             assert await goto(w, 100.0, 10.0) == ACCEPTED
@@ -61,7 +61,7 @@ async def test_height_command_after_a_goto_that_was_cancelled_elsewhere_keeps_th
         await on_its_way(w)
         mark = w.client.mark()
         await w.client.wait("GLOBAL_POSITION_INT", since=mark)
-        somebody_else(w, ardrone3.CancelMoveTo())
+        another_controller(w, ardrone3.CancelMoveTo())
         await said(w.client, "Goto ended: ", mark)
         ack = await w.client.command(dialect.MAV_CMD_DO_CHANGE_ALTITUDE, 20.0, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT)
         assert ack.result == ACCEPTED

@@ -14,10 +14,10 @@ from support.fault_scenarios import (
     PX4_HOLD,
     REJECTED,
     RTL,
+    another_controller,
     goto,
     heard,
     now_mute,
-    somebody_else,
     until,
 )
 from support.mav import NAN
@@ -82,7 +82,7 @@ async def test_a_pause_is_not_continued_after_something_else(since: str) -> None
             if since == "landing":
                 assert (await other.command(LAND_CMD)).result == ACCEPTED
             else:
-                somebody_else(w, ardrone3.Landing())
+                another_controller(w, ardrone3.Landing())
             await lands(w)
             await w.take_off()
         before = len(moves(w))

@@ -85,7 +85,7 @@ async def silent_after(client: Client, lost: float) -> None:
 
 
 async def back_within(client: Client, seconds: float, landed: Callable[[int], bool]) -> None:
-    """The system is there again: same id, in Hold, its state read anew."""
+    """The system is there again: same id, in Hold, its state read again."""
     mark = client.mark()
     beat = await client.heartbeat(lambda beat: True, timeout=seconds)
     assert (beat.get_srcSystem(), beat.custom_mode) == (7, HOLD)
@@ -112,7 +112,7 @@ async def test_killed(tmp_path: Path) -> None:
 
 
 async def test_stopped(tmp_path: Path) -> None:
-    """SIGSTOP: the sockets stay, nobody answers. It goes on where it was, and hears no old order."""
+    """SIGSTOP: the sockets stay, no one answers. It goes on where it was, and hears no old order."""
     drone, address = loopback(), loopback()
     async with gateway(drone, address), simulator_process(drone, tmp_path / "sim.jsonl", "--speed", "2") as sim:
         client = await Client().connect(5760, address)
@@ -161,7 +161,7 @@ async def test_all_datagrams_lost(engaged: bool) -> None:
 
 
 async def test_the_ground_station_falls_silent_during_the_loss() -> None:
-    """What ANF_GCS_LOSS promises is kept, counted from when the drone is back: nobody was heard before."""
+    """What ANF_GCS_LOSS promises is kept, counted from when the drone is back: no one was heard before."""
     async with world(speed=1.0) as w:
         client, after = w.client, 4.0
         await write(client, "ANF_GCS_LOSS", 2, dialect.MAV_PARAM_TYPE_INT32)

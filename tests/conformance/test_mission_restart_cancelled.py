@@ -6,7 +6,7 @@ import asyncio
 import math
 
 import pytest
-from support.fault_scenarios import home_being_undone, somebody_else, until
+from support.fault_scenarios import another_controller, home_being_undone, until
 from support.flavours import both
 from support.missions import ACTIVE, MISSION_MODE, PAUSED, first, on_the_way, put, state, takeoff, way, whole
 from support.world import World, world
@@ -249,7 +249,7 @@ async def test_paused_mission_that_another_controller_stops_in_the_wait_is_not_b
         mark, starts = w.client.mark(), len(commanded(w, "Mavlink.Start"))
         w.client.send_command(mav_enums.MAV_CMD_MISSION_START)
         await asyncio.sleep(0.5)
-        somebody_else(w, common.Stop())
+        another_controller(w, common.Stop())
         assert (mav_enums.MAV_CMD_MISSION_START, mav_enums.MAV_RESULT_TEMPORARILY_REJECTED) in await until(
             w.client, mark, 2
         )

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import deaf, return_by_itself, somebody_else
+from support.fault_scenarios import another_controller, deaf, return_by_itself
 from support.flavours import both
 from support.mav import NAN, Client
 from support.missions import RTL as RTL_ITEM
@@ -240,7 +240,7 @@ async def test_return_to_a_first_fix_hovers() -> None:
 async def test_return_to_the_pilot_hovers() -> None:
     async with world(speed=FAST) as w:
         await write(w.client, "ANF_HOME_TYPE", 4, INT32)
-        somebody_else(w, ardrone3.SendControllerGPS(*geo.destination(*HOME[:2], 5.0, 0.0), 35.0, 2.0, 3.0))
+        another_controller(w, ardrone3.SendControllerGPS(*geo.destination(*HOME[:2], 5.0, 0.0), 35.0, 2.0, 3.0))
         await away(w)
         mark = await go_home(w)
         await hovers(w, ": home is the pilot", mark)

@@ -26,6 +26,7 @@ from support.fault_scenarios import (
     RTL,
     SET_MODE,
     TAKEOFF_CMD,
+    another_controller,
     being_tried,
     deaf,
     goto,
@@ -33,7 +34,6 @@ from support.fault_scenarios import (
     now_mute,
     on_command,
     return_by_itself,
-    somebody_else,
     until,
     watched,
 )
@@ -299,15 +299,15 @@ async def test_repeated_land_and_return_are_executed_each_time() -> None:
     async with world(speed=1.0) as w:
         await w.take_off(8.0)
         assert (await w.client.command(LAND_CMD)).result == ACCEPTED
-        somebody_else(w, ardrone3.PCMD(1, 0, 0, 0, 50, 0))  # a pilot pulls up
+        another_controller(w, ardrone3.PCMD(1, 0, 0, 0, 50, 0))  # a pilot pulls up
         await w.client.heartbeat(lambda beat: beat.custom_mode != LAND)
         assert (await w.client.command(LAND_CMD)).result == ACCEPTED
         await w.client.heartbeat(lambda beat: beat.custom_mode == LAND)
-        somebody_else(w, ardrone3.PCMD(1, 0, 0, 0, 50, 0))
+        another_controller(w, ardrone3.PCMD(1, 0, 0, 0, 50, 0))
         await w.client.heartbeat(lambda beat: beat.custom_mode != LAND)
         assert (await w.client.command(RTL)).result == ACCEPTED
         await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
-        somebody_else(w, rth.Abort())
+        another_controller(w, rth.Abort())
         await w.client.heartbeat(lambda beat: beat.custom_mode != RETURN)
         assert (await w.client.command(RTL)).result == ACCEPTED
         await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
@@ -374,7 +374,7 @@ async def test_setpoints_end_at_a_return_by_another_controller() -> None:
         await w.take_off()
         async with streaming(w.client, pitch=FORWARD):
             await engage(w.client)
-            somebody_else(w, rth.ReturnToHome())
+            another_controller(w, rth.ReturnToHome())
             await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
             flown = len(pitches(w))
             await watched(0.5)  # the program goes on, to no effect
@@ -487,9 +487,9 @@ async def test_climb_ends_with_its_own_takeoff() -> None:
     async with world() as w:
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
         assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=20.0)).result == ACCEPTED
-        somebody_else(w, ardrone3.Landing())
+        another_controller(w, ardrone3.Landing())
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
-        somebody_else(w, ardrone3.TakeOff())
+        another_controller(w, ardrone3.TakeOff())
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 20.0)
         await watched(1.0)
         assert heard(w, "moveBy") == []
@@ -500,7 +500,7 @@ async def test_hold_ends_a_move_of_another_client() -> None:
     async with world(speed=1.0) as w:
         await w.take_off()
         place = geo.destination(*HOME[:2], 80.0, 0.0)
-        somebody_else(w, ardrone3.MoveTo(*place, 10.0, ardrone3.OrientationMode.NONE, 0.0))
+        another_controller(w, ardrone3.MoveTo(*place, 10.0, ardrone3.OrientationMode.NONE, 0.0))
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 3.0, 15.0)
         assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
         assert heard(w, "CancelMoveTo") == ["CancelMoveTo"]
@@ -575,7 +575,7 @@ async def test_end_of_the_gateway_lands_a_takeoff_that_the_drone_has_not_receive
         assert w.drone.flying_state.name == "LANDED"
 
 
-# Values that nobody foresaw.
+# Values that no one foresaw.
 
 
 async def test_an_impossible_value_of_the_drone_silences_nothing() -> None:

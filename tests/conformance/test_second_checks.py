@@ -21,10 +21,10 @@ from support.fault_scenarios import (
     RTL,
     SET_MODE,
     TAKEOFF_CMD,
+    another_controller,
     goto,
     home_being_undone,
     return_by_itself,
-    somebody_else,
     until,
     watched,
 )
@@ -132,7 +132,7 @@ async def test_return_that_begins_while_the_switch_ends_a_goto_goes_on() -> None
         began = now()
         send_set(w.client, "ANF_SC_OFFBOARD", 0, dialect.MAV_PARAM_TYPE_INT32)
         await watched(0.2)
-        somebody_else(w, rth.ReturnToHome())
+        another_controller(w, rth.ReturnToHome())
         await watched(3.0)
         assert heard(w, "abort", since=began) == []
         assert w.drone.firmware.homing.active
@@ -257,14 +257,14 @@ TASKS = {"goto": far, "turn": turn, "offboard": offboard, "follow": follow, "orb
 
 MEANWHILE: dict[str, tuple[Callable[[World], Any], str, str]] = {
     "landing": (
-        lambda w: somebody_else(w, ardrone3.Landing()),
+        lambda w: another_controller(w, ardrone3.Landing()),
         "drone is landing",
         "goto turn offboard follow orbit mission",
     ),
     "own return": (return_by_itself, " refused: drone is returning", "goto turn offboard follow orbit mission"),
     "lost fix": (lambda w: setattr(w.drone.faults, "gps", False), " refused: no GPS fix", "follow orbit"),
     "camera sticks": (
-        lambda w: somebody_else(w, piloting_style.SetStyle(CAMERA)),
+        lambda w: another_controller(w, piloting_style.SetStyle(CAMERA)),
         " refused: sticks relative to camera",
         "offboard follow",
     ),
@@ -333,7 +333,7 @@ async def test_offboard_chosen_on_the_ground_is_refused_when_the_drone_rises_in_
             mark, began = w.client.mark(), now()
             await offboard(w)
             await watched(4.2)
-            somebody_else(w, ardrone3.TakeOff())
+            another_controller(w, ardrone3.TakeOff())
             assert (SET_MODE, REJECTED) in await until(w.client, mark, 2)
             assert w.drone.flying_state.name in ("MOTOR_RAMPING", "TAKINGOFF")
             await watched(4.0)
@@ -358,7 +358,7 @@ async def test_offboard_while_a_mission_is_about_to_take_off_is_refused_and_the_
 
 async def test_offboard_during_a_takeoff_is_refused_while_sticks_follow_the_camera() -> None:
     async with world(speed=1.0) as w:
-        somebody_else(w, piloting_style.SetStyle(CAMERA))
+        another_controller(w, piloting_style.SetStyle(CAMERA))
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
         assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=UP)).result == ACCEPTED
         async with streaming(w.client, local(VELOCITY_ONLY, v=(0.0, 2.0, 0.0))):

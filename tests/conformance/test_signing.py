@@ -158,7 +158,7 @@ async def test_signed_endpoint_survives_hostile_frames_and_a_restart() -> None:
                 await hostile(gateway, attacker)
                 assert gateway.counters()["refused_replay"] == 20 * len(recorded)
                 assert gateway.lines()[1].endswith(f"0 peers, signed with key {name}")
-                # One heartbeat in a tenth of a second tells a station which key it needs: fewer bytes than it sent.
+                # One heartbeat in a tenth of a second shows a station which key it needs: fewer bytes than it sent.
                 kinds = {message.get_type() for _, message in attacker.received}
                 assert kinds <= {"HEARTBEAT"}
                 assert len(attacker.received) < 20

@@ -19,10 +19,10 @@ from support.fault_scenarios import (
     RTL,
     SET_MODE,
     TAKEOFF_CMD,
+    another_controller,
     goto,
     heard,
     home_being_undone,
-    somebody_else,
     watched,
 )
 from support.mav import NAN, Client
@@ -276,7 +276,7 @@ async def test_joystick_override_ends_a_clients_landing() -> None:
         await w.client.heartbeat(lambda beat: beat.custom_mode == POSITION)
     async with world(speed=1.0) as w:
         await w.take_off(8.0)
-        somebody_else(w, ardrone3.Landing())
+        another_controller(w, ardrone3.Landing())
         await w.client.heartbeat(lambda beat: beat.custom_mode == LAND)
         vehicle = system_of(w).vehicle
         with pytest.raises(AnafiMavError, match="drone is landing"):
@@ -300,7 +300,7 @@ RACE = [-0.3, -0.15, 0.0, 0.15, 0.3]
 @pytest.mark.parametrize("offset", RACE)
 @pytest.mark.parametrize("stop", ["Hold", "Takeoff"])
 async def test_abort_raced_with_touchdown(stop: str, offset: float) -> None:
-    """200 ms each way, a quarter lost: whoever wins, the acknowledgement says what the drone does."""
+    """200 ms each way, a quarter lost: no matter which one wins, the acknowledgement says what the drone does."""
     await _race(stop, offset, frozenset())
 
 

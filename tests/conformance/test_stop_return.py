@@ -1,4 +1,4 @@
-"""A person can end a return, whoever began it; a program that repeats its Hold ends none of the drone's own."""
+"""A person can end a return, no matter who began it; a program that repeats its Hold ends none of the drone's own."""
 
 from __future__ import annotations
 

@@ -160,7 +160,7 @@ async def silent(w: World) -> None:
 
 
 async def test_failed_single_position_is_not_repeated() -> None:
-    """Its sender was told that it is not flown, and is silent since."""
+    """Its sender was notified that it is not flown, and is silent since."""
     async with world(speed=1.0, flavour="ardupilot") as w:
         await w.take_off(8.0)
         w.drone.faults.magneto_required = True

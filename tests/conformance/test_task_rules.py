@@ -23,10 +23,10 @@ from support.fault_scenarios import (
     RTL,
     SET_MODE,
     TAKEOFF_CMD,
+    another_controller,
     goto,
     home_being_undone,
     return_by_itself,
-    somebody_else,
     until,
     watched,
 )
@@ -111,7 +111,7 @@ async def test_landing_is_ended_by_the_tasks_that_may_end_it(name: str, by: str)
         if by == "client":
             assert (await w.client.command(LAND_CMD)).result == ACCEPTED
         else:
-            somebody_else(w, ardrone3.Landing())
+            another_controller(w, ardrone3.Landing())
         await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.land)
         ack = await send(w, w.client)
         ends = by in ended_by.split()
@@ -161,7 +161,7 @@ async def test_landing_that_begins_during_a_stop_is_not_ended_without_the_right(
             w.drone.faults.up = w.drone.faults.down = Impairment(delay=0.3)
         w.client.send_command(SET_MODE, *MODES["ardupilot"]["guided"])
         await watched(0.2)
-        somebody_else(w, ardrone3.Landing())
+        another_controller(w, ardrone3.Landing())
         assert await until(w.client, mark, 1) == [(SET_MODE, REJECTED)]
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 30.0)
         assert [e for e in heard(w, "PCMD", since=began) if e.args["gaz"] > 0] == []
@@ -175,7 +175,7 @@ async def test_return_does_not_end_a_landing_that_begins_before_it_is_flown() ->
         mark, began = w.client.mark(), now()
         w.client.send_command(RTL)
         await watched(0.2)
-        somebody_else(w, ardrone3.Landing())
+        another_controller(w, ardrone3.Landing())
         assert (RTL, REJECTED) in await until(w.client, mark, 2)
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 30.0)
         assert [e for e in heard(w, "PCMD", since=began) if e.args["gaz"] > 0] == []

@@ -21,7 +21,7 @@ from olympe.features.media import media as media_feature  # noqa: E402
 from olympe.messages.ardrone3 import PilotingState  # noqa: E402
 
 LIMIT = 60.0
-"""s for anything: a machine may be slow. What takes its time on an aircraft is told apart by the simulator's log."""
+"""s for anything: a machine may be slow. What takes its time on an aircraft is distinguished by the simulator's log."""
 
 # Olympe tries once to open the websocket of the media, for half a second, and knows nothing of them if that fails.
 media_feature.HTTP_CONNECTION_TIMEOUT = LIMIT
@@ -53,7 +53,7 @@ class Visit:
         self.model = model
         self.direct = kind == "Drone"
         self.drone = getattr(olympe, kind)(address, http_port=self.http_port)
-        # Olympe finds the way to the video through a Skycontroller by itself, and will not be told a port then.
+        # Olympe finds the way to the video through a Skycontroller by itself, and accepts no port then.
         self.video = {"address": address, "port": int(rtsp_port)} if self.direct else {}
         self.report: dict[str, dict[str, Any]] = {}
         self.settles = False
@@ -88,7 +88,7 @@ class Visit:
         return ok
 
     def hold(self, roll: int, pitch: int, yaw: int, gaz: int) -> bool:
-        """Hold the sticks until the drone flies, and tells its attitude some more; it hovers soon after."""
+        """Hold the sticks until the drone flies, and reports its attitude some more; it hovers soon after."""
         flying = PilotingState.FlyingStateChanged(state="flying", _policy="wait", _timeout=LIMIT)
         flew = self.drone(flying)
         self.drone.piloting(roll, pitch, yaw, gaz, LIMIT)
@@ -166,7 +166,7 @@ class Visit:
 
 
 def quiet() -> None:
-    """Olympe tells warnings and worse."""
+    """Olympe logs warnings and worse."""
     olympe.log.update_config({"loggers": {name: {"level": "WARNING"} for name in ("olympe", "ulog", "urllib3")}})
 
 

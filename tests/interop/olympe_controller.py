@@ -42,8 +42,8 @@ class Controller(Visit):
         network, devices = controllerNetwork, devicemanager
         self.expect("links", network.Command.GetState(_timeout=LIMIT) >> network.Event.State(_policy="check"))
         self.expect("devices", devices.Command.GetState(_timeout=LIMIT) >> devices.Event.State(_policy="check"))
-        told = json.dumps(self.drone.get_state(devices.Event.State), default=str)
-        self.result["known"]["devices"] = json.loads(told)
+        observed = json.dumps(self.drone.get_state(devices.Event.State), default=str)
+        self.result["known"]["devices"] = json.loads(observed)
 
     def look_at_the_web(self) -> None:
         """The drone's web server, by whatever way Olympe has to it."""

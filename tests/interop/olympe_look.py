@@ -77,7 +77,7 @@ class Watch:
                 if not self._more.wait_for(lambda before=before: len(self.said) > before, seconds):  # type: ignore[misc]
                     return
 
-    def told(self) -> dict[str, object]:
+    def observed(self) -> dict[str, object]:
         return {
             "said": self.said,
             "kinds": sorted(self.kinds),
@@ -106,11 +106,11 @@ class Look(Visit):
 
     def stop(self, name: str, watch: Watch) -> None:
         for stream in self.drone.streaming.multistreams:
-            told = stream.session_metadata
-            watch.session = {key: plain(told[key]) for key in SESSION if key in told}
+            observed = stream.session_metadata
+            watch.session = {key: plain(observed[key]) for key in SESSION if key in observed}
         with self.step(f"stop {name}") as entry:
             entry["ok"] = bool(self.drone.streaming.stop())
-        self.result.setdefault("streams", {})[name] = watch.told()
+        self.result.setdefault("streams", {})[name] = watch.observed()
 
     def watch_live(self) -> None:
         """Some pictures of the drone's first camera."""

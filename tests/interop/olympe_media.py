@@ -1,7 +1,7 @@
 """Olympe's own media examples, as they are installed: ``olympe_media.py ADDRESS PORT drone|skycontroller FOLDER``.
 
 Knows nothing of this project. Each example takes a burst, downloads every file of it while it is being taken, compares
-them with the MD5 that the drone tells, counts them and deletes them. Prints one JSON object: the assertion that failed,
+them with the drone's MD5, counts them and deletes them. Prints one JSON object: the assertion that failed,
 if one did. Olympe's log goes to stderr.
 """
 
@@ -49,13 +49,13 @@ def main() -> None:
     media_feature.HTTP_CONNECTION_TIMEOUT = 60.0
     # The example knows the address alone, and its web server to be on port 80.
     olympe.SkyController4 = functools.partial(olympe.SkyController4, http_port=int(PORT))
-    # This example's own listener downloads the whole media again for each file of it that it is told of, and then finds
+    # This example's own listener downloads the whole media again for each file that is reported, and then finds
     # that it has more files than the drone. The other example's downloads once.
     media_ai.MediaEventListener = skyctrl_media.MediaEventListener
     count_each_file_once(skyctrl_media.MediaEventListener)
     # It also says everything to the older camera feature first, which an Ai does not speak, and waits ten seconds.
     media_ai.configure_photo_burst_mode = skyctrl_media.setup_photo_burst_mode
-    # Its other half, with a Media of one's own, cannot succeed: it asks the drone for what only that Media is told.
+    # Its other half, with a Media of one's own, cannot succeed: it asks the drone for what only that Media receives.
     example = media_ai.test_media_ai_internal_media if VIA == "drone" else skyctrl_media.test_media
     try:
         example()

@@ -75,13 +75,13 @@ class Payload(Visit):
 
     def photo(self, name: str) -> None:
         """From the button to the file, on the drone's link and on its websocket."""
-        told = self.drone.media(media_created(_timeout=LIMIT))
-        # The first shot's file comes with its media; only those after it are told of by themselves.
-        files = self.drone.media(resource_created(_timeout=LIMIT)) if "burst" in name else told
+        observed = self.drone.media(media_created(_timeout=LIMIT))
+        # The first shot's file comes with its media; only those after it are reported by themselves.
+        files = self.drone.media(resource_created(_timeout=LIMIT)) if "burst" in name else observed
         saved = self.drone(camera.photo_progress(result="photo_saved", _policy="wait", _timeout=LIMIT))
         idle = camera.photo_state(cam_id=0, state="inactive", _policy="wait", _timeout=LIMIT)
         self.expect(name, camera.take_photo(0) >> idle)
-        ok = all(self.heard(one) for one in (saved, told, files))
+        ok = all(self.heard(one) for one in (saved, observed, files))
         self.say(f"{name}, told", ok)
         self.result[name] = saved.received_events().last().args["media_id"] if ok else None
 
@@ -104,9 +104,9 @@ class Payload(Visit):
         configure("photo mode", camera_mode="photo", photo_mode="single", photo_file_format="jpeg")
         configure("settings", ev_compensation="1_00", white_balance_mode="sunny", image_style="plog")
         done = event.Photo(type="stop", stop_reason="capture_done", _policy="wait", _timeout=LIMIT)
-        told = self.drone.media(media_created(_timeout=LIMIT))
+        observed = self.drone.media(media_created(_timeout=LIMIT))
         self.expect("photo", command.StartPhoto(camera_id=0) & done)
-        self.say("photo, told", self.heard(told))
+        self.say("photo, told", self.heard(observed))
         configure("burst", photo_mode="burst", photo_burst_value="14_over_1s")
         done = event.Photo(type="stop", stop_reason="capture_done", _policy="wait", _timeout=LIMIT)
         self.expect("photos of a burst", command.StartPhoto(camera_id=0) & done)
@@ -154,7 +154,7 @@ class Payload(Visit):
         self.result["axes"] = str(self.drone.get_state(gimbal.gimbal_capabilities)[0]["axes"])
 
     def calibrate_compass(self) -> None:
-        """As somebody turns the drone about each axis, in Olympe's words; all is asked for beforehand."""
+        """As a person turns the drone about each axis, in Olympe's words; all is asked for beforehand."""
         wait = {"_policy": "wait", "_timeout": LIMIT}
         turned = {
             axis: self.drone(CalibrationState.MagnetoCalibrationAxisToCalibrateChanged(axis=axis, **wait))

@@ -43,10 +43,10 @@ class Video(Look, Visit):
             self.say(f"{name} beside others", watch.wait(10))
         self.say("stop all", bool(self.drone.streaming.stop()))
         for name, watch in watches.items():
-            self.result["streams"][f"{name} beside others"] = watch.told()
+            self.result["streams"][f"{name} beside others"] = watch.observed()
 
     def fly(self, watch: Watch) -> None:
-        """A little; at each turn the drone is left alone until a picture has told of it."""
+        """A little; at each turn the drone is left alone until a picture has reported it."""
         self.say("on the ground", watch.wait_for_state("FS_LANDED"))
         self.expect("take off", Piloting.TakeOff())
         self.say("seen to hover", watch.wait_for_state("FS_HOVERING"))

@@ -1,7 +1,7 @@
 """One connection of Parrot's Olympe that does everything: ``olympe_visit.py ADDRESS CLASS MODEL HTTP RTSP FOLDER``.
 
 CLASS is Olympe's: Drone, SkyController3 or SkyController4. MODEL (4k, thermal, usa, ai) only says what is worth asking
-for. HTTP and RTSP are the aircraft's ports; with RTSP 0 nobody looks. Downloads go to FOLDER. Written against Olympe
+for. HTTP and RTSP are the aircraft's ports; with RTSP 0 no one looks. Downloads go to FOLDER. Written against Olympe
 alone. Prints one JSON object: of each part what its steps came to, and what Olympe believes. Olympe's log goes to
 stderr.
 """

@@ -233,16 +233,16 @@ async def test_media_and_video_of_two_aircraft_with_one_address(spaces: tuple[st
             assert await visit.end(60.0) == 0, str(visit)
         finally:
             await visit.put_away()
-    told = json.loads(visit.lines[-1])
-    assert told["wlan1"]["streams"] == ["DefaultVideo"]
-    assert told["wlan2"]["streams"] == ["DefaultVideo", "ParrotThermalVideo", "ParrotThermalBlendedVideo"]
-    assert told["wlan1"]["serial"] != told["wlan2"]["serial"]
-    for log, one in zip(logs, told.values(), strict=True):
+    observed = json.loads(visit.lines[-1])
+    assert observed["wlan1"]["streams"] == ["DefaultVideo"]
+    assert observed["wlan2"]["streams"] == ["DefaultVideo", "ParrotThermalVideo", "ParrotThermalBlendedVideo"]
+    assert observed["wlan1"]["serial"] != observed["wlan2"]["serial"]
+    for log, one in zip(logs, observed.values(), strict=True):
         assert one["frames"] == 30
         assert one["foreign"] == 0
         assert one["files"]
         assert one["bytes"] > 0
-        # Each aircraft has shown its video to the one who asked there, and nobody else has asked.
+        # Each aircraft has shown its video to the one who asked there, and no one else has asked.
         videos = entries(log, "video")
         assert [entry["name"] for entry in videos] == ["setup", "play", "end"]
         assert videos[0]["args"]["client"][0] == OURS

@@ -49,12 +49,12 @@ async def test_olympe_does_everything(on: olympe.Combination, tmp_path: Path) ->
         check_flight(report["flight"], model, log)
     else:
         check_controller(report["controller"], kind, model, log)
-    # Without the right to listen on 554 nobody looks through a Skycontroller 3.
+    # Without the right to listen on 554 no one looks through a Skycontroller 3.
     if kind != "SkyController3" or olympe.rtsp_of_a_skycontroller_3():
         check_look(report["look"], model, log)
     check_payload(report["payload"], model, tmp_path / "downloads", log)
     check_plan(report["plan"], log)
 
-    told = olympe.complaints(err, olympe.HARMLESS_WITH_VIDEO, HARMLESS)
-    assert not told, err
+    observed = olympe.complaints(err, olympe.HARMLESS_WITH_VIDEO, HARMLESS)
+    assert not observed, err
     assert err.count("Traceback") == err.count(BROKEN)

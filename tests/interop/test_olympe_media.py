@@ -26,14 +26,14 @@ async def test_olympes_media_examples(on: olympe.Combination, tmp_path: Path) ->
     async with simulator_process(address, log, *options):
         report, err = await olympe.run("olympe_media.py", address, port, via, str(downloads), timeout=200.0)
     assert report == {"failed": None}, err
-    told = olympe.complaints(err)
-    assert not told, err
+    observed = olympe.complaints(err)
+    assert not observed, err
 
     files = sorted(downloads.glob("*/*.JPG"))
     assert [file.name for file in files] == [f"1000000100{number:02}.JPG" for number in range(1, 15)]
     for file in files:
-        told_md5 = file.with_name(f"{file.name}.md5").read_text().split()[0]
-        assert hashlib.md5(file.read_bytes()).hexdigest() == told_md5
+        reported_md5 = file.with_name(f"{file.name}.md5").read_text().split()[0]
+        assert hashlib.md5(file.read_bytes()).hexdigest() == reported_md5
     assert sorted(file.name for file in downloads.glob("*/thumbnails/*.JPG")) == [file.name for file in files]
     entries = [json.loads(line) for line in log.read_text().splitlines()]
     olympe.clock_set(entries, on.controller)

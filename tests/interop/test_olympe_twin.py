@@ -21,7 +21,7 @@ from support.world import ARMED, loopback
 SAMPLE = Path(__file__).parents[2] / "missions" / "delivery.plan"
 
 PORT = 8080
-"""Of the simulator's web server: Olympe is told, so nobody needs the right to listen on 80."""
+"""Of the simulator's web server: Olympe is given it, so no one needs the right to listen on 80."""
 
 WITHIN = 1.0
 """m."""

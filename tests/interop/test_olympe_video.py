@@ -45,7 +45,7 @@ class Truth:
 
 
 def check_flight(said: list[dict[str, Any]], log: list[dict[str, Any]], *, modern: bool) -> None:
-    """Every picture tells the pose of its moment, which lies between two in the log."""
+    """Every picture reports the pose of its moment, which lies between two in the log."""
     truth = Truth(log)
     home = next(entry["args"] for entry in log if entry["kind"] == "pose")
     compared: list[float] = []
@@ -59,7 +59,7 @@ def check_flight(said: list[dict[str, Any]], log: list[dict[str, Any]], *, moder
         off = 0.1 * max(1.0, ((poses[1]["time"] - poses[0]["time"]) / 0.2) ** 2)
         place, speed = drone["location"], drone["speed"]
         north, east = offset(home["lat"], home["lon"], place["latitude"], place["longitude"])
-        told = {
+        observed = {
             "north": north,  # steps of version 3 are 3 cm
             "east": east,
             "up": drone["ground_distance"],
@@ -68,11 +68,11 @@ def check_flight(said: list[dict[str, Any]], log: list[dict[str, Any]], *, moder
             "vd": speed["down"],
         }
         if modern:
-            told["ato"] = drone["altitude_ato"]
+            observed["ato"] = drone["altitude_ato"]
             assert drone["position"]["north"] == pytest.approx(north, abs=0.02)
             assert drone["position"]["east"] == pytest.approx(east, abs=0.02)
             assert drone["position"]["down"] == pytest.approx(-drone["altitude_ato"], abs=1e-3)
-        for key, value in told.items():
+        for key, value in observed.items():
             low, high = sorted(pose[key] for pose in poses)
             assert low - off <= value <= high + off, (key, value, poses)
         assert place["altitude_egm96amsl"] == pytest.approx(35.0 + drone["ground_distance"], abs=0.01)
@@ -82,7 +82,7 @@ def check_flight(said: list[dict[str, Any]], log: list[dict[str, Any]], *, moder
         for turn, (one, two) in ((drone["quat"], attitudes), (camera["quat"], level)):
             way = same_turn(dict(zip("wxyz", one, strict=True)), two)
             assert same_turn(turn, one) + same_turn(turn, two) <= way + math.radians(4.0)
-    # Those of moments when the machine let nobody run have no pose on both sides; the rest is enough.
+    # Those of moments when the machine let no one run have no pose on both sides; the rest is enough.
     assert len([height for height in compared if height > 0.2]) >= 30
     assert max(picture["drone"]["ground_distance"] for picture in said) > 2.5, "1 m of take-off and 2 by moveBy"
 
@@ -127,10 +127,10 @@ def check_camera(said: list[dict[str, Any]], *, modern: bool) -> None:
 
 def check_states(said: list[dict[str, Any]], log: list[dict[str, Any]]) -> None:
     """The states of the flight in their order; one that was short may have had no picture."""
-    told = [state for state, _ in itertools.groupby(picture["drone"]["flying_state"] for picture in said)]
+    observed = [state for state, _ in itertools.groupby(picture["drone"]["flying_state"] for picture in said)]
     true = iter(["FS_LANDED", *(f"FS_{e['args']['to'].upper()}" for e in log if e["kind"] == "state")])
-    assert all(state in true for state in told), told
-    assert {"FS_LANDED", "FS_HOVERING", "FS_LANDING"} <= set(told)
+    assert all(state in true for state in observed), observed
+    assert {"FS_LANDED", "FS_HOVERING", "FS_LANDING"} <= set(observed)
 
 
 def check_streams(streams: dict[str, Any], log: list[dict[str, Any]]) -> None:
@@ -161,8 +161,8 @@ async def test_olympe_watches_a_flight(on: olympe.Combination, tmp_path: Path) -
     check_states(said, log)
     session = streams[first]["session"]
     assert (session["model_id"], session["picture_fov"]["horz"]) == (PRODUCTS[model], 68.0 if model == "ai" else 69.0)
-    told = olympe.complaints(err, olympe.HARMLESS_WITH_VIDEO)
-    assert not told, "\n".join(told)
+    observed = olympe.complaints(err, olympe.HARMLESS_WITH_VIDEO)
+    assert not observed, "\n".join(observed)
     if kind != "Drone":
         return
     # A recording is played picture by picture to its end. Olympe gets its decoder ready while the first ones come.

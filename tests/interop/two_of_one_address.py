@@ -48,10 +48,10 @@ async def visit(address: str, interface: str, folder: Path, watching: asyncio.Ev
 
 async def main(address: str, left: str, right: str, folder: str) -> None:
     events = asyncio.Event(), asyncio.Event()
-    told = await asyncio.gather(
+    observed = await asyncio.gather(
         visit(address, left, Path(folder) / left, *events), visit(address, right, Path(folder) / right, *events[::-1])
     )
-    sys.stdout.write(json.dumps(dict(zip((left, right), told, strict=True))) + "\n")
+    sys.stdout.write(json.dumps(dict(zip((left, right), observed, strict=True))) + "\n")
 
 
 if __name__ == "__main__":

@@ -30,7 +30,7 @@ def check_controller(report: dict[str, Any], kind: str, model: str, log: list[di
         assert paired["info"]["uid"] == known["web"]["serial"]
     assert known["web"]["serial"] == known["serial of the drone"]["high"] + known["serial of the drone low"]["low"]
 
-    # The drone was not told what was the controller's business, and flew what it was told.
+    # The drone did not receive what was the controller's business, and flew what it was commanded.
     commands = [entry for entry in log if entry["kind"] == "command"]
     assert not [entry for entry in commands if entry["name"].startswith(CONTROLLERS_OWN)]
     assert [report["moveBy"][name] for name in ("dX", "dY", "dZ")] == pytest.approx((5.0, 0.0, -1.0), abs=0.1)

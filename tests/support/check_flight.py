@@ -67,9 +67,9 @@ class Record:
 
 
 def check_flight(report: dict[str, Any], model: str, log: list[dict[str, Any]]) -> None:
-    """It flew as it was told."""
+    """It flew as it was commanded."""
     record = Record(report, log)
-    assert set(told := failed(record.steps)) == set(FAILS), told
+    assert set(observed := failed(record.steps)) == set(FAILS), observed
     check_what_olympe_knows(report, model)
     check_moves(record)
     check_sticks(record)
@@ -124,7 +124,7 @@ def check_moves(record: Record) -> None:
     # Heading east now: front is east, right is south.
     assert record.flown("extended_move_by") == pytest.approx((-2.0, 4.0, 1.0, math.pi / 2), abs=0.15)
     assert_moved_by(record.report["extended_move_by"], (4.0, 2.0, -1.0, math.pi / 2))
-    # It was told to go 60 m.
+    # It was commanded to go 60 m.
     assert 1.0 < record.pose("cancel", "to")["north"] - record.pose("far", "from")["north"] < 30.0
     ends = [entry["args"]["status"] for entry in record.during("cancel") if entry["name"].endswith(".moveToChanged")]
     assert ends == [MoveToStatus.CANCELED]

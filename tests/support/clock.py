@@ -1,4 +1,4 @@
-"""The clock of tests: nobody waits for a wait, and how busy the machine is makes no difference.
+"""The clock of tests: no one waits for a wait, and how busy the machine is makes no difference.
 
 Gateway, simulator and client of most tests live in one process and one event loop. When none of them has anything to do
 before a timer is due, and nothing is on its way between their sockets (the loopback interface delivers what is sent
@@ -11,7 +11,7 @@ How long one turn of callbacks computed at most, which every timer has to wait f
 (`turns`): it is processor time of this thread. What latencies that makes is for tests/bench/ to say, and that nothing
 of ours blocks a loop in other ways for ruff.
 
-As soon as somebody else is there, a child process, work in a thread or a timer of the kernel's, the clock runs like
+As soon as another client is there, a child process, work in a thread or a timer of the kernel's, the clock runs like
 theirs; with threads, or beside child processes that only react (`only_reacts`), like a router, only while the loop
 waits, and never past the timer that it waits for: they have no timers, and a busy machine must not look like a host
 that stalled.
@@ -119,7 +119,7 @@ class Selector(selectors.DefaultSelector):
         self.others = 0
         """Who else can bring something about, as the test has said."""
         self.processes: list[asyncio.SubprocessTransport] = []
-        """Those whose end the loop has not been told of: a thread may have collected it already."""
+        """Those of whose end the loop has no report: a thread may have collected it already."""
         self.reactive: list[asyncio.SubprocessTransport] = []
         """Those among them that only react to what they receive, as the test has said."""
         self.turns: Turns | None = None
@@ -171,7 +171,7 @@ class Selector(selectors.DefaultSelector):
         return now()
 
     def _alone(self) -> bool:
-        """Whether nobody but the loop itself can bring anything about."""
+        """Whether no one but the loop itself can bring anything about."""
         if self.processes:
             self.processes = [process for process in self.processes if process.get_returncode() is None]
         return not (self.in_threads or self.others or self.processes) and childless()

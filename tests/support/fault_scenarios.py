@@ -83,8 +83,8 @@ def return_by_itself(w: World) -> None:
     assert firmware.homing.request(StateReason.LOW_BATTERY, firmware.pose, False)
 
 
-def somebody_else(w: World, message: Any) -> None:
-    """Another controller, a Skycontroller's keys for instance, tells the drone something."""
+def another_controller(w: World, message: Any) -> None:
+    """Another controller, a Skycontroller's keys for instance, commands the drone."""
     w.drone.firmware.receive(message, asyncio.get_running_loop().time())
 
 

@@ -121,8 +121,8 @@ class Log:
 
     def starts(self) -> list[float]:
         """When files were begun."""
-        told = [(entry["t"], entry["args"]) for entry in self.entries if entry["kind"] == entry["name"] == "plan"]
-        return [t for t, args in told if args["state"] == "playing"]
+        observed = [(entry["t"], entry["args"]) for entry in self.entries if entry["kind"] == entry["name"] == "plan"]
+        return [t for t, args in observed if args["state"] == "playing"]
 
     def camera(self) -> list[str]:
         """What plan and gateway had the camera do."""

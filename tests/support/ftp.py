@@ -1,4 +1,4 @@
-"""A client's side of MAVLink FTP, told by nothing but the messages."""
+"""A client's side of MAVLink FTP, fed with nothing but the messages."""
 
 from __future__ import annotations
 

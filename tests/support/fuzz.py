@@ -1,4 +1,4 @@
-"""Frames that nobody would send: any message with random content, damaged ones among them."""
+"""Frames that no one would send: any message with random content, damaged ones among them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Somebody who listens: keeps what it is told, and waits until what it has heard is enough."""
+"""A listener: keeps what it receives, and waits until that is enough."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 
 class Listener(Generic[T]):
-    """`hear` is told of each thing; `heard` has all of them, oldest first."""
+    """`hear` receives each thing; `heard` has all of them, oldest first."""
 
     def __init__(self) -> None:
         self.heard: list[T] = []
@@ -34,7 +34,7 @@ class Listener(Generic[T]):
 
 
 class MessageListener(Listener[Message | UnknownMessage]):
-    """What a session tells of its messages: `on_message`."""
+    """Receives the messages of a session: `on_message`."""
 
     def __call__(self, message: Message | UnknownMessage, now: float) -> None:
         self.hear(message)

@@ -37,7 +37,7 @@ def kind_of(message: Any) -> str:
 
 
 class Client:
-    """A ground station: keeps every frame it received, sends what a test tells it to."""
+    """A ground station: keeps every frame it received, sends what a test commands it to."""
 
     def __init__(self, sysid: int = 255, compid: int = 190) -> None:
         self.sysid, self.compid = sysid, compid
@@ -158,8 +158,8 @@ class Client:
             try:
                 await asyncio.wait_for(news.wait(), max(left, 0.0))
             except asyncio.TimeoutError:
-                told = (*kinds, "STATUSTEXT", "COMMAND_ACK")
-                seen = [str(m) for _, m in self.received[start:] if kind_of(m) in told]
+                observed = (*kinds, "STATUSTEXT", "COMMAND_ACK")
+                seen = [str(m) for _, m in self.received[start:] if kind_of(m) in observed]
                 raise AssertionError(f"no such {kind} within {timeout} s; seen: {seen[-8:]}") from None
 
     async def silence(self, kind: str, seconds: float, *, timeout: float = 20.0) -> None:

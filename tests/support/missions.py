@@ -71,7 +71,7 @@ def whole(message: Any) -> Any:
 
 
 def reached(w: World, since: int = 0) -> list[int]:
-    """The items that were told as reached, counted from 0."""
+    """The items that were reported as reached, counted from 0."""
     return [m.seq - first(w) for _, m in w.client.since(since, "MISSION_ITEM_REACHED")]
 
 
@@ -122,10 +122,10 @@ async def on_the_way(w: World, item: int) -> None:
 
 
 def pauses(w: World) -> list[str]:
-    """What the drone was told against its plan, and how it plays."""
+    """What the drone was commanded against its plan, and how it plays."""
     names = ("Pause", "Stop", "moveBy", "moveTo", "PCMD")
-    told = [e.name for e in w.drone.log if e.kind == "command" and e.name.rpartition(".")[2] in names]
-    return [*told, *(e.args["state"] for e in w.drone.log if e.name == "plan")]
+    observed = [e.name for e in w.drone.log if e.kind == "command" and e.name.rpartition(".")[2] in names]
+    return [*observed, *(e.args["state"] for e in w.drone.log if e.name == "plan")]
 
 
 def apart(where: Sequence[float], begin: Sequence[float], end: Sequence[float]) -> float:

@@ -24,7 +24,7 @@ from support.world import loopback
 SCRIPTS = Path(__file__).parents[1] / "interop"
 
 HTTP_PORT, RTSP_PORT = 8080, 8554
-"""Of the simulator where Olympe can be told, so that nobody needs the right to listen on 80 and 554."""
+"""Of the simulator where Olympe accepts a port, so that no one needs the right to listen on 80 and 554."""
 
 needed = pytest.mark.skipif(
     importlib.util.find_spec("olympe") is None,
@@ -108,14 +108,14 @@ HARMLESS_WITH_VIDEO = {
 
 
 def complaints(err: str, *harmless: dict[str, str]) -> list[str]:
-    """The lines of Olympe's log at WARNING and above for which nobody knows a reason, and messages it cannot read."""
+    """The lines of Olympe's log at WARNING and above for which no one knows a reason, and messages it cannot read."""
     known = [pattern for patterns in (HARMLESS, *harmless) for pattern in patterns]
-    told = [
+    observed = [
         line
         for line in err.splitlines()
         if re.search(r"\[(WARNING|ERROR|CRITICAL)\]|Traceback|[Uu]nknown message", line)
     ]
-    return [line for line in told if not any(re.search(pattern, line) for pattern in known)]
+    return [line for line in observed if not any(re.search(pattern, line) for pattern in known)]
 
 
 async def run(script: str, *arguments: str, timeout: float) -> tuple[Any, str]:
@@ -185,12 +185,12 @@ def rtsp_of_a_skycontroller_3() -> int:
 
 
 def clock_set(log: list[dict[str, Any]], kind: str) -> None:
-    """Olympe told the date to all that it was connected to, and the drone said it back."""
-    told = [entry for entry in log if entry["name"].endswith(".Common.CurrentDateTime")]
-    assert {entry["name"].partition(".")[0] for entry in told} == {"common"} | (
+    """Olympe sent the date to all that it was connected to, and the drone said it back."""
+    observed = [entry for entry in log if entry["name"].endswith(".Common.CurrentDateTime")]
+    assert {entry["name"].partition(".")[0] for entry in observed} == {"common"} | (
         {"skyctrl"} if kind != "Drone" else set()
     )
-    at, date = next((entry["t"], entry["args"]) for entry in told if entry["kind"] == "command")
+    at, date = next((entry["t"], entry["args"]) for entry in observed if entry["kind"] == "command")
     answers = [entry for entry in log if entry["name"] == "common.CommonState.CurrentDateTimeChanged"]
     assert date in [entry["args"] for entry in answers if entry["t"] >= at], answers
 

@@ -1,4 +1,4 @@
-"""A client's side of the parameter protocol, both encodings, told by nothing but the messages."""
+"""A client's side of the parameter protocol, both encodings, fed with nothing but the messages."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 From MAVSDK's mavlink_mission_transfer_client (158e33932): it counts how often it has sent an item, and each half second
 in which nothing was requested. A request beyond five, or a half second beyond five, ends the upload. Only a request of
-exactly the item after the one that it has sent last lets it count anew; an earlier item is sent again and is from then
+exactly the item after the one that it has sent last lets it count again; an earlier item is sent again and is from then
 on the last that was sent; a later one is not answered. An acknowledgement is good only when the last item that was sent
 is the last of all.
 """

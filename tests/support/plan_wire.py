@@ -171,7 +171,7 @@ class Wire:
         self._air: list[tuple[float, int, Any, Any]] = []
         self._count = 0
 
-    def to_desk(self, client: Client, messages: list[Any]) -> None:
+    def to_protocol(self, client: Client, messages: list[Any]) -> None:
         for message in messages:
             self._throw(client, message, False)
 
@@ -207,12 +207,12 @@ class Wire:
             self.now = max(self.now, min(times))
             self._perform(self.protocol.expire(self.now))
             for client in self.clients:
-                self.to_desk(client, client.expire(self.now))
+                self.to_protocol(client, client.expire(self.now))
             while self._air and self._air[0][0] <= self.now:
                 _, _, what, way = heapq.heappop(self._air)
                 if way is None:
                     self._perform(self.protocol.stored(what, self.now))
                 elif way[1]:
-                    self.to_desk(way[0], way[0].receive(what, self.now))
+                    self.to_protocol(way[0], way[0].receive(what, self.now))
                 else:
                     self._perform(self.protocol.receive(what, way[0].peer, self.now))

@@ -70,7 +70,7 @@ def circle(place: tuple[float, float], radius: float, *, inclusion: bool = True)
 
 
 def mission(home: tuple[float, float, float], size: int, shift: float = 0.0) -> list[Item]:
-    """A mission that can be told from one of another size or shift, as an ArduPilot client lists it: item 0 is home,
+    """A mission that differs from one of another size or shift, as an ArduPilot client lists it: item 0 is home,
     to others a first way point."""
     turns = [2.0 * math.pi * n / max(size - 1, 1) for n in range(size - 1)]
     circle = around(home[:2], *[(30.0 * math.cos(turn), 30.0 * math.sin(turn)) for turn in turns])

@@ -22,7 +22,7 @@ START_LIMIT = 30.0
 
 
 def free_udp_port(address: str) -> int:
-    """A port of an address that only we use, so that nobody else takes it in the meantime."""
+    """A port of an address that only we use, so that no one else takes it in the meantime."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind((address, 0))
         port: int = probe.getsockname()[1]

@@ -133,7 +133,7 @@ SITUATIONS: tuple[tuple[Callable[[str], Bench], Callable[[Bench], bool]], ...] =
 """How to get there, and whether it still is so."""
 
 _ONE_WAY = (ardrone3.Emergency, ardrone3.TakeOff, ardrone3.Landing, common.Start)
-"""Sent last, so that a situation is not made anew more often than needed."""
+"""Sent last, so that a situation is not repeated more often than needed."""
 
 
 def unanswered(model: str) -> set[str]:

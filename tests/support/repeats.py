@@ -1,6 +1,6 @@
 """Pytest plugin: repeats a failed `third_party` test once, and prints the first failure.
 
-The marker is for tests whose outcome depends on a program of somebody else's that runs in real time. A test in virtual
+The marker is for tests whose outcome depends on a program of another client's that runs in real time. A test in virtual
 time, or of our own processes alone, never repeats: a failure of one is a defect to be found.
 """
 

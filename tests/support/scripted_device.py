@@ -1,4 +1,4 @@
-"""A drone that does what a test tells it, over real sockets: our device role, no firmware behind it."""
+"""A drone that does what a test commands, over real sockets: our device role, no firmware behind it."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class ScriptedDevice:
 
     @asynccontextmanager
     async def connected(self) -> AsyncIterator[Drone]:
-        """A drone of ours, connected; at the end nobody may wait for anything any more."""
+        """A drone of ours, connected; at the end no one may wait for anything any more."""
         drone = self.drone()
         await drone.connect()
         yield drone

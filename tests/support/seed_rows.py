@@ -280,7 +280,7 @@ async def _frame(pair: Pair) -> VideoFrame:
 
 
 def _said(name: str, field: str, note: str = "") -> Row:
-    """What is told with the pictures only."""
+    """What is reported with the pictures only."""
 
     async def drive(pair: Pair) -> object:
         return getattr((await _frame(pair)).metadata, field)

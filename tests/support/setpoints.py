@@ -170,7 +170,7 @@ async def held(w: World, script: Process, name: str, calm: float = 0.0) -> Pose:
     """Where the drone truly is while a program holds a step; it may go on then.
 
     `calm`: s that what the program asks for takes to settle. Where the machine holds the program up, just now perhaps,
-    the drone hovers and begins anew: nobody looks before that has settled too.
+    the drone hovers and begins again: no one looks before that has settled too.
     """
     await script.line(lambda line: line == f"held {name}", timeout=60.0)
     loop = asyncio.get_running_loop()

@@ -1,4 +1,4 @@
-"""A video server that does what a test tells it, over real sockets. Its RTSP and SDP are written by hand here, so that
+"""A video server that does what a test commands, over real sockets. Its RTSP and SDP are written by hand here, so that
 no mistake of ours is on both sides; what its pictures say is `arsdk`'s, which Parrot's own library reads."""
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ class VideoServer:
     quiet: bool = False
     """True: no pictures are sent."""
     reports: list[Report] = field(default_factory=list)
-    """What clients told of RTP."""
+    """What clients reported about RTP."""
     sent: int = 0
     """Pictures."""
     playing: int = 0

@@ -43,9 +43,9 @@ class Modes:
     """custom_mode of what a vehicle can be doing, in one flavour (conformance A3, A4)."""
 
     hold: int
-    """Where a vehicle is that `World.take_off` has lifted, or that was told to stop or to go somewhere."""
+    """Where a vehicle is that `World.take_off` has lifted, or that was commanded to stop or to go somewhere."""
     idle: int
-    """Where a vehicle is that nobody has told anything."""
+    """Where a vehicle is that no client has commanded anything."""
     position: int
     land: int
     returning: int
@@ -59,7 +59,7 @@ MODES = {
 
 
 def loopback() -> str:
-    """An address of the loopback network that nobody else uses: two runs on one machine do not meet."""
+    """An address of the loopback network that no one else uses: two runs on one machine do not meet."""
     while True:
         address = f"127.{random.randint(64, 126)}.{random.randint(1, 254)}.{random.randint(1, 254)}"
         with socket.socket() as probe:

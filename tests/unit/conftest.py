@@ -1,4 +1,4 @@
-"""The drone of the unit tests, connected over real sockets to a device that does what a test tells it."""
+"""The drone of the unit tests, connected over real sockets to a device that does what a test commands."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from anafi_mav.drone import Drone
 
 @pytest.fixture
 def states() -> list[Message]:
-    """What the device tells of its states at the start; a module that wants more says so in its own."""
+    """States that the device reports at the start; a module that wants more says so in its own."""
     return STATES
 
 

@@ -94,8 +94,7 @@ class PanoramaService(Service, PlainTask):
             if await drone.camera.set_mode(CameraMode.PHOTO, id) is not CameraMode.PHOTO:
                 raise Refused(texts.PANORAMA, texts.CAMERA_MODE_KEPT)
             self._require_hovering()
-        async with vehicle.control.acquire(self, by=command.right):
-            self._require_hovering()
+        async with vehicle.control.acquire(self, by=command.right, condition=self._require_hovering):
             await drone.animations.photo_panorama(panorama_type(wide, high, drone.animations.state.available or ()))
 
     def _require_hovering(self) -> None:

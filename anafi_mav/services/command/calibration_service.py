@@ -11,16 +11,15 @@ import math
 from collections.abc import Awaitable, Callable, Mapping
 
 from anafi_mav import texts
-from anafi_mav.drone.events import CalibrationAxis, FlyingState, MagnetoCalibrationStateChanged, Message
+from anafi_mav.drone.events import CalibrationAxis, MagnetoCalibrationStateChanged, Message
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.service import Service
-from anafi_mav.texts import OperatorText
-from anafi_mav.vehicle.base.flight_task import MAINTENANCE
+from anafi_mav.texts import OperatorText, Subject
+from anafi_mav.vehicle.base.flight_task import CommandTask, Needs, maintenance
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.vehicle import Vehicle
 
 _MAGNETOMETER, _HORIZON = 1.0, 2.0
 """param2 and param5 of MAV_CMD_PREFLIGHT_CALIBRATION that can be meant for an ANAFI (MAVLink common.xml)."""
@@ -44,17 +43,6 @@ of that turn, and what to do with the drone in hand. QGroundControl shows the pi
 
 
 Work = Callable[[], Awaitable[None]]
-
-
-def require_standing(vehicle: Vehicle, what: OperatorText) -> None:
-    """Raise `Refused` unless the drone stands with its motors off.
-
-    After a motor cut it may still be falling.
-    """
-    if vehicle.flying_state is FlyingState.EMERGENCY:
-        raise Refused(what, texts.EMERGENCY_STOP)
-    if not vehicle.on_ground or vehicle.drone.piloting.about_to_fly:
-        raise Refused(what, texts.NOT_ON_GROUND)
 
 
 class CalibrationService(Service):
@@ -95,7 +83,7 @@ class CalibrationService(Service):
         wanted = {index: value for index, value in enumerate(values, 1) if value != 0.0}
         if not wanted:
             if self.host.vehicle.on_ground:
-                await self._acquire(command)  # ends the one that runs
+                await self._acquire(command, maintenance(texts.CALIBRATION, Needs.NONE))  # ends the one that runs
         elif wanted == {2: _MAGNETOMETER}:
             await self._on_ground(command, texts.CALIBRATION, self._magnetometer)
         elif wanted == {5: _HORIZON}:
@@ -105,14 +93,13 @@ class CalibrationService(Service):
             self.host.text(Severity.ERROR, texts.CAL_FAILED.fill(error=texts.CALIBRATIONS))
             raise Refused(texts.CALIBRATION, texts.CALIBRATIONS, lasting=True)
 
-    async def _on_ground(self, command: Command, what: OperatorText, work: Work) -> None:
-        require_standing(self.host.vehicle, what)
-        await self._acquire(command)
+    async def _on_ground(self, command: Command, what: Subject, work: Work) -> None:
+        await self._acquire(command, maintenance(what))
         await work()
 
-    async def _acquire(self, command: Command) -> None:
-        """End what flies, or is calibrated."""
-        async with self.host.vehicle.control.acquire(MAINTENANCE, by=command.right):
+    async def _acquire(self, command: Command, task: CommandTask) -> None:
+        """End what is about to fly, or is calibrated."""
+        async with self.host.vehicle.control.acquire(task, by=command.right):
             pass
 
     async def _told(

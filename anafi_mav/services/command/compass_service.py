@@ -16,10 +16,9 @@ from anafi_mav import texts
 from anafi_mav.drone.events import CalibrationAxis
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.command.calibration_service import require_standing
 from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.service import Host, Service
-from anafi_mav.vehicle.base.flight_task import MAINTENANCE
+from anafi_mav.vehicle.base.flight_task import maintenance
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
 
@@ -73,9 +72,7 @@ class CompassService(Service):
         once and does not restart.
         """
         _check_mask(command)
-        vehicle = self.host.vehicle
-        require_standing(vehicle, texts.COMPASS_CALIBRATION)
-        async with vehicle.control.acquire(MAINTENANCE, by=command.right):
+        async with self.host.vehicle.control.acquire(maintenance(texts.COMPASS_CALIBRATION), by=command.right):
             pass
         self._succeeded = False
         await self.host.drone.calibration.start_magnetometer()

@@ -23,7 +23,6 @@ from anafi_mav.vehicle.base.bounds import (
     FASTEST,
     SLOWEST,
     UnsupportedFrame,
-    check_height,
     check_on_earth,
     height_in_frame,
     home_height,
@@ -97,12 +96,11 @@ async def change_altitude(vehicle: Vehicle, ato: float, flavour: Flavour, by: Ri
     if goto is None:
         await vehicle.guided.reposition(None, ato, None, mode=flavour.guided_mode, by=by)
     else:
-        check_height(vehicle, ato)
         move = vehicle.drone.piloting.move
         # MAVProxy says it as a command and as an item at once, and means one move. If nothing comes of that, the newer
         # order stands for itself.
         if goto.at_height(ato) != goto or move is None or not await move.under_way():
-            await vehicle.guided.go(goto.at_height(ato), by=by)
+            await vehicle.guided.go(goto.at_height(ato), by=by, condition=lambda: vehicle.guided.check(goto.place, ato))
 
 
 def _effect_of_pause(command: Command) -> Effect:

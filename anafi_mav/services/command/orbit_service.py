@@ -72,7 +72,7 @@ class _Orbit:
 class OrbitService(Service, PlainTask):
     """Flies circles; the vehicle's flight task while it does."""
 
-    rules = TaskRules(texts.ORBIT, needs=Needs.NO_DESCENT | Needs.IN_AIR | Needs.FIX | STEERING)
+    rules = TaskRules(texts.ORBIT, needs=Needs.NO_DESCENT | Needs.IN_AIR | Needs.FIX | Needs.LIMITS | STEERING)
     mode = FlightMode.ORBIT
 
     def __init__(self, host: Host) -> None:
@@ -135,28 +135,13 @@ class OrbitService(Service, PlainTask):
         is AMSL in every frame but ArduPilot's clients'. ACCEPTED when the drone is on its way to the circle, or on
         it.
         """
-        vehicle, control, by = self.host.vehicle, self.host.vehicle.control, command.right
-        circle = self._described(command)
-        control.check(self, by)
-        here = vehicle.place
-        if here is None:
-            raise Refused(texts.ORBIT, texts.NO_FIX)
-        start = entry(circle, here)
-        check_place(vehicle, start)
-        for before, point in pairwise(outline(circle)):
-            check_place(vehicle, point, start=before)
-        orbit = _Orbit(Lap(self._held_back(circle)), vehicle.cruise_speed)
-        circle = orbit.lap.circle
-        bearing = _bearing(circle.centre, start)
-        off = abs(geo.distance(*circle.centre, *here) - circle.radius)
-        is_away = off > ON_IT or abs((vehicle.drone.piloting.state.altitude or 0.0) - circle.height) > ON_IT
-        if is_away:
-            check_place(vehicle, start, start=here)
-        async with control.acquire(self, by=by) as grant:
+        vehicle, circle = self.host.vehicle, self._described(command)
+        async with vehicle.control.acquire(self, by=command.right, condition=lambda: self._way(circle)) as grant:
+            start, is_away = self._way(circle)
+            orbit = _Orbit(Lap(self._held_back(circle)), vehicle.cruise_speed)
             if is_away:
-                await vehicle.guided.move(
-                    Goto(start, circle.height, heading_at(circle, bearing), None, FlightMode.HOLD)
-                )
+                heading = heading_at(orbit.lap.circle, _bearing(circle.centre, start))
+                await vehicle.guided.move(Goto(start, circle.height, heading, None, FlightMode.HOLD))
             else:
                 vehicle.drone.piloting.hover()  # ends a move of ours, which would ignore sticks
             self._newest = orbit
@@ -165,6 +150,23 @@ class OrbitService(Service, PlainTask):
                 orbit.approach = self.host.spawn(self._approach(move, orbit))
             else:
                 self._begin(orbit)
+
+    def _way(self, circle: Circle) -> tuple[GeoPoint, bool]:
+        """Return the first point of the circle, and True when the drone is away from it.
+
+        Raises `Refused` for a way or a circle that may not be flown.
+        """
+        vehicle, here = self.host.vehicle, self.host.vehicle.place
+        if here is None:
+            raise Refused(texts.ORBIT, texts.NO_FIX)
+        check_height(vehicle, circle.height)
+        start = entry(circle, here)
+        off = abs(geo.distance(*circle.centre, *here) - circle.radius)
+        is_away = off > ON_IT or abs((vehicle.drone.piloting.state.altitude or 0.0) - circle.height) > ON_IT
+        check_place(vehicle, start, start=here if is_away else None)
+        for before, point in pairwise(outline(circle)):
+            check_place(vehicle, point, start=before)
+        return start, is_away
 
     def _described(self, command: Command) -> Circle:
         vehicle, piloting = self.host.vehicle, self.host.drone.piloting.state
@@ -191,7 +193,6 @@ class OrbitService(Service, PlainTask):
             ato = piloting.altitude if running is None else running.height
         if ato is None:
             raise Refused(texts.ORBIT, texts.HEIGHT_UNKNOWN)
-        check_height(vehicle, ato)
         heading = 0.0 if piloting.attitude is None else piloting.attitude.yaw
         return Circle(
             where,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from anafi_mav import geo, texts
 from anafi_mav.drone.events import PilotedPOIV2, PoiMode, PoiStatus
@@ -18,7 +18,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.service import Host
 from anafi_mav.services.system_position import SystemPosition
 from anafi_mav.vehicle.base.bounds import amsl_to_ato, check_on_earth
-from anafi_mav.vehicle.base.flight_task import Needs, PlainTask, TaskRules
+from anafi_mav.vehicle.base.flight_task import Needs, PlainTask, Preparation, TaskRules
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, reason_of
@@ -140,14 +140,12 @@ class RegionOfInterest(PlainTask):
         region.is_confirmed = True
 
     async def _begin_region(self, region: Region, by: By, where: GeoPoint, ato: float) -> None:
-        """Acquire the drone for a region. Raises `Refused` when it does not hover then."""
+        """Acquire the drone for a region, and stop it."""
         vehicle = self._host.vehicle
-        async with vehicle.control.acquire(self, by=by) as grant:
-            if vehicle.drone.piloting.moving:
-                await vehicle.drone.piloting.stop()
-            if (reason := vehicle.lacking(self.rules.needs)) is not None:
-                raise Refused(texts.ROI, reason)
-            self._require_prepared(region)
+        rules = replace(self.rules, start=Preparation.STOP) if vehicle.drone.piloting.moving else self.rules
+        async with vehicle.control.acquire(
+            self, by=by, rules=rules, condition=lambda: self._require_prepared(region)
+        ) as grant:
             self._region, self._prepared = region, None  # no await from the checks to the start
             grant.begin()
             await self._start(region, where, ato)

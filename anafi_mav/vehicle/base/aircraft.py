@@ -303,6 +303,12 @@ class Aircraft(ABC):
 
 
 _UNMET: tuple[tuple[Needs, Callable[[Aircraft], bool], OperatorText], ...] = (
+    (Needs.STANDS, lambda aircraft: aircraft.flying_state is FlyingState.EMERGENCY, texts.EMERGENCY_STOP),
+    (
+        Needs.STANDS,
+        lambda aircraft: not aircraft.on_ground or aircraft.drone.piloting.about_to_fly,
+        texts.NOT_ON_GROUND,
+    ),
     (Needs.IN_AIR, lambda aircraft: not aircraft.in_air, texts.NOT_IN_AIR),
     (Needs.FIX, lambda aircraft: aircraft.place is None, texts.NO_FIX),
     (Needs.NO_PILOT, lambda aircraft: aircraft.drone.controller.pilot_acquired_control, texts.PILOT),

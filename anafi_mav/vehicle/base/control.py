@@ -2,11 +2,12 @@
 
 `control_machine` decides; this shell performs its effects. `acquire` is the only way to the drone's sticks and moves:
 
-1. The policy and the task's needs are checked. A request that is refused disturbs nothing.
+1. The policy, the task's needs and the request's own condition are checked. A request that is refused disturbs nothing.
 2. What flies is ended at once, and all older actions are cancelled. From now on they can send only what stops them.
 3. Their end is awaited: without that an aborted move could cancel the one that follows it.
-4. A return that a client commanded is cancelled, and the drone is stopped where the task needs it. The needs are
-   checked again if that, or the end of what flew, has taken an event-loop iteration. Then the task begins.
+4. The drone is stopped where the task needs it, and a return that is not reported yet is cancelled.
+5. After each wait all conditions are checked again, and that the pilot has not moved a stick meanwhile. From the last
+   check to the first command of the task there is no wait.
 
 A newer request replaces a pending one. No module but this one stores who flies, and the mode is derived from it.
 """
@@ -67,6 +68,9 @@ class Request(Struct, frozen=True):
 
 Policy: TypeAlias = Callable[[Request], "Refused | None"]
 """Decides who may request a flight task: returns the refusal, or None."""
+
+Condition: TypeAlias = Callable[[], object]
+"""Raises `Refused` while a request may not be carried out, for a reason that its task does not declare as a need."""
 
 
 class Conditions(Protocol):
@@ -212,6 +216,7 @@ class Control:
         below: FlightTask | None = None,
         pauses: bool = False,
         rules: TaskRules | None = None,
+        condition: Condition = lambda: None,
     ) -> AsyncIterator[Grant]:
         """Acquire control for a task, in an action; the block prepares and starts it.
 
@@ -220,13 +225,23 @@ class Control:
         action, and is not disturbed by either.
 
         `below`: the hovering mode after the task; None: Hold. `pauses`: streams do not leave it. `rules`: for this
-        request, instead of the task's own.
+        request, instead of the task's own. `condition`: what the request needs beyond them. A caller checks nothing
+        before or after: it would be true on one side of the wait only.
 
-        Raises `Refused` by the policy, for a need that is not met, while the motors are being cut, and when the drone
-        rejects what is sent to it.
+        Raises `Refused` by the policy, for a need or a condition that is not met, while the motors are being cut, and
+        when the drone rejects what is sent to it.
         """
-        rules = rules or task.rules
-        self.check(task, by, rules)
+        own_rules, rules = rules, rules or task.rules
+        piloting, controller = self._aircraft.drone.piloting, self._aircraft.drone.controller
+        takeovers = controller.takeovers
+
+        def check() -> None:
+            self.check(task, by, own_rules)  # those of some tasks depend on the drone's state
+            condition()
+            if rules.is_flight and controller.takeovers != takeovers:
+                raise Refused(rules.what, texts.PILOT)
+
+        check()
         number = self.epoch + 1
         own = task if rules.lasts and not rules.is_hover else None
         hover = task if rules.is_hover else below
@@ -234,7 +249,15 @@ class Control:
         try:
             has_waited = await self._release(attempt, rules.wait)
             self.handle(Event.RELEASED, Input(attempt))
-            await self._prepare(Request(task, by, rules), has_waited=has_waited)
+            if rules.start is Preparation.STOP:
+                await piloting.stop()
+            if has_waited or rules.start is Preparation.STOP:  # else no event was received since the first check
+                check()
+            # A return that is commanded and not reported. Raises when it is the drone's own.
+            if Needs.NO_DESCENT in rules.needs and await piloting.cancel_return_home():
+                check()
+            if rules.start is Preparation.HOVER:
+                piloting.hover()
             grant = Grant(self, attempt)
             yield grant
             grant.begin()
@@ -287,25 +310,6 @@ class Control:
             drone.silence(late)
             return True
         return False
-
-    async def _prepare(self, request: Request, *, has_waited: bool) -> None:
-        """Stop the drone as the task needs it, and check policy and needs again after a wait.
-
-        Without one (`has_waited` is that of before) no event has been received since the first check.
-        """
-        rules, aircraft, piloting = request.rules, self._aircraft, self._aircraft.drone.piloting
-        if rules.start is Preparation.STOP:
-            await piloting.stop()
-            has_waited = True
-        if Needs.NO_DESCENT in rules.needs:
-            # One asked for through another controller, or before the link was lost. Raises when it is the drone's own.
-            has_waited |= await piloting.cancel_return_home()
-        if has_waited:
-            if (reason := aircraft.lacking(rules.needs)) is not None:
-                raise Refused(rules.what, reason)
-            self.require_allowed(request.task, request.by, rules)
-        if rules.start is Preparation.HOVER:
-            piloting.hover()
 
     def succeed(self, task: FlightTask) -> None:
         """Let a task follow the active one, instead of another successor.

@@ -33,6 +33,11 @@ class Needs(enum.Flag):
     NONE = 0
     NO_DESCENT = enum.auto()
     """The drone neither lands nor returns, and was not commanded to."""
+    STANDS = enum.auto()
+    """The drone is on the ground with its motors off, and no take-off of ours is about to begin.
+
+    After a motor cut it may still be falling.
+    """
     IN_AIR = enum.auto()
     FIX = enum.auto()
     NO_PILOT = enum.auto()
@@ -180,8 +185,11 @@ LAND = CommandTask(TaskRules(texts.LANDING, wait=STOP_WAIT, is_flight=False))
 MOTOR_CUT = CommandTask(TaskRules(texts.MOTOR_CUT, is_urgent=True, lasts=False, is_flight=False))
 DISARM = CommandTask(TaskRules(texts.DISARM, wait=STOP_WAIT, keeps_below=True, lasts=False, is_flight=False))
 HAND_LAUNCH = CommandTask(TaskRules(texts.ARMING, keeps_below=True, lasts=False))
-MAINTENANCE = CommandTask(TaskRules(texts.CALIBRATION, keeps_below=True, lasts=False, is_flight=False))
-"""Calibrations and the like: nothing flies meanwhile."""
+
+
+def maintenance(what: Subject, needs: Needs = Needs.STANDS) -> CommandTask:
+    """Return the task of a calibration or the like, during which nothing flies."""
+    return CommandTask(TaskRules(what, needs=needs, keeps_below=True, lasts=False, is_flight=False))
 
 
 class FlightAction(Struct, eq=False):

@@ -22,6 +22,7 @@ from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import FlightPlanFile
 from anafi_mav.vehicle.base.aircraft import Aircraft
+from anafi_mav.vehicle.base.control import Condition
 from anafi_mav.vehicle.base.flight_task import Needs, PlainTask, TaskRules
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import DroneRefused, Refused, reason_of, text_of
@@ -124,17 +125,21 @@ class MissionFlight(PlainTask):
             raise Refused(texts.MISSION, texts.NO_MISSION)
         if machine.flying and item is None:
             return  # it is flown, and is not interrupted
-        self._require_freedom()
+        attempt = machine.attempt(item)
         if vehicle.armed:
-            attempt = machine.attempt(item)
+            self._require_freedom(attempt, ends_return=self.returns)
             await self._work(Prepare(attempt), by)
             self._require_same(attempt)
             return
-        vehicle.require_ready()
-        async with vehicle.control.acquire(self, by=by):
+
+        def condition() -> None:
+            self._require_freedom(attempt)
+            vehicle.require_ready()
+            if not vehicle.on_ground:  # it has taken off, and waits for no arming
+                raise Refused(texts.MISSION, vehicle.activity)
+
+        async with vehicle.control.acquire(self, by=by, condition=condition):
             effects = machine.await_arm(by.client, self._now)
-            if machine.state is not State.AWAIT_ARM:  # the mission was deleted in the wait
-                raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
         self._handle(effects)
         if vehicle.is_armed_by(by.client):  # since it requested this
             self.armed(by.client)
@@ -366,26 +371,31 @@ class MissionFlight(PlainTask):
         Without a client the mission has control since its mode was chosen, and its end cancels this work. A mission
         that was replaced meanwhile does not become active.
         """
-        async with contextlib.nullcontext() if by is None else self._vehicle.control.acquire(self, by=by):
-            await self._stop(work.prepared)
+        control, ends_return = self._vehicle.control, self.returns
+
+        def condition() -> None:
+            self._require_freedom(work.attempt, ends_return=ends_return)
+            if not self._vehicle.armed:
+                raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
+
+        async with contextlib.nullcontext() if by is None else control.acquire(self, by=by, condition=condition):
+            await self._stop(work.prepared, condition)
             if not (effects := self.machine.granted(work.attempt)):
-                self._require_same(work.attempt)
                 raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
         return effects
 
-    async def _stop(self, prepared: Prepared) -> None:
-        """End the moves, a commanded return and another plan; check the drone again."""
+    async def _stop(self, prepared: Prepared, condition: Condition) -> None:
+        """End the moves, the mission's own return and another plan; check the drone after each wait."""
         vehicle, plan = self._vehicle, self._vehicle.drone.flight_plan
         if vehicle.in_air:
             await vehicle.drone.piloting.stop()
+            condition()
             await vehicle.drone.piloting.cancel_return_home()
         if not prepared.resumes and plan.state.playing not in (None, PlayingState.STOPPED):
             await plan.stop()
         if prepared.resumes and plan.state.playing != PlayingState.PAUSED:  # it would begin the file again
             raise Refused(texts.MISSION, texts.MISSION_STOPPED)
-        self._require_freedom()
-        if not vehicle.armed:
-            raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
+        condition()
 
     async def _start(self, work: StartFile) -> None:
         """Command the drone to fly a file, or to resume it; returns when it does."""
@@ -399,16 +409,19 @@ class MissionFlight(PlainTask):
         if work.prepared.resumes and not self._payload_holds:
             self._vehicle.text(Severity.WARNING, texts.MISSION_PAYLOAD_CHANGED)
 
-    def _require_freedom(self) -> None:
+    def _require_freedom(self, attempt: MissionAttempt, *, ends_return: bool = False) -> None:
+        """Raise `Refused` while the drone may not fly an attempt.
+
+        `ends_return`: a return under way is the mission's own.
+        """
         vehicle = self._vehicle
-        if vehicle.flying_state in _LANDING:
-            raise Refused(texts.MISSION, texts.LANDS)
+        self._require_same(attempt)
         if vehicle.returning_by_itself:
             raise Refused(texts.MISSION, texts.RETURNS_BY_ITSELF)
+        if (vehicle.returning and not ends_return) or not (vehicle.in_air or vehicle.on_ground):
+            raise Refused(texts.MISSION, vehicle.activity)
         if (reason := vehicle.lacking(self.rules.needs)) is not None:
             raise Refused(texts.MISSION, reason)
-        if not vehicle.in_air and not vehicle.on_ground:
-            raise Refused(texts.MISSION, vehicle.activity)
 
     def _require_same(self, attempt: MissionAttempt) -> None:
         if self.machine.mission is not attempt.mission:

@@ -278,11 +278,16 @@ class OffboardFlight(PlainTask):
     async def _take_off(self, by: Right, *, guided: bool) -> None:
         """Take off after a second of climbing setpoints; the newest is flown from the first hover."""
         vehicle, client = self._vehicle, by.client
+
+        def condition() -> None:
+            fresh = self._stream.candidate(client, self._clock.monotonic()) == client
+            if not (self._stands and fresh and self._takeoff.is_armed_by(client)):
+                raise Refused(texts.SETPOINT_TAKEOFF, texts.SETPOINTS_STOPPED)
+            vehicle.require_ready()
+
         try:
-            async with vehicle.control.acquire(self, by=by, below=_GUIDED if guided else None) as grant:
-                fresh = self._stream.candidate(client, self._clock.monotonic()) == client
-                if not (self._stands and fresh and self._takeoff.is_armed_by(client)):
-                    raise Refused(texts.SETPOINT_TAKEOFF, texts.SETPOINTS_STOPPED)
+            below = _GUIDED if guided else None
+            async with vehicle.control.acquire(self, by=by, below=below, condition=condition) as grant:
                 self._engage(Event.LIFT, client)
                 grant.begin()
                 await self._takeoff.launch()
@@ -341,11 +346,7 @@ class OffboardFlight(PlainTask):
         Raises `Refused`.
         """
         control, client = self._vehicle.control, by.client
-        self._require_freedom(texts.OFFBOARD)
-        candidate = self._stream.candidate(client, self._clock.monotonic())
-        if candidate is None:
-            reason = texts.ROLL_INVERTED if self._vehicle.roll.sign is RollSign.INVERTED else texts.NO_SETPOINTS
-            raise Refused(texts.OFFBOARD, reason)
+        candidate = self._pilot_for(client)
         if self._stream.state in STREAMS and candidate == self._stream.pilot:
             self._stream = self._stream.note(chosen_by=client)
             return  # it flies already, and goes on without a jolt
@@ -353,13 +354,19 @@ class OffboardFlight(PlainTask):
             self._engage(Event.JOIN, candidate, client)
             control.succeed(self)
             return
-        async with control.acquire(self, by=by) as grant:
-            pilot = self._stream.candidate(client, self._clock.monotonic())
-            if pilot is None or not (self._vehicle.in_air or self._stands):
-                raise Refused(texts.OFFBOARD, texts.SETPOINTS_STOPPED if pilot is None else self._vehicle.activity)
-            self._engage(Event.ENGAGE, pilot, client)
+        async with control.acquire(self, by=by, condition=lambda: self._pilot_for(client)) as grant:
+            self._engage(Event.ENGAGE, self._pilot_for(client), client)
             grant.begin()
             self._begin()
+
+    def _pilot_for(self, client: Hashable) -> Hashable:
+        """Return the client whose setpoints mode Offboard flies for this one, or raise `Refused`."""
+        self._require_freedom(texts.OFFBOARD)
+        pilot = self._stream.candidate(client, self._clock.monotonic())
+        if pilot is None:
+            reason = texts.ROLL_INVERTED if self._vehicle.roll.sign is RollSign.INVERTED else texts.NO_SETPOINTS
+            raise Refused(texts.OFFBOARD, reason)
+        return pilot
 
     def _engage(self, event: Event, pilot: Hashable, chosen_by: Hashable = None) -> None:
         """The session has this pilot from now on, and ends with its silence."""
@@ -396,13 +403,12 @@ class OffboardFlight(PlainTask):
         try:
             if vehicle.mode is not FlightMode.GUIDED:  # ended by what arrived together with the setpoint
                 raise Refused(texts.SETPOINT, texts.IN_MODE.fill(mode=vehicle.mode.value))
+            by = Right(client, Extent.COMMANDED)
             async with control.acquire(
-                self, by=Right(client, Extent.COMMANDED), below=_GUIDED, rules=_IN_GUIDED
+                self, by=by, below=_GUIDED, rules=_IN_GUIDED, condition=lambda: self._require_recent(client)
             ) as grant:
-                now, newest = self._clock.monotonic(), self._stream.received.get(client)
-                if newest is None or now >= (newest.at + SINGLE_WAIT if newest.is_single else newest.over):
-                    raise Refused(texts.SETPOINT, texts.WAITED_TOO_LONG)
-                self._engage(Event.ENGAGE_SINGLE if newest.is_single else Event.ENGAGE, client)
+                is_single = self._stream.received[client].is_single
+                self._engage(Event.ENGAGE_SINGLE if is_single else Event.ENGAGE, client)
                 grant.begin()
                 self._begin()
         except AnafiMavError as error:
@@ -413,6 +419,12 @@ class OffboardFlight(PlainTask):
             if is_single and action is not None and action.is_replaced_by_another_client:
                 self.drop(client, texts.MISSION_DISPLACED if action.replaced_by_order else texts.OTHER_PROGRAM)
             raise
+
+    def _require_recent(self, client: Hashable) -> None:
+        """Raise `Refused` when a client's newest setpoint in Guided is out of date."""
+        now, newest = self._clock.monotonic(), self._stream.received.get(client)
+        if newest is None or now >= (newest.at + SINGLE_WAIT if newest.is_single else newest.over):
+            raise Refused(texts.SETPOINT, texts.WAITED_TOO_LONG)
 
     # Ending.
 

@@ -31,7 +31,7 @@ LONGEST_STORY = 400
 """Messages of one run: more than version 1 has sequence numbers, so that they wrap."""
 
 CALM = 60.0
-"""s at the end of a run in which nobody speaks: every acknowledged message arrives in it, for three datagrams in ten
+"""s at the end of a run in which no one speaks: every acknowledged message arrives in it, for three datagrams in ten
 are lost at most. The chance that a frame needs more than 60 s (400 sendings at 1 - 0.7² each) is nil."""
 
 
@@ -160,9 +160,9 @@ def test_each_acknowledged_message_arrives_exactly_once_and_in_order(version: in
         given_up = set(weather.undelivered[end])
         assert not given_up or (version == 1 and end == 0)
         heard = [message for message in weather.heard[1 - end] if isinstance(message, UnknownMessage)]
-        # Every message is accounted for: delivered, or told to be given up.
+        # Every message is accounted for: delivered, or reported as abandoned.
         assert weather.delivered[end] == [token for token in said[end] if token not in given_up]
-        # What arrives does so once and in the order of sending; of what was given up nobody knows.
+        # What arrives does so once and in the order of sending; of what was abandoned no one knows.
         certain = [message for token, message in said[end].items() if token not in given_up]
         lost = {message.id for token, message in said[end].items() if token in given_up}
         assert [message for message in heard if message.id not in lost] == certain

@@ -63,7 +63,7 @@ async def test_discover_prints_a_valid_configuration() -> None:
             "name": direct.identity.name,
             "serial": direct.identity.serial,
         } in json.loads("\n".join(held.lines))
-        # Nobody was disturbed: no session was begun.
+        # No one was disturbed: no session was begun.
         assert not [entry for drone in simulator.drones for entry in drone.log.find("session")]
 
 

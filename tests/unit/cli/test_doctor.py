@@ -56,7 +56,7 @@ async def command(*arguments: str) -> AsyncIterator[Process]:
 
 @contextlib.asynccontextmanager
 async def device(answers: dict[int, Callable[[], bytes]]) -> AsyncIterator[str]:
-    """TCP servers at one address: each answers whoever connects, and keeps the connection."""
+    """TCP servers at one address: each answers each client that connects, and keeps the connection."""
     address, held = loopback(), []
     servers = []
     for port, answer in answers.items():

@@ -186,7 +186,7 @@ def test_check_for_a_fleet_covers_its_models(flight: Path, tmp_path: Path, capsy
     assert main(["plan", "check", str(flight), "-c", str(fleet)]) == 0
     flies = [line.split(" flies it")[0] for line in capsys.readouterr().out.splitlines() if "flies it" in line]
     assert flies == ["flight.plan: an ANAFI USA", "flight.plan: an ANAFI Ai"]
-    fleet.write_text("drones: [{name: a, sysid: 1, address: 192.168.42.1}]")  # whose model nobody knows
+    fleet.write_text("drones: [{name: a, sysid: 1, address: 192.168.42.1}]")  # whose model no one knows
     assert main(["plan", "check", str(flight), "-c", str(fleet)]) == 0
     assert capsys.readouterr().out.count(" flies it") == 4
 

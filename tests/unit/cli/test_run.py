@@ -82,7 +82,7 @@ async def under_way(folder: Path) -> AsyncIterator[tuple[Product, Client, str, s
 
 
 def left_hovering(p: Product) -> None:
-    """Before the link ended the drone was told to stop, and it did."""
+    """Before the link ended the drone was commanded to stop, and it did."""
     (end,) = (entry for entry in p.entries("session") if entry["name"] == "lost")
     (move,) = p.entries("command", "Piloting.moveTo")
     after = [entry for entry in p.entries("command") if entry["t"] > move["t"]]
@@ -166,20 +166,20 @@ def test_run_without_configuration_flies_the_default_fleet() -> None:
 
 
 async def test_run_prints_each_drone_and_endpoint_before_ready(tmp_path: Path) -> None:
-    address, first, second, nobody = loopback(), loopback(), loopback(), loopback()
+    address, first, second, absent = loopback(), loopback(), loopback(), loopback()
     port = free_udp_port(address)
     config = f"""
         endpoints: ["tcpin://{address}:5760", "udpout://{address}:{port}"]
         drones:
           - {{name: alpha, sysid: 1, sim: {{address: {first}}}}}
           - {{name: bravo, sysid: 245, sim: {{address: {second}}}}}
-          - {{name: charlie, sysid: 3, address: {nobody}}}
+          - {{name: charlie, sysid: 3, address: {absent}}}
     """
     async with product(tmp_path, config) as p:
         alpha, bravo, charlie, tcp, udp, video, page, ready = p.lines
         assert alpha.startswith(f"drone alpha: system 1 at {first}: ANAFI 4K PI04")
         assert bravo.startswith(f"drone bravo: system 245 at {second}: ANAFI 4K PI04")
-        assert charlie.startswith(f"drone charlie: system 3 at {nobody}: not connected (")
+        assert charlie.startswith(f"drone charlie: system 3 at {absent}: not connected (")
         assert charlie.endswith("), retrying")
         assert tcp == f"endpoint tcpin://{address}:5760: 0 clients"
         assert udp == f"endpoint udpout://{address}:{port}"
@@ -335,8 +335,8 @@ async def test_killed_simulator_is_reported_and_survived(tmp_path: Path) -> None
         os.kill(child, signal.SIGKILL)
         await gone(child)
         deadline = time.monotonic() + 10.0
-        told = "anafi-mav: the simulator ended by signal 9; with it went alpha"
-        while told not in p.complaints:
+        observed = "anafi-mav: the simulator ended by signal 9; with it went alpha"
+        while observed not in p.complaints:
             assert time.monotonic() < deadline, p
             await asyncio.sleep(0.02)  # stderr is read by another task
         p.process.send_signal(signal.SIGINT)

@@ -81,7 +81,7 @@ async def refused(*words: str) -> str:
 
 
 async def discover(address: str) -> dict[str, Any]:
-    """What a drone tells whoever connects to its discovery port."""
+    """What a drone sends each client that connects to its discovery port."""
     reader, writer = await asyncio.open_connection(address, handshake.DISCOVERY_PORT)
     text = await asyncio.wait_for(reader.readuntil(b"\0"), LIMIT)
     writer.close()

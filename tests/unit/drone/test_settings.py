@@ -120,7 +120,7 @@ VERBS: list[tuple[Callable[[Drone], Awaitable[Any]], Message, Message, Any]] = [
 
 @pytest.fixture
 def settings() -> list[Message]:
-    """What the device tells of its settings at the start."""
+    """Settings that the device reports at the start."""
     return [*SETTINGS, *REPORTED]
 
 
@@ -180,10 +180,10 @@ async def test_hand_launch(device: ScriptedDevice, drone: Drone) -> None:
     await asyncio.sleep(0)
     device.say(ardrone3.UserTakeoffReady())
     await ready
-    told = [drone.piloting.state.ready_for_hand_launch]
+    observed = [drone.piloting.state.ready_for_hand_launch]
     await drone.piloting.cancel_hand_launch()
-    told.append(drone.piloting.state.ready_for_hand_launch)
-    assert told == [True, False]
+    observed.append(drone.piloting.state.ready_for_hand_launch)
+    assert observed == [True, False]
     await drone.piloting.cancel_hand_launch()
     assert [m.state for m in device.got(ardrone3.UserTakeOff)] == [1, 0]
 

@@ -174,7 +174,7 @@ async def test_stop_ends_a_move_by_and_a_return(drone: Drone, real: SimulatedDro
 
 @asynccontextmanager
 async def held(drone: Drone, command: PilotingCommand) -> AsyncIterator[None]:
-    """Somebody holds the sticks: a deflection has to be renewed."""
+    """A person holds the sticks: a deflection has to be renewed."""
 
     async def renew() -> None:
         while True:
@@ -284,7 +284,7 @@ async def test_the_link_is_lost_in_silence_and_found_again(drone: Drone, real: S
     # Half a second more than the silence of 2.5 s. However late the machine is, it runs its timers in their order.
     await asyncio.wait([lost], timeout=3.0)
     for _ in range(5):
-        await asyncio.sleep(0)  # what the timer has set off takes some turns of the loop to be told
+        await asyncio.sleep(0)  # what the timer has set off takes some event-loop iterations to be reported
     assert lost.done()
     assert "nothing received for" in lost.result()
     assert drone.fading

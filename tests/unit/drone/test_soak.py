@@ -1,4 +1,4 @@
-"""Whatever was begun, given up or replaced, in whatever air: once `stop` has returned, nothing moves and nothing comes.
+"""Whatever was begun, aborted or replaced, in whatever air: once `stop` has returned, nothing moves and nothing comes.
 
 The commands that begin something are drawn from a seed, and so is the weather; the simulated drone's own log is the
 judge.
@@ -22,7 +22,7 @@ from anafi_mav.sim.world.faults import Impairment
 ROUNDS = 8
 
 STALE = 0.7
-"""s in which what was taken back would have come: several retransmissions, and whatever the air held back."""
+"""s in which what was withdrawn would have come: several retransmissions, and whatever the air held back."""
 
 BEGIN = {
     "moveTo",

@@ -1,4 +1,4 @@
-"""The messages of our own: their ids collide with nobody's, their wire format stays, their numbers are Parrot's."""
+"""The messages of our own: their ids collide with no one's, their wire format stays, their numbers are Parrot's."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def test_generated_message_has_the_specified_checksum(id: int) -> None:
     ],
 )
 def test_the_wire_format_is_frozen(id: int, crc_extra: int, length: int) -> None:
-    """Whoever changes a published message breaks every client that knows it: take a new id instead."""
+    """A person who changes a published message breaks every client that knows it: take a new id instead."""
     assert _extra(OURS[id]) == (crc_extra, length)
 
 

@@ -265,7 +265,7 @@ def test_signed_frame_is_parsed_and_forwarded_with_signature() -> None:
 
 
 def unknown(sysid: int, compid: int) -> bytes:
-    """A frame whose message id 0x0FFFFF nobody has defined."""
+    """A frame whose message id 0x0FFFFF no one has defined."""
     return bytes((0xFD, 3, 0, 0, 5, sysid, compid, 0xFF, 0xFF, 0x0F)) + b"abc" + b"\x12\x34"
 
 

@@ -33,7 +33,7 @@ LISTENER = 200
 
 
 class Bench:
-    """A node and what it told its owner."""
+    """A node and what it reported to its owner."""
 
     def __init__(self) -> None:
         self.inbound: list[Inbound] = []
@@ -115,7 +115,7 @@ async def test_a_message_with_a_target_goes_there_alone() -> None:
         await thirty.wait("PING", since=0)
         thirty.send(ping(10, 0, 2))
         await ten.wait("PING", since=0)
-        ten.send(ping(99, 1, 3))  # nobody's
+        ten.send(ping(99, 1, 3))  # no one's
         ten.send(ping(0, 0, 4))
         await twenty.wait("PING", since=0)
         await thirty.wait("PING", lambda message: message.seq == 4, since=0)
@@ -155,7 +155,7 @@ async def test_message_for_our_system_is_not_forwarded() -> None:
         answer = await ten.wait("PING", since=0)
         assert (answer.seq, answer.get_srcSystem()) == (9, 1)
         d.node.remove_hosts(1)
-        ten.send(ping(1, 1, 2))  # its drone is away: nobody's now
+        ten.send(ping(1, 1, 2))  # its drone is away: no one's now
         ten.send(ping(0, 0, 3))
         await twenty.wait("PING", since=0)
         await thirty.wait("PING", since=0)
@@ -189,7 +189,7 @@ COMMAND_ACK without its trailing zeros."""
 
 
 def newest(frames: list[ReceivedFrame]) -> int:
-    """The time that the last frame tells."""
+    """The time of the last frame."""
     time: int = frames[-1].message.time_boot_ms
     return time
 

@@ -36,7 +36,7 @@ def file_request(opcode: int) -> Any:
         (LIST, (255, 190)),
     ],
 )
-def test_observer_tells_other_clients_nothing_false(message: Any, source: tuple[int, int]) -> None:
+def test_observer_sends_other_clients_nothing_false(message: Any, source: tuple[int, int]) -> None:
     party = Party()
     party.send("drone", DRONE, (FOREIGN, 1))
     party.send("pilot", STATION, (255, 190))

@@ -60,7 +60,7 @@ class Station:
 def run(transfer: Upload | Download, plans: Any, **trouble: Any) -> Wire:
     station = Station(transfer)
     wire = Wire(plans, [station], **trouble)  # type: ignore[list-item]
-    wire.to_desk(station, station.start())  # type: ignore[arg-type]
+    wire.to_protocol(station, station.start())  # type: ignore[arg-type]
     wire.run()
     return wire
 

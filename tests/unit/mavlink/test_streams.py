@@ -114,7 +114,7 @@ def test_due_on_recomputes_each_channel_after_a_change() -> None:
     channels = [one]
     assert due_on(streams, channels, 0.0) == [one]
     assert due_on(streams, channels, 0.01) == []
-    streams.set(one, ATTITUDE, 0.5)  # begins anew, whatever was left of the old interval
+    streams.set(one, ATTITUDE, 0.5)  # begins again, whatever was left of the old interval
     assert due_on(streams, channels, 0.02) == [one]
     streams.set(one, ATTITUDE, 0.5)  # said again: nothing is new about that
     assert due_on(streams, channels, 0.2) == []

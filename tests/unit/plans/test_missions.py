@@ -83,8 +83,8 @@ def test_converted_sample_differs_by_its_listed_losses_only(path: Path, form: Fo
     version: parrot.Version = 1 if form is Format.PARROT_1 else 2
     again = files.parse(data, path.name, version)
     of_plan = said(losses, None)
-    told = {"home": "home", "fence": "the fence", "rally": "rally point", "speeds": "speeds"}
-    assert differences(plan, again) == {name for name, words in told.items() if words in of_plan}
+    observed = {"home": "home", "fence": "the fence", "rally": "rally point", "speeds": "speeds"}
+    assert differences(plan, again) == {name for name, words in observed.items() if words in of_plan}
     assert again.blocks == ()
     left = list(again.items)
     for number, item in enumerate(plan.items):
@@ -177,7 +177,7 @@ TWINS = [(path, version) for path in SAMPLES if path.stem not in GATEWAYS for ve
 
 @pytest.mark.parametrize(("path", "version"), TWINS, ids=lambda value: getattr(value, "stem", None))
 def test_a_samples_twin_is_current(path: Path, version: parrot.Version, tmp_path: Path) -> None:
-    """Made anew by the command that made it (missions/README.md); the drone's own reader takes it as it is meant."""
+    """Made again by the command that made it (missions/README.md); the drone's own reader takes it as it is meant."""
     kept, made = path.with_name(f"{path.stem}.v{version}.mavlink"), tmp_path / "twin.mavlink"
     model = "4k" if version == 1 else "ai"
     assert main(["plan", "convert", str(path), str(made), "--model", model]) == 0
@@ -195,7 +195,7 @@ def test_a_samples_twin_is_current(path: Path, version: parrot.Version, tmp_path
 
 @pytest.mark.parametrize(("path", "version"), TWINS, ids=lambda value: getattr(value, "stem", None))
 def test_parrot_export_of_a_sample_survives_rewriting(path: Path, version: parrot.Version) -> None:
-    """Through Parrot's file, QGroundControl's and Parrot's again, as often as somebody converts it."""
+    """Through Parrot's file, QGroundControl's and Parrot's again, as often as a person converts it."""
     kept = path.with_name(f"{path.stem}.v{version}.mavlink").read_bytes()
     plan = files.parse(kept, path.name, version)
     for _ in range(3):

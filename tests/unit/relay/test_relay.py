@@ -1,4 +1,4 @@
-"""The relay on real sockets, before a video server of ours that does what a test tells it."""
+"""The relay on real sockets, before a video server of ours that does what a test commands."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ async def test_drone_has_one_session_for_all_viewers(monkeypatch: pytest.MonkeyP
         assert held.server.methods().count("PLAY") == 2
 
 
-async def test_two_drones_with_one_address_are_told_apart() -> None:
+async def test_two_drones_with_one_address_are_distinguished() -> None:
     async with studio() as held, AsyncExitStack() as stack:
         server = await stack.enter_async_context(VideoServer())
         device = await stack.enter_async_context(ScriptedDevice())

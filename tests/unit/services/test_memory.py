@@ -229,7 +229,7 @@ async def test_unreadable_memory_file_is_not_replaced(tmp_path: Path) -> None:
     assert line is not None
     assert "new ones not kept" in line
     memory.put(1, ITEMS)
-    assert await memory.save() == memory.problem == line  # whoever uploads is notified each time
+    assert await memory.save() == memory.problem == line  # the client that uploads is notified each time
     assert await memory.load(SERIAL) is None
     assert memory.plans[1] == ITEMS  # and has it until the gateway ends, also after a loss of the link
     assert (tmp_path / f"{SERIAL}.json").is_dir()
@@ -238,7 +238,7 @@ async def test_unreadable_memory_file_is_not_replaced(tmp_path: Path) -> None:
 async def test_uncreatable_folder_is_reported(tmp_path: Path) -> None:
     memory = Memory(tmp_path / "state")
     assert await memory.load(SERIAL) is None
-    (tmp_path / "state").write_text("")  # somebody else's file
+    (tmp_path / "state").write_text("")  # another program's file
     memory.put(1, ITEMS)
     line = await memory.save()
     assert line is not None

@@ -16,7 +16,7 @@ from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 
 
 class Heard:
-    """What a controller was told, and when."""
+    """What a controller received, and when."""
 
     def __init__(self) -> None:
         self.messages: list[Message | UnknownMessage] = []

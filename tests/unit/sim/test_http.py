@@ -109,9 +109,9 @@ async def test_files_are_what_the_list_says(site: Site) -> None:
             async with site.client.get(resource["url"]) as answer:
                 data = await answer.read()
                 assert int(answer.headers["Content-Length"]) == resource["size"] == len(data)
-            status, told = await site.ask("GET", f"{API}/media/md5/{resource['resource_id']}")
-            assert (status, told["media_id"]) == (200, media.id)
-            assert told["md5"] == hashlib.md5(data).hexdigest()
+            status, observed = await site.ask("GET", f"{API}/media/md5/{resource['resource_id']}")
+            assert (status, observed["media_id"]) == (200, media.id)
+            assert observed["md5"] == hashlib.md5(data).hexdigest()
             status, thumbnail = await site.ask("GET", resource["thumbnail"])
             assert (status, thumbnail[:2]) == (200, b"\xff\xd8")
 
@@ -178,12 +178,12 @@ async def test_media_changes_reach_every_websocket(site: Site) -> None:
         site.media.add(burst, files)
         await site.ask("DELETE", f"{API}/media/medias")
         for listener in (one, two):
-            told = [await listener.receive_json(timeout=5.0) for _ in range(3)]
-            assert [event["name"] for event in told] == ["media_created", "resource_created", "all_media_removed"]
-            assert told[0]["data"]["media"]["media_id"] == burst.id
-            assert [file["resource_id"] for file in told[0]["data"]["media"]["resources"]] == [files[0].id]
-            assert told[1]["data"]["resource"]["resource_id"] == files[1].id
-            assert told[2]["data"] == {}
+            observed = [await listener.receive_json(timeout=5.0) for _ in range(3)]
+            assert [event["name"] for event in observed] == ["media_created", "resource_created", "all_media_removed"]
+            assert observed[0]["data"]["media"]["media_id"] == burst.id
+            assert [file["resource_id"] for file in observed[0]["data"]["media"]["resources"]] == [files[0].id]
+            assert observed[1]["data"]["resource"]["resource_id"] == files[1].id
+            assert observed[2]["data"] == {}
 
 
 async def test_websocket_that_does_not_read_is_closed(site: Site) -> None:
@@ -215,8 +215,8 @@ async def test_a_plan_is_kept(site: Site) -> None:
     assert status == 200
     assert site.plans.get(uid) == PLAN
     assert await site.ask("GET", f"{API}/upload/flightplans") == (200, [{"uid": uid, "date": DATE}])
-    status, told = await site.ask("GET", f"{API}/upload/flightplan/{uid}")
-    assert (status, told["uid"]) == (200, uid)
+    status, observed = await site.ask("GET", f"{API}/upload/flightplan/{uid}")
+    assert (status, observed["uid"]) == (200, uid)
     assert (await site.ask("DELETE", f"{API}/upload/flightplan/{uid}"))[0] == 200
     assert (await site.ask("DELETE", f"{API}/upload/flightplan/{uid}"))[0] == 404
     assert await site.ask("GET", f"{API}/upload/flightplans") == (200, [])
@@ -233,9 +233,9 @@ async def test_a_plan_is_kept(site: Site) -> None:
     ],
 )
 async def test_upload_of_an_invalid_plan_is_refused(site: Site, data: bytes, status: int, words: str) -> None:
-    got, told = await site.ask("PUT", f"{API}/upload/flightplan", data=data)
+    got, observed = await site.ask("PUT", f"{API}/upload/flightplan", data=data)
     assert got == status
-    assert words in told["error"]
+    assert words in observed["error"]
     assert site.plans.list() == ()
 
 

@@ -81,4 +81,4 @@ async def test_wait_looks_back_and_forward() -> None:
     assert (await waiting).t == 3.0
     with pytest.raises(CommandTimeout):
         await log.wait(lambda entry: entry.name == "c", 0.01)
-    log.add(5.0, "state", "c", {})  # nobody waits for it any more
+    log.add(5.0, "state", "c", {})  # no one waits for it any more

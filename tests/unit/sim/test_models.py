@@ -1,4 +1,4 @@
-"""The four simulated models: the table of the paper as data, what each tells at the connection, the Ai's services."""
+"""The four simulated models: the table of the paper as data, what each reports at the connection, the Ai's services."""
 
 from __future__ import annotations
 
@@ -67,13 +67,13 @@ def test_states_at_connection_are_those_of_the_model(name: str) -> None:
     states, settings = all_states(firmware), all_settings(firmware)
     for message in states + settings:
         assert decode(encode(message)) is not None
-    told = features(states)
+    observed = features(states)
     old = {"camera", "user_storage"}
     new = {"user_storage_v2", "obstacle_avoidance", "move", "poi", "flight_plan"}
-    assert old & told == (set() if name == "ai" else old)
-    assert new & told == (new if name == "ai" else set())
-    assert ("thermal" in told) == (name in ("thermal", "usa"))
-    assert {"gimbal", "battery", "rth", "mediastore", "alarms"} <= told
+    assert old & observed == (set() if name == "ai" else old)
+    assert new & observed == (new if name == "ai" else set())
+    assert ("thermal" in observed) == (name in ("thermal", "usa"))
+    assert {"gimbal", "battery", "rth", "mediastore", "alarms"} <= observed
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -134,9 +134,9 @@ QUESTIONS: list[tuple[Message, type[Message]]] = [
 
 @pytest.mark.parametrize(("question", "answer"), QUESTIONS)
 def test_a_question_is_answered(question: Message, answer: type[Message]) -> None:
-    (told,) = Bench("ai").send(question)
-    assert type(told) is answer
-    assert decode(encode(told)) == told
+    (observed,) = Bench("ai").send(question)
+    assert type(observed) is answer
+    assert decode(encode(observed)) == observed
     assert Bench("usa").send(question) == []
 
 

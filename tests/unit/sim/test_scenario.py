@@ -19,7 +19,7 @@ from anafi_mav.sim.world.wind import CALM, WindSpec
 
 
 class World:
-    """Drones that nobody started: time goes by when the test says so."""
+    """Drones that no one started: time goes by when the test says so."""
 
     def __init__(self, text: str, drones: int = 1) -> None:
         specs = [DroneSpec(address=f"127.0.42.{n + 1}") for n in range(drones)]
@@ -44,8 +44,8 @@ async def test_at_a_time_and_for_a_while() -> None:
     assert not world.drone.faults.gps
     world.run(0.2)
     assert world.drone.faults.gps
-    told = [entry.args for entry in world.drone.log.find("scenario", "step")]
-    assert told == [{"step": 0, "ends": False}, {"step": 0, "ends": True}]
+    observed = [entry.args for entry in world.drone.log.find("scenario", "step")]
+    assert observed == [{"step": 0, "ends": False}, {"step": 0, "ends": True}]
 
 
 async def test_when_a_state_is_reached() -> None:

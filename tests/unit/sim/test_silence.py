@@ -11,21 +11,21 @@ from support.silent_commands import CONTROLLERS, DRONES, reason
 def test_commands_unanswered_by_a_drone_equal_the_list(model: str) -> None:
     silent = unanswered(model)
     assert {name for name in silent if reason(name, model, DRONES) is None} == set(), "silence without a reason"
-    told = {
+    observed = {
         command.NAME
         for command in COMMANDS
         if not command.NAME.startswith(OF_A_CONTROLLER) and reason(command.NAME, model, DRONES) is not None
     }
-    assert told - silent == set(), "the table says that it is silent, and it is not"
+    assert observed - silent == set(), "the table says that it is silent, and it is not"
 
 
 @pytest.mark.parametrize("generation", [3, 4])
 def test_commands_unanswered_by_a_skycontroller_equal_the_list(generation: int) -> None:
     silent = unanswered_by_controller(generation)
     assert {name for name in silent if reason(name, str(generation), CONTROLLERS) is None} == set()
-    told = {
+    observed = {
         command.NAME
         for command in COMMANDS
         if command.NAME.startswith(OF_A_CONTROLLER) and reason(command.NAME, str(generation), CONTROLLERS) is not None
     }
-    assert told - silent == set()
+    assert observed - silent == set()

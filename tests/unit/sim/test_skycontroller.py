@@ -64,7 +64,7 @@ class Station:
         return await self.wait(answer, since=mark)
 
     def commands(self, name: str) -> list[dict[str, Any]]:
-        """What the drone was told."""
+        """What the drone was commanded."""
         return [entry.args for entry in self.drone.log if entry.kind == "command" and entry.name.endswith(name)]
 
 
@@ -146,8 +146,8 @@ async def test_the_sticks_fly_until_the_source_is_the_controller() -> None:
             "flag": 1, "roll": 40, "pitch": 0, "yaw": -20, "gaz": 0,
         }  # fmt: skip
 
-        told = await station.ask(skyctrl.SetPilotingSource(Source.CONTROLLER), skyctrl.PilotingSource)
-        assert told.source is Source.CONTROLLER
+        observed = await station.ask(skyctrl.SetPilotingSource(Source.CONTROLLER), skyctrl.PilotingSource)
+        assert observed.source is Source.CONTROLLER
         count = len(station.commands("PCMD"))
         station.session.send(forward)
         await station.drone.wait_log(lambda entry: is_stick(entry) and entry.args["pitch"] == 30)

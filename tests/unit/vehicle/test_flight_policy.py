@@ -10,7 +10,7 @@ import pytest
 from anafi_mav import texts
 from anafi_mav.services.command.orbit_service import OrbitService
 from anafi_mav.vehicle.base.control import Control, Request
-from anafi_mav.vehicle.base.flight_task import DISARM, HAND_LAUNCH, LAND, MAINTENANCE, MOTOR_CUT, FlightTask, Hover
+from anafi_mav.vehicle.base.flight_task import DISARM, HAND_LAUNCH, LAND, MOTOR_CUT, FlightTask, Hover, maintenance
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import By, Source
@@ -67,7 +67,9 @@ def test_hand_launch_is_refused_in_pilot() -> None:
     assert refusal.text == "Arming refused: pilot flies, ANF_SC_OFFBOARD 0"
 
 
-@pytest.mark.parametrize("task", [LAND, DISARM, MOTOR_CUT, MAINTENANCE, Hover(), Hover(FlightMode.GUIDED)])
+@pytest.mark.parametrize(
+    "task", [LAND, DISARM, MOTOR_CUT, maintenance(texts.CALIBRATION), Hover(), Hover(FlightMode.GUIDED)]
+)
 def test_stop_is_never_refused(task: FlightTask) -> None:
     assert [refusal_of(state, request(task)) for state in State] == [None] * 3
 

@@ -69,7 +69,7 @@ def test_velocity_of_a_target_without_velocity_is_estimated() -> None:
 
 
 def test_repeated_target_position_keeps_the_estimated_velocity() -> None:
-    """MAVSDK repeats the last one each second, right before its user tells the next."""
+    """MAVSDK repeats the last one each second, right before its user reports the next."""
     follower = TargetFollower(FollowSettings(responsiveness=0.0))
     for second in range(8):
         follower.see(1.5 * second, 0.0, None, None, float(second))

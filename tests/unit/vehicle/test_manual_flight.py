@@ -83,7 +83,7 @@ def test_override_changes_only_the_set_channels() -> None:
     assert after(first, override(0, 1300, 0xFFFF, 0xFFFF)).sticks == Sticks(forward=0.4)
     assert after(first, override(0, 0xFFFF, 0xFFFF, 0xFFFF)).released
     assert after(override()).released
-    assert after(override(0, 0, 0, 0, 1500, 1500)).released  # other channels are nobody's sticks
+    assert after(override(0, 0, 0, 0, 1500, 1500)).released  # other channels are no one's sticks
 
 
 @pytest.mark.parametrize("value", [1, 799, 2201, 65534])

@@ -324,7 +324,7 @@ def test_names_and_queues() -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "3412 1a00 05000000  d201 02 08 02",  # a service nobody knows
+        "3412 1a00 05000000  d201 02 08 02",  # a service no one knows
         "e6b2 fff0 05000000  d201 02 08 02",  # a number it does not have
         "e6b2 1a00 00000000",  # no message inside
         "e6b2 1a00 05000000  ca01 02 08 02",  # another one inside

@@ -134,7 +134,7 @@ async def test_our_own_wrong_versions_raise() -> None:
 
 @contextlib.asynccontextmanager
 async def answering(text: bytes | None) -> AsyncIterator[int]:
-    """A TCP port on which somebody says this to everyone; None: nothing, and hangs up."""
+    """A TCP port that sends this to every client; None: nothing, and hangs up."""
 
     async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if text is not None:

@@ -35,7 +35,7 @@ HOVERING = ardrone3.FlyingStateChanged(ardrone3.FlyingState.HOVERING)
 
 
 def tilt(value: float) -> ardrone3.MaxTilt:
-    """An acknowledged command that tells which one it is."""
+    """An acknowledged command with its number."""
     return ardrone3.MaxTilt(value)
 
 
@@ -154,7 +154,7 @@ def test_emergency_does_not_cut_a_split_command() -> None:
         (FrameType.NOACK, 3, [20], 25, True),  # frames were lost
         (FrameType.NOACK, 3, [20], 20, False),  # a repetition
         (FrameType.NOACK, 3, [20], 10, False),  # ten below: late
-        (FrameType.NOACK, 3, [20], 9, True),  # eleven below: the peer began anew
+        (FrameType.NOACK, 3, [20], 9, True),  # eleven below: the peer began again
         (FrameType.NOACK, 3, [100, 65530], 2, True),  # wrapped
         (FrameType.NOACK, 1, [], 0, True),
         (FrameType.NOACK, 1, [100, 250], 3, True),

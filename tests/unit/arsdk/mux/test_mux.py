@@ -225,7 +225,7 @@ async def test_garbage_at_the_port_ends_nothing() -> None:
 
 
 class Echo(asyncio.DatagramProtocol):
-    """What a Skycontroller's video server is to a socket: sends where it was told to, hears who is aimed at it."""
+    """What a Skycontroller's video server is to a socket: sends to the port it was given, hears who is aimed at it."""
 
     def __init__(self) -> None:
         self.ear: Listener[tuple[bytes, int]] = Listener()

@@ -96,12 +96,12 @@ async def test_a_photo_panorama_is_in_the_store() -> None:
 
 @pytest.fixture
 def states() -> list[Message]:
-    """What the device tells at the start."""
+    """What the device reports at the start."""
     return [
         *STATES,
         animation.Availability(1 << Type.VERTIGO | 1 << Type.DRONIE),
         animation.State(Type.NONE, 0),
-        # One mode, two figures, as an Ai tells it.
+        # One mode, two figures, as an Ai reports it.
         animation.Capabilities(Mode.MANUAL, 1 << Type.VERTIGO | 1 << Type.CANDLE | 1 << Type.DRONIE, 3),
         animation.Info(Type.VERTIGO, 0, 1),
         animation.Info(Type.CANDLE, 1 << Indicator.DRONE_GPS | 1 << Indicator.DRONE_BATTERY, 2),

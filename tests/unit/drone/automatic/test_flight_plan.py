@@ -51,12 +51,12 @@ async def test_a_plan_is_uploaded_flown_paused_and_stopped(pair: Pair) -> None:
     await drone.expect(common.MissionItemExecuted, lambda m: m.idx == 1, 20.0)
     assert drone.flight_plan.state.item == 1
     await drone.flight_plan.pause()
-    told = [drone.flight_plan.state.playing]
+    observed = [drone.flight_plan.state.playing]
     await drone.flight_plan.start(uid)
     assert drone.flight_plan.state.item == 1
     await drone.flight_plan.stop()
-    told.append(drone.flight_plan.state.playing)
-    assert told == [PlayingState.PAUSED, PlayingState.STOPPED]
+    observed.append(drone.flight_plan.state.playing)
+    assert observed == [PlayingState.PAUSED, PlayingState.STOPPED]
     assert await drone.flight_plan.delete(uid)
     assert not await drone.flight_plan.delete(uid)
     with pytest.raises(CommandRejected, match="404"):
@@ -113,7 +113,7 @@ async def test_return_on_disconnect() -> None:
 
 @pytest.fixture
 def states() -> list[Message]:
-    """What the device tells at the start."""
+    """What the device reports at the start."""
     return [
         *STATES,
         common.MavlinkFilePlayingStateChanged(PlayingState.STOPPED, "", MavlinkType.FLIGHT_PLAN),

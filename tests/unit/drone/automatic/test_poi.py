@@ -22,7 +22,7 @@ PLACE = (48.8795, 2.3680, 3.0)
 
 @pytest.fixture
 def states() -> list[Message]:
-    """What the device tells at the start."""
+    """What the device reports at the start."""
     return [
         *STATES,
         ardrone3.PilotedPOIV2(500.0, 500.0, 500.0, PoiMode.LOCKED_GIMBAL, PoiStatus.AVAILABLE),
@@ -71,7 +71,7 @@ async def test_follow_me(device: ScriptedDevice, drone: Drone) -> None:
     with pytest.raises(LocalProtocolError):
         await drone.follow_me.start(follow_me.Mode.NONE)
     assert drone.follow_me.state.improvements == {follow_me.Mode.LOOK_AT: frozenset()}
-    # It has taken the mode and waits for what it lacks: that is no success, and is taken back.
+    # It has taken the mode and waits for what it lacks: that is no success, and is withdrawn.
     device.script[follow_me.Start] = lambda m: [
         follow_me.State(m.mode, follow_me.Behavior.IDLE, follow_me.Animation.NONE, 0)
     ]
@@ -99,10 +99,10 @@ async def test_follow_me(device: ScriptedDevice, drone: Drone) -> None:
 
 async def test_follow_target_is_sent(device: ScriptedDevice, drone: Drone) -> None:
     drone.follow_me.tell_target(Position(48.0, 2.0, 40.0), (1.0, 2.0, -0.5), 3.0)
-    told = await device.until(controller_info.Gps)
-    assert (told.latitude, told.longitude, told.altitude) == (48.0, 2.0, 40.0)
-    assert (told.north_speed, told.east_speed, told.down_speed) == (1.0, 2.0, -0.5)
-    assert (told.horizontal_accuracy, told.vertical_accuracy) == (3.0, 3.0)
+    observed = await device.until(controller_info.Gps)
+    assert (observed.latitude, observed.longitude, observed.altitude) == (48.0, 2.0, 40.0)
+    assert (observed.north_speed, observed.east_speed, observed.down_speed) == (1.0, 2.0, -0.5)
+    assert (observed.horizontal_accuracy, observed.vertical_accuracy) == (3.0, 3.0)
     with pytest.raises(LocalProtocolError):
         drone.follow_me.tell_target(Position(48.0, 2.0, math.nan))
 
@@ -110,10 +110,10 @@ async def test_follow_target_is_sent(device: ScriptedDevice, drone: Drone) -> No
 async def test_the_beep() -> None:
     async with connected("4k") as (drone, _):
         await drone.sound.start()
-        told = [drone.sound.state.playing]
+        observed = [drone.sound.state.playing]
         await drone.sound.stop()
-        told.append(drone.sound.state.playing)
-        assert told == [True, False]
+        observed.append(drone.sound.state.playing)
+        assert observed == [True, False]
 
 
 async def test_the_magnetometer() -> None:

@@ -95,8 +95,8 @@ class Crew:
         """Pitch of each PCMD that reached the drone."""
         return [entry.args["pitch"] for entry in self.real.log.find("command", since=since) if "PCMD" in entry.name]
 
-    def told(self, name: str) -> list[LogEntry]:
-        """What the controller itself was told."""
+    def observed(self, name: str) -> list[LogEntry]:
+        """Commands that the controller itself received."""
         return [entry for entry in self.real.log.find("controller") if entry.name.endswith(name)]
 
 
@@ -144,8 +144,8 @@ async def test_connecting_and_taking_off_leaves_sticks_to_the_pilot(crew: Crew) 
     await crew.take_off()
     crew.drone.piloting.hover()
     await crew.drone.piloting.return_home()
-    assert crew.told("setPilotingSource") == []
-    assert crew.told("grab") == []
+    assert crew.observed("setPilotingSource") == []
+    assert crew.observed("grab") == []
     crew.sc.stick(PITCH, 50)
     await crew.until(lambda entry: entry.kind == "command" and "PCMD" in entry.name)
     assert crew.sc.dropped == 0  # no stick position of ours, level or not
@@ -164,7 +164,7 @@ async def test_setpoint_acquires_the_source_and_silence_releases_it(crew: Crew) 
     await crew.sees(lambda: crew.sc.source is Source.SKY_CONTROLLER)
     assert now() - quiet < 1.3  # the sticks hold for 0.5 s, then it is quiet for 0.5 s
     await crew.grabbed(0)
-    assert [entry.args["axes"] for entry in crew.told("grab")] == [STICKS, 0]
+    assert [entry.args["axes"] for entry in crew.observed("grab")] == [STICKS, 0]
 
 
 async def test_pilots_stick_acquires_the_drone_immediately(crew: Crew) -> None:
@@ -240,8 +240,8 @@ async def test_the_end_of_the_program_gives_everything_back(crew: Crew) -> None:
         mark = now()
         await crew.drone.close()
     await crew.sees(lambda: crew.sc.source is Source.SKY_CONTROLLER, 1.0)
-    # It was told so, and did not find it out by itself.
-    assert [entry.args for entry in crew.told("setPilotingSource") if entry.t >= mark] == [
+    # It received a report, and did not find it out by itself.
+    assert [entry.args for entry in crew.observed("setPilotingSource") if entry.t >= mark] == [
         {"source": Source.SKY_CONTROLLER}
     ]
     assert crew.sc.grabbed_axes == 0
@@ -489,7 +489,7 @@ async def test_controller_acquiring_the_source_ends_a_move() -> None:
         assert drone.controller.pilot_acquired_control
         device.say(ended(move))
         assert await asyncio.wait_for(move.result(), 3.0) is MoveEnd.CANCELED
-        # The axes of the sticks are given back too: otherwise nobody would fly.
+        # The axes of the sticks are given back too: otherwise no one would fly.
         await device.until(mapper.Grab, 2)
         assert device.got(mapper.Grab)[-1].axes == 0
         with pytest.raises(CommandRejected, match="the pilot"):

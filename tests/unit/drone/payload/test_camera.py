@@ -171,7 +171,7 @@ OLD: list[Message] = [
 
 @pytest.fixture
 def states() -> list[Message]:
-    """What the device tells at the start."""
+    """What the device reports at the start."""
     return [*STATES, *OLD]
 
 

@@ -45,7 +45,7 @@ REPORTED: list[Message] = [
 
 @pytest.fixture
 def states() -> list[Message]:
-    """What the device tells at the start."""
+    """What the device reports at the start."""
     return [*STATES, *REPORTED]
 
 

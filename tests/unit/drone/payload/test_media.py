@@ -1,4 +1,4 @@
-"""Media: listed, copied, deleted and told of by the simulator; and a web server that talks nonsense."""
+"""Media: listed, copied, deleted and reported by the simulator; and a web server that talks nonsense."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A move that is refused before it is sent: nothing of it stays, no future whose error nobody retrieves."""
+"""A move that is refused before it is sent: nothing of it stays, no future whose error no one retrieves."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was called off does not happen, what is said to have ended has ended, and the drone's own will is not fought:
+"""What was cancelled does not happen, what is said to have ended has ended, and the drone's own will is not fought:
 against a device that answers as each test says, and goes deaf when it says so."""
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ OTHERS: list[Message] = [
 
 @pytest.fixture
 def states() -> list[Message]:
-    """What the device tells at the start."""
+    """What the device reports at the start."""
     return [*STATES, *OTHERS]
 
 
@@ -290,7 +290,7 @@ async def test_plan_starting_after_hover_is_stopped(drone: Drone, device: Script
     await device.until(common.Stop)
     device.say(plan(PlayingState.PLAYING))
     await device.until(common.Stop, 2)
-    # Asked for anew it is wanted.
+    # Asked for again it is wanted.
     device.script[common.Start] = lambda _: [plan(PlayingState.PLAYING)]
     await reported(drone, device, plan(PlayingState.STOPPED))
     await drone.flight_plan.start("abc")
@@ -619,7 +619,7 @@ async def test_zero_move_of_hover_confirms_no_newer_move(drone: Drone, device: S
     newer = asyncio.ensure_future(drone.piloting.move_by(2.0, 0.0, 0.0, 0.0))
     await device.until(ardrone3.MoveBy, 4)
     device.say(
-        ardrone3.MoveByEnd(0.4, 0.0, 0.0, 0.0, MoveByError.INTERRUPTED),  # what was given up
+        ardrone3.MoveByEnd(0.4, 0.0, 0.0, 0.0, MoveByError.INTERRUPTED),  # what was abandoned
         ardrone3.MoveByEnd(0.0, 0.0, 0.0, 0.0, MoveByError.OK),  # the zero move
         ardrone3.MoveByEnd(0.0, 0.0, 0.0, 0.0, MoveByError.INTERRUPTED),  # the older
     )

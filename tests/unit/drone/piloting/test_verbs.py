@@ -1057,7 +1057,7 @@ async def test_setting_never_reported_is_unsupported(drone: Drone, device: Scrip
     assert await drone.piloting.set_max_rotation_speed(100.0) == 100.0
 
 
-# -- commands are taken back
+# -- commands are withdrawn
 
 
 @pytest.mark.parametrize("how", ["timeout", "cancel"])

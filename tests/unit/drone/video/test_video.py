@@ -52,11 +52,16 @@ async def test_frame_metadata_is_that_of_the_pictures(profile: int) -> None:
             state = drone.video.state
             assert state.playing
             assert state.frame == frames[-1]
-            told = frames[-1].metadata
-            assert (told.awb_r_gain, told.awb_b_gain, told.exposure_time, told.iso_gain) == (1.5, 2.0, 16.5, 318)
-            assert told.hfov == pytest.approx(1.2043, abs=1e-4)
-            assert told.vfov == pytest.approx(0.7377, abs=1e-4)
-            assert told.wifi == METADATA.wifi
+            observed = frames[-1].metadata
+            assert (observed.awb_r_gain, observed.awb_b_gain, observed.exposure_time, observed.iso_gain) == (
+                1.5,
+                2.0,
+                16.5,
+                318,
+            )
+            assert observed.hfov == pytest.approx(1.2043, abs=1e-4)
+            assert observed.vfov == pytest.approx(0.7377, abs=1e-4)
+            assert observed.wifi == METADATA.wifi
             recent = [frame.arrived for frame in frames if frames[-1].arrived - frame.arrived <= 1.0]
             assert state.rate_hz == pytest.approx((len(recent) - 1) / (recent[-1] - recent[0]))
             # 3000 units of 90 kHz between two, over the wrap of their 32 bits.
@@ -360,7 +365,7 @@ async def test_nothing_of_it_survives_the_link() -> None:
         with pytest.raises(LinkLost):
             async with drone.video.watching():
                 pass
-        # Whoever watches still wants to when the drone is back.
+        # A viewer still wants the video when the drone is back.
         await server.until(lambda: server.playing == 0)
         await drone.connect()
         await drone.video.next_frame(10.0)

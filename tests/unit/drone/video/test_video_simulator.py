@@ -42,7 +42,7 @@ async def test_the_pictures_say_what_the_drone_does(model: str) -> None:
             assert (said.location.latitude, said.location.longitude) == pytest.approx(real.firmware.place(), abs=1e-6)
             if model == "ai":
                 assert said.starfish is not None
-                assert said.wifi is None  # so that an Ai tells no goodput
+                assert said.wifi is None  # so that an Ai reports no goodput
             else:
                 assert said.wifi is not None
                 assert said.wifi.goodput > 0
@@ -100,7 +100,7 @@ async def test_each_camera_has_a_stream_of_its_own(model: str) -> None:
 
 @pytest.mark.parametrize("model", ["4k", "ai"])
 async def test_a_bad_link_costs_pictures_and_not_their_order(model: str) -> None:
-    """The Ai's metadata is spread over the packets of a picture: of what came in part nothing is told."""
+    """The Ai's metadata is spread over the packets of a picture: of what came in part nothing is reported."""
     async with connected(model) as pair, pair.drone.video.watching():
         frames: list[VideoFrame] = []
         pair.drone.video.subscribe(frames.append)

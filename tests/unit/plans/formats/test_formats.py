@@ -455,29 +455,33 @@ def test_any_plan_through_the_waypoint_format(plan: Plan) -> None:
 @settings(max_examples=200, deadline=None)
 @given(plans())
 def test_any_plan_through_parrots_formats(plan: Plan) -> None:
-    """Each item is there again, or told of; of one that is there, each parameter."""
+    """Each item is there again, or reported; of one that is there, each parameter."""
     versions: tuple[parrot.Version, ...] = (1, 2)
     for version in versions:
         data, losses = parrot.write(plan, version)
         again = list(parrot.read(data.decode(), "x", version).items)
         if version == 1:  # the format of photos stands elsewhere
             again = [item for item in again if item.command != parrot.SET_STILL_MODE]
-        told: dict[int, str] = {}
+        observed: dict[int, str] = {}
         for loss in losses:
             if loss.item is not None:
-                told[loss.item] = told.get(loss.item, "") + loss.what
+                observed[loss.item] = observed.get(loss.item, "") + loss.what
         for number, item in enumerate(plan.items):
             if version == 1 and item.command == parrot.SET_STILL_MODE:
                 continue
-            dropped = any(words in told.get(number, "") for words in ("none such", "no place"))
+            dropped = any(words in observed.get(number, "") for words in ("none such", "no place"))
             if dropped:
                 continue
             kept = again.pop(0)
             assert kept.command == item.command
             for place, (before, after) in enumerate(zip(item.params, kept.params, strict=True), 1):
                 same = before == after or (before in (None, 0.0, -1.0) and after in (None, 0.0))
-                assert same or f"param{place} of" in told[number] or "heading" in told[number], (place, item, kept)
-            assert item.autocontinue or "continued" in told[number]
+                assert same or f"param{place} of" in observed[number] or "heading" in observed[number], (
+                    place,
+                    item,
+                    kept,
+                )
+            assert item.autocontinue or "continued" in observed[number]
         assert again == []
 
 

@@ -26,7 +26,7 @@ def found(*items: Item, model: str = "4k", limits: FlightLimits | None = None, *
     return check(Plan(tuple(items), **{"home": HOME, **more}), MODELS[model], limits)  # type: ignore[arg-type]
 
 
-def told(findings: Findings, severity: FindingSeverity = FindingSeverity.ERROR) -> list[str]:
+def observed(findings: Findings, severity: FindingSeverity = FindingSeverity.ERROR) -> list[str]:
     return [str(problem) for problem in findings.problems if problem.severity is severity]
 
 
@@ -53,34 +53,34 @@ def test_planner_speed_counts_without_a_mission_speed() -> None:
 
 def test_check_names_each_item_that_cannot_fly() -> None:
     findings = found(UP, action(mav_enums.MAV_CMD_DO_SET_SERVO, 1.0), waypoint(1, 0, frame=10))
-    assert told(findings) == [
+    assert observed(findings) == [
         "item 1: DO_SET_SERVO: the drone has no actuator that a flight plan could move",
         "item 2: NAV_WAYPOINT: heights above terrain are unsupported",
     ]
     assert findings.errors
     assert (findings.distance, findings.seconds) == (None, None)
-    assert told(found()) == ["it has no mission"]
+    assert observed(found()) == ["it has no mission"]
 
 
 def test_heights() -> None:
     items = (UP, waypoint(1, 0, 120.0), waypoint(2, 0, -3.0), BACK)
-    assert told(found(*items)) == ["item 2: -3 m is below the take-off"]
-    assert told(found(*items, limits=FlightLimits(max_altitude=100.0))) == [
+    assert observed(found(*items)) == ["item 2: -3 m is below the take-off"]
+    assert observed(found(*items, limits=FlightLimits(max_altitude=100.0))) == [
         "item 1: 120 m above take-off is higher than the limit of 100 m",
         "item 2: -3 m is below the take-off",
     ]
-    assert told(found(UP, waypoint(1, 0, 120.0), BACK, home=Point(LAT, LON, 4400.0))) == [
+    assert observed(found(UP, waypoint(1, 0, 120.0), BACK, home=Point(LAT, LON, 4400.0))) == [
         "item 1: 4520 m above the sea is higher than an ANAFI 4K flies"
     ]
-    assert told(found(UP, waypoint(1, 0, 135.0, frame=GLOBAL), BACK, limits=FlightLimits(max_altitude=99.0))) == [
+    assert observed(found(UP, waypoint(1, 0, 135.0, frame=GLOBAL), BACK, limits=FlightLimits(max_altitude=99.0))) == [
         "item 1: 100 m above take-off is higher than the limit of 99 m"
     ]
 
 
 def test_check_without_home_has_no_amsl_heights() -> None:
     findings = found(UP, waypoint(1, 0, 60.0, frame=GLOBAL), BACK, home=None)
-    assert told(findings) == []
-    assert told(findings, FindingSeverity.WARNING) == [
+    assert observed(findings) == []
+    assert observed(findings, FindingSeverity.WARNING) == [
         "item 1: height above mean sea level, but that of the take-off point is unknown: its path cannot be checked"
     ]
 
@@ -88,55 +88,55 @@ def test_check_without_home_has_no_amsl_heights() -> None:
 def test_the_fence() -> None:
     """The circle is 50 m wide; the way to item 2 leads through the forbidden square and ends outside of it."""
     circle = found(UP, waypoint(9, 0), BACK, zones=(FenceCircle(True, (LAT, LON), 50.0),))
-    assert told(circle) == ["item 1: the way there leaves the fence (inclusion circle 0)"]
+    assert observed(circle) == ["item 1: the way there leaves the fence (inclusion circle 0)"]
     square = tuple((LAT + north * 1e-4, LON + east * 1e-4) for north, east in ((4, -1), (4, 1), (6, 1), (6, -1)))
     through = found(UP, waypoint(3, 0), waypoint(7, 0), waypoint(7, 5), BACK, zones=(FencePolygon(False, square),))
-    assert told(through) == ["item 2: the way there leaves the fence (exclusion polygon 0)"]
+    assert observed(through) == ["item 2: the way there leaves the fence (exclusion polygon 0)"]
     outside = found(UP, waypoint(1, 0), BACK, zones=(FenceCircle(True, (LAT + 0.01, LON), 50.0),))
-    assert "it begins outside the fence" in told(outside)
+    assert "it begins outside the fence" in observed(outside)
 
 
 def test_distances() -> None:
-    assert told(found(UP, waypoint(20, 0), BACK, limits=FlightLimits(max_distance=200.0))) == [
+    assert observed(found(UP, waypoint(20, 0), BACK, limits=FlightLimits(max_distance=200.0))) == [
         "item 1: it is 222 m from home, the limit is 200 m"
     ]
-    assert told(found(UP, waypoint(540, 0), BACK))[0] == (
+    assert observed(found(UP, waypoint(540, 0), BACK))[0] == (
         "item 1: it is 6.0 km from home, where no setting lets the drone fly"
     )
     begins_there = found(waypoint(100, 0), BACK)
-    assert told(begins_there) == []
+    assert observed(begins_there) == []
     far_take_off = Item(mav_enums.MAV_CMD_NAV_TAKEOFF, RELATIVE, (0.0, 0.0, 0.0, None, None, None, 0.0))
-    assert "item 1: it is 1112 m from home: the drone may refuse to begin so far away" in told(
+    assert "item 1: it is 1112 m from home: the drone may refuse to begin so far away" in observed(
         found(far_take_off, waypoint(100, 0), BACK), FindingSeverity.WARNING
     )
 
 
 def test_speeds() -> None:
     items = (UP, action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 15.5), waypoint(1, 0), BACK)
-    assert told(found(*items)) == ["item 1: 15.5 m/s is more than the 15 that an ANAFI 4K flies"]
-    assert told(found(*items, model="ai")) == []
+    assert observed(found(*items)) == ["item 1: 15.5 m/s is more than the 15 that an ANAFI 4K flies"]
+    assert observed(found(*items, model="ai")) == []
 
 
 def test_the_battery() -> None:
-    assert told(found(UP, action(mav_enums.MAV_CMD_NAV_DELAY, 1500.0), BACK)) == [
+    assert observed(found(UP, action(mav_enums.MAV_CMD_NAV_DELAY, 1500.0), BACK)) == [
         "it takes 26 min of the 25 that an ANAFI 4K flies"
     ]
     findings = found(UP, action(mav_enums.MAV_CMD_NAV_DELAY, 1500.0), BACK, model="usa")
-    assert (told(findings), told(findings, FindingSeverity.WARNING)) == (
+    assert (observed(findings), observed(findings, FindingSeverity.WARNING)) == (
         [],
         [],
     )
-    assert told(found(UP, action(mav_enums.MAV_CMD_NAV_DELAY, 1700.0), BACK, model="usa"), FindingSeverity.WARNING) == [
-        "it takes 29 min of the 32 that an ANAFI USA flies"
-    ]
+    assert observed(
+        found(UP, action(mav_enums.MAV_CMD_NAV_DELAY, 1700.0), BACK, model="usa"), FindingSeverity.WARNING
+    ) == ["it takes 29 min of the 32 that an ANAFI USA flies"]
 
 
 def test_a_plan_without_an_end() -> None:
     findings = found(UP, waypoint(1, 0), waypoint(2, 0), action(mav_enums.MAV_CMD_DO_JUMP, 1.0, -1.0))
     assert not findings.errors
-    assert "it is flown until the battery is low" in told(findings, FindingSeverity.WARNING)
+    assert "it is flown until the battery is low" in observed(findings, FindingSeverity.WARNING)
     assert findings.seconds is None
-    assert told(found(UP, waypoint(1, 0)), FindingSeverity.WARNING) == [
+    assert observed(found(UP, waypoint(1, 0)), FindingSeverity.WARNING) == [
         "it ends in the air: the drone hovers there until the battery is low"
     ]
 
@@ -145,19 +145,19 @@ def test_how_an_ai_begins() -> None:
     """At its return height above the first way point, if that is lower (Parrot's flight plan page)."""
     low = Item(mav_enums.MAV_CMD_NAV_TAKEOFF, RELATIVE, (0.0, 0.0, 0.0, None, None, None, 10.0))
     findings = found(low, waypoint(1, 0, 10.0), BACK, model="ai", limits=FlightLimits(return_height=30.0))
-    assert told(findings, FindingSeverity.WARNING) == [
+    assert observed(findings, FindingSeverity.WARNING) == [
         "item 0: an Ai begins at 30 m above take-off: it rises there first, goes over to above it and sinks"
     ]
-    assert told(found(low, waypoint(1, 0, 10.0), BACK), FindingSeverity.WARNING) == []
+    assert observed(found(low, waypoint(1, 0, 10.0), BACK), FindingSeverity.WARNING) == []
     high = found(
         low, waypoint(1, 0, 10.0), BACK, model="ai", limits=FlightLimits(max_altitude=25.0, return_height=30.0)
     )
-    assert told(high) == ["item 0: 30 m above take-off is higher than the limit of 25 m"]
+    assert observed(high) == ["item 0: 30 m above take-off is higher than the limit of 25 m"]
 
 
 def test_check_names_items_flown_by_the_gateway() -> None:
     findings = found(UP, action(mav_enums.MAV_CMD_SET_CAMERA_ZOOM, 2.0, 50.0), waypoint(1, 0), BACK)
-    assert told(findings, FindingSeverity.WARNING) == [
+    assert observed(findings, FindingSeverity.WARNING) == [
         "item 1: flown by the gateway: SET_CAMERA_ZOOM: the gateway zooms: a flight plan cannot"
     ]
 
@@ -166,7 +166,7 @@ def test_check_names_items_flown_by_the_gateway() -> None:
 @pytest.mark.parametrize("path", sorted(MISSIONS.glob("*.plan")), ids=lambda path: path.stem)
 def test_the_samples_can_be_flown(path: Path, model: str) -> None:
     findings = check(files.load(path), MODELS[model])
-    assert told(findings) == []
+    assert observed(findings) == []
     assert findings.distance is not None
     assert 100.0 < findings.distance < 1000.0
 

@@ -475,7 +475,7 @@ BUSY = {
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("what", [*IDLE, *BUSY])
 def test_endless_loop_is_refused_only_without_flight(what: str, version: Version) -> None:
-    """A photo is nothing: that the drone waits until it is taken, nobody says."""
+    """A photo is nothing: that the drone waits until it is taken, no one says."""
     items = [take_off(8.0), *{**IDLE, **BUSY}[what]]
     report = examine([*items, action(DO_JUMP, 1.0, -1.0)], version)
     idle = TranslationFault(len(items), "endless loop, no flight", FaultKind.PLAN)

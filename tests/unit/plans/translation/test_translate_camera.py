@@ -37,7 +37,7 @@ def read(items: list[Item], version: Version, start: Start = AIR) -> list[plan_f
     return list(plan_file.read(leg.content, version))
 
 
-def told(items: list[Item], version: Version, start: Start = AIR) -> list[tuple[float, ...]]:
+def observed(items: list[Item], version: Version, start: Start = AIR) -> list[tuple[float, ...]]:
     """Command and what it says: of version 1 all seven, of version 2 those that are set."""
     return [
         (int(item.command), *(value for value in item[2:] if value == value))
@@ -62,7 +62,7 @@ def test_parrots_own_example() -> None:
     """Parrot's flight plan page: it says with words what it does, and so does its translation."""
     items = list(files.parse(PARROTS_EXAMPLE, "sample.mavlink", 2).items)
     start = Start(48.878601, 2.366549, 0.0, flying=False, heading=30.0)
-    assert told(items, 2, start) == [
+    assert observed(items, 2, start) == [
         (22,),
         (16, 0.0, 1.0, 48.878601, 2.366549, 15.0),
         (16, 0.0, 1.0, 0.0, 48.879, 2.366549, 20.0),
@@ -74,7 +74,7 @@ def test_parrots_own_example() -> None:
         (21,),
     ]
     assert examine(items, 2).approximations == ()
-    one = told(items, 1, start)
+    one = observed(items, 1, start)
     assert one[0] == (22, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     assert one[1] == (16, 0.0, 1.0, 0.0, 30.0, 48.878601, 2.366549, 15.0)
     assert one[3:5] == [(50001, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0), (2000, 0.0, 1.0, 12.0, 0.0, 0.0, 0.0, 0.0)]
@@ -97,7 +97,7 @@ def test_photos(version: Version) -> None:
         action(mav_enums.MAV_CMD_IMAGE_STOP_CAPTURE),
         action(mav_enums.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 3.0, 10.0),
     ]
-    found = told(items, version)[1:]
+    found = observed(items, version)[1:]
     if version == 1:
         zeros = (0.0,) * 4
         assert [row for row in found if row[0] != 16] == [
@@ -149,7 +149,7 @@ def test_a_survey_as_qgroundcontrol_writes_it(version: Version) -> None:
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_mavsdks_items(version: Version) -> None:
-    """MAVSDK mission_impl.cpp: way point, speed, gimbal of nobody in particular, delay, camera action."""
+    """MAVSDK mission_impl.cpp: way point, speed, gimbal of no one in particular, delay, camera action."""
     items = [
         waypoint(1, 0, 20.0, 0.0, 1.0, 0.0, None),
         action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 5.0, -1.0),
@@ -191,7 +191,7 @@ def test_a_region_of_interest_of_version_1() -> None:
         waypoint(3, 0),
         action(mav_enums.MAV_CMD_DO_SET_ROI_NONE),
     ]
-    assert [row[:3] if row[0] != 201 else (201, row[1], row[7]) for row in told(items, 1) if row[0] != 16] == [
+    assert [row[:3] if row[0] != 201 else (201, row[1], row[7]) for row in observed(items, 1) if row[0] != 16] == [
         (201, 3.0, 5.0),
         (50000, 2.0, 0.0),
         (50000, 0.0, 0.0),
@@ -211,7 +211,7 @@ def test_a_region_of_interest_of_version_2() -> None:
         action(mav_enums.MAV_CMD_DO_SET_ROI, 0.0),
         waypoint(2, 0),
     ]
-    assert told(items, 2) == [
+    assert observed(items, 2) == [
         (195, LAT, LON, 5.0),
         (16, 0.0, 1.0, LAT + 1e-4, LON, 20.0),  # its heading does not count
         (197,),
@@ -231,7 +231,7 @@ def test_where_a_view_mode_numbers_regions_they_are_only_numbered() -> None:
         action(50000, 1.0, 0.0),
         waypoint(3, 0),
     ]
-    assert [(row[0], row[1], row[-1]) for row in told(items, 1) if row[0] != 16] == [
+    assert [(row[0], row[1], row[-1]) for row in observed(items, 1) if row[0] != 16] == [
         (201, 3.0, 9.0),
         (50000, 2.0, 0.0),
         (50000, 1.0, 0.0),
@@ -268,7 +268,7 @@ def test_aiming_the_gimbal_ends_looking_at_something(version: Version) -> None:
 def test_gimbal_axes_that_an_item_leaves_out_keep_their_angle() -> None:
     """Version 1 has no word for it: a line with 0 would be an order to look ahead."""
     items = [GO, action(mav_enums.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, None, 0.0, None, None, 0.0, None, 0.0)]
-    assert [row[0] for row in told(items, 1)] == [16]
+    assert [row[0] for row in observed(items, 1)] == [16]
     assert translate(items, 1, AIR).parts[0].done == ((0, 1),)
 
 
@@ -318,7 +318,7 @@ def test_an_ai_takes_a_photo_where_it_is_to_be_taken() -> None:
 
 
 def test_beginning_in_the_middle_begins_what_runs_there() -> None:
-    """As PX4 does when it resumes a survey: else it would be flown without a photo, and nobody would know."""
+    """As PX4 does when it resumes a survey: else it would be flown without a photo, and no one would know."""
     items = [
         action(mav_enums.MAV_CMD_DO_MOUNT_CONTROL, -90.0),
         roi(),
@@ -370,19 +370,19 @@ def test_photos_that_are_stopped_twice_are_stopped_once() -> None:
         action(mav_enums.MAV_CMD_IMAGE_STOP_CAPTURE),
     ]
     flight = translate(items, 1, AIR)
-    assert [row[0] for row in told(items, 1)] == [16, 50001, 2000, 16, 2001, 16]
+    assert [row[0] for row in observed(items, 1)] == [16, 50001, 2000, 16, 2001, 16]
     assert flight.parts[0].done[-2:] == ((3, 4), (5, 6))
 
 
 def test_a_panorama() -> None:
-    assert told([GO, action(mav_enums.MAV_CMD_PANORAMA_CREATE, 360.0, 30.0, 20.0, 10.0)], 2)[1] == (
+    assert observed([GO, action(mav_enums.MAV_CMD_PANORAMA_CREATE, 360.0, 30.0, 20.0, 10.0)], 2)[1] == (
         2800,
         360.0,
         30.0,
         20.0,
         10.0,
     )
-    assert told([GO, action(mav_enums.MAV_CMD_PANORAMA_CREATE, 360.0)], 1)[1] == (
+    assert observed([GO, action(mav_enums.MAV_CMD_PANORAMA_CREATE, 360.0)], 1)[1] == (
         2800,
         360.0,
         0.0,
@@ -397,7 +397,7 @@ def test_a_panorama() -> None:
 def test_old_names_of_a_photo() -> None:
     assert [
         row[0]
-        for row in told(
+        for row in observed(
             [
                 GO,
                 action(mav_enums.MAV_CMD_DO_DIGICAM_CONTROL, 0.0, 0.0, 0.0, 0.0, 1.0),

@@ -195,7 +195,8 @@ async def test_stop_of_flight_is_a_command_or_a_mode(system: System, message: An
 
 
 async def test_every_other_action_needs_a_role_and_no_query_does(system: System) -> None:
-    free = set(GIMBAL_COMMANDS) | {dialect.MAV_CMD_NAV_LAND, dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH}
+    stops = {dialect.MAV_CMD_NAV_LAND, dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, dialect.MAV_CMD_NAV_LOITER_UNLIM}
+    free = set(GIMBAL_COMMANDS) | stops
     stops_unset = {dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_FLIGHTTERMINATION}
     for index, component in enumerate(system.components):
         for id in component.commands._queries:

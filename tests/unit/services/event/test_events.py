@@ -38,7 +38,7 @@ def test_requested_events_are_sent_again() -> None:
 
 
 def test_discarded_event_request_is_answered_by_an_error() -> None:
-    """The error tells where to go on."""
+    """The error names where to go on."""
     log = filled(KEPT + 10)
     assert sequences(log, 10, 11) == [-10, 11]
     (error,) = log.again(10, 10, 255, 190)

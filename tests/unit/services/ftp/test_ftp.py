@@ -269,7 +269,7 @@ def test_odd_requests() -> None:
     assert b.ask(request(Opcode.NONE, seq=3)).opcode == ACK
     assert b.ask(request(99)).error == Error.UNKNOWN_COMMAND
     assert b.ask(request(Opcode.OPEN_FILE_RO, b"/data.bin", size=240)).error == Error.INVALID_DATA_SIZE
-    assert b.server.receive("a", request(ACK), tree(), 0.0) is None  # somebody's answer
+    assert b.server.receive("a", request(ACK), tree(), 0.0) is None  # another client's answer
     assert b.server.receive("a", request(NAK), tree(), 0.0) is None
     assert b.server.receive("a", bytes(11), tree(), 0.0) is None
 
@@ -324,7 +324,7 @@ def test_numbers_that_a_client_gives() -> None:
 
 
 def test_a_number_that_is_still_open() -> None:
-    """Nobody gets another file than he opened: not at once, and after a silence the new one."""
+    """No one gets another file than he opened: not at once, and after a silence the new one."""
     b = Bench()
     b.ask(request(Opcode.OPEN_FILE_RO, b"/data.bin"))
     assert b.ask(request(Opcode.OPEN_FILE_RO, b"/deep/other.txt", seq=2)).error == Error.NO_SESSIONS_AVAILABLE

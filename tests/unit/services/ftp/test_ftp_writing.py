@@ -1,4 +1,4 @@
-"""A file that a client replaces over MAVLink FTP: parts in any order, twice, too long, given up."""
+"""A file that a client replaces over MAVLink FTP: parts in any order, twice, too long, abandoned."""
 
 from __future__ import annotations
 

@@ -89,7 +89,7 @@ def test_partial_list_is_requested_within_its_bounds() -> None:
 def upload(loss: float, seed: int, delay: tuple[float, float], number: int = 500) -> CountingClient:
     plans, client = mission_protocol(), CountingClient(ME, items(number))
     wire = Wire(plans, [client], seed=seed, loss=loss, delay=delay)
-    wire.to_desk(client, client.upload(0.0))
+    wire.to_protocol(client, client.upload(0.0))
     wire.run()
     if client.result is not None:
         assert plans.transfers[FENCE].items == client.plan

@@ -365,7 +365,7 @@ def test_an_upload_during_another_clients_download_is_refused() -> None:
     plans.receive(ask_list(), ME, 0.0)
     plans.receive(ask(0), ME, 1.0)
     assert replies(plans.receive(count(1), OTHER, 1.0))[0].type == DENIED
-    assert replies(plans.receive(count(1), ME, 1.0))[0].seq == 0  # its own is given up
+    assert replies(plans.receive(count(1), ME, 1.0))[0].seq == 0  # its own is abandoned
     plans.receive(ack(CANCELLED), ME, 1.0)
     plans.receive(ask_list(), ME, 2.0)
     plans.receive(ask(0), ME, 2.0)
@@ -686,7 +686,7 @@ def test_upload_over_a_bad_link(
     who = peer(255, 0 if as_float else 190)
     client = Client(who, items(number), as_float)
     wire = Wire(plans, [client], seed=seed, loss=loss, duplicate=duplicate, delay=(0.001, slow))
-    wire.to_desk(client, client.upload(0.0))
+    wire.to_protocol(client, client.upload(0.0))
     wire.run()
     stored = plans.transfers[FENCE].items
     if client.result is not None:
@@ -701,13 +701,13 @@ def test_500_items_with_a_quarter_lost_both_ways() -> None:
         plans = mission_protocol()
         client = Client(ME, items(500))
         wire = Wire(plans, [client], seed=seed, loss=0.25)
-        wire.to_desk(client, client.upload(0.0))
+        wire.to_protocol(client, client.upload(0.0))
         wire.run()
         assert client.result == ACCEPTED, seed
         assert plans.transfers[FENCE].items == items(500)
         reader = Client(ME)
         wire = Wire(plans, [reader], seed=seed, loss=0.25)
-        wire.to_desk(reader, reader.download(0.0))
+        wire.to_protocol(reader, reader.download(0.0))
         wire.run()
         assert tuple(reader.downloaded.values()) == items(500), seed
 
@@ -717,7 +717,7 @@ def test_copies_do_not_multiply() -> None:
     plans = mission_protocol()
     client = Client(ME, items(30), patience=10.0, repeat=1.0)
     wire = Wire(plans, [client], duplicate=0.5, delay=(0.25, 0.25), seed=7)
-    wire.to_desk(client, client.upload(0.0))
+    wire.to_protocol(client, client.upload(0.0))
     wire.run()
     assert client.result == ACCEPTED
     requests = [m for m in wire.sent if m.get_type() == "MISSION_REQUEST_INT"]
@@ -731,7 +731,7 @@ def test_two_clients_at_once_on_a_bad_link() -> None:
     clients = [Client(ME, items(40)), Client(OTHER, items(25), kind=RALLY)]
     wire = Wire(plans, clients, loss=0.1, seed=3)
     for client in clients:
-        wire.to_desk(client, client.upload(0.0))
+        wire.to_protocol(client, client.upload(0.0))
     wire.run()
     assert [client.result for client in clients] == [ACCEPTED, ACCEPTED]
     assert [len(plans.transfers[kind].items) for kind in (FENCE, RALLY)] == [40, 25]
@@ -779,7 +779,7 @@ def some_message(draw: Any) -> Any:
 @given(st.data())
 def test_random_messages_neither_raise_nor_block_the_protocol(data: st.DataObject) -> None:
     """A list only ever changes by a commit that was stored, every answer goes to who asked, and when all fall silent
-    the desk comes to rest."""
+    the protocol comes to rest."""
     plans, now = mission_protocol(), 0.0
     clients = [ME, OTHER, peer(1, 0, ARDUPILOT, "c")]
     waiting: list[Commit] = []

@@ -214,7 +214,7 @@ def test_nothing_is_no_text_and_too_much_is_cut() -> None:
 
 
 def vehicle(**elements: Any) -> Any:
-    """A vehicle of which these elements have told something."""
+    """A vehicle of which these elements have reported something."""
     return SimpleNamespace(
         drone=SimpleNamespace(**{name: SimpleNamespace(state=state) for name, state in elements.items()})
     )
@@ -223,22 +223,22 @@ def vehicle(**elements: Any) -> Any:
 @pytest.mark.parametrize("quality", [1, 2, 3, 4, 5])
 def test_rssi_in_the_scale_of_the_family(quality: int) -> None:
     # fifths of 100, and of 254: 50.8, 101.6, 152.4, 203.2, 254
-    told = vehicle(link=LinkState(quality=quality))
-    told.drone.controller = SimpleNamespace(present=True, state=ControllerState())
+    observed = vehicle(link=LinkState(quality=quality))
+    observed.drone.controller = SimpleNamespace(present=True, state=ControllerState())
     for flavour, full in (
         (PX4, [20, 40, 60, 80, 100]),
         (STANDARD, [20, 40, 60, 80, 100]),
         (ARDUPILOT, [51, 102, 152, 203, 254]),
     ):
-        message: Any = telemetry_link.rc_channels(told, NOW.for_flavour(flavour))
+        message: Any = telemetry_link.rc_channels(observed, NOW.for_flavour(flavour))
         assert message.rssi == full[quality - 1]
         assert message.time_boot_ms == 1234
 
 
 def test_rssi_without_a_skycontroller_is_unknown() -> None:
-    told = vehicle(link=LinkState(quality=5))
-    told.drone.controller = SimpleNamespace(present=False)
-    message: Any = telemetry_link.rc_channels(told, NOW)
+    observed = vehicle(link=LinkState(quality=5))
+    observed.drone.controller = SimpleNamespace(present=False)
+    message: Any = telemetry_link.rc_channels(observed, NOW)
     assert (message.rssi, message.chancount) == (255, 0)
 
 
@@ -247,9 +247,9 @@ def test_rssi_without_a_skycontroller_is_unknown() -> None:
     [(-30, 226, 184), (-100, 156, 51), (-127, 129, 0), (-200, 128, 0), (-2, 254, 238), (-1, 254, 239)],
 )
 def test_radio_signal_in_the_scale_of_the_family(dbm: int, px4: int, ardupilot: int) -> None:
-    told = vehicle(link=LinkState(rssi_dbm=dbm))
-    a: Any = telemetry_link.radio_status(told, NOW)
-    b: Any = telemetry_link.radio_status(told, NOW.for_flavour(ARDUPILOT))
+    observed = vehicle(link=LinkState(rssi_dbm=dbm))
+    a: Any = telemetry_link.radio_status(observed, NOW)
+    b: Any = telemetry_link.radio_status(observed, NOW.for_flavour(ARDUPILOT))
     assert (a.rssi, b.rssi) == (px4, ardupilot)
     assert telemetry_link.radio_status(vehicle(link=LinkState()), NOW) is None
     assert telemetry_link.radio_status(vehicle(link=LinkState(rssi_dbm=0)), NOW) is None  # 0 dBm is no reading

@@ -115,7 +115,7 @@ def test_a_horizontal_panorama_turns_on_the_spot(bench: Bench) -> None:
     said = perform(bench, animation.StartHorizontalPanorama(ALL, -1.5 * math.pi, 0.5))
     assert isinstance(said[0], animation.HorizontalPanoramaState)
     assert said[0].rotation_angle == pytest.approx(-1.5 * math.pi)
-    assert [told.state for told in bench.of(animation.HorizontalPanoramaState)] == [
+    assert [observed.state for observed in bench.of(animation.HorizontalPanoramaState)] == [
         AnimationState.RUNNING,
         AnimationState.IDLE,
     ]
@@ -274,8 +274,8 @@ def test_a_photo_panorama_is_one_media_of_many_pictures(model: str, command: Mes
     perform(bench, command, limit=300.0)
     bench.run(0.5)
     (media,) = bench.firmware.payload.media
-    told = media.describe()
-    assert (told["photo_mode"], told["panorama_type"], told["expected_count"]) == ("PANORAMA", kind, count)
+    observed = media.describe()
+    assert (observed["photo_mode"], observed["panorama_type"], observed["expected_count"]) == ("PANORAMA", kind, count)
     assert len(media.resources) == count
     views = {(round(one.scene.pitch / 5.0), round(one.scene.heading / 5.0)) for one in media.resources}
     assert len(views) > count * 0.8, "the pictures show different things"

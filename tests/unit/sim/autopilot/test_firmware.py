@@ -76,7 +76,7 @@ def test_cancelled_hand_launch_stops_the_motors(bench: Bench) -> None:
     bench.run(3.0)
     bench.send(ardrone3.UserTakeOff(0))
     assert bench.state is S.LANDED
-    bench.firmware.throw()  # nobody throws a drone whose motors are off
+    bench.firmware.throw()  # no one throws a drone whose motors are off
     bench.run(1.0)
     assert bench.state is S.LANDED
 

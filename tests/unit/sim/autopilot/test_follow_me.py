@@ -17,7 +17,7 @@ RAD = math.pi / 180.0
 
 
 class Walk:
-    """Somebody who carries the controller: m from the drone's home, m/s, on the ground."""
+    """A person who carries the controller: m from the drone's home, m/s, on the ground."""
 
     def __init__(self, bench: Bench, north: float, east: float, vn: float = 0.0, ve: float = 0.0) -> None:
         self.bench = bench
@@ -39,7 +39,7 @@ class Walk:
 
 @pytest.fixture
 def bench() -> Bench:
-    """Hovering at 10 m, heading north; the target is whoever controls."""
+    """Hovering at 10 m, heading north; the target is the person who controls."""
     bench = Bench()
     bench.take_off()
     bench.climb(10.0)
@@ -50,7 +50,7 @@ def bench() -> Bench:
 def missing(bench: Bench, mode: Mode) -> set[Input]:
     """By the report of the states: bits that are 0."""
     report = bench.firmware.follow.states_report()
-    (info,) = (told for told in report if isinstance(told, follow_me.ModeInfo) and told.mode is mode)
+    (info,) = (observed for observed in report if isinstance(observed, follow_me.ModeInfo) and observed.mode is mode)
     return {input for input in Input if not info.missing_requirements >> input & 1}
 
 
@@ -100,7 +100,7 @@ def test_controller_position_is_valid_while_recent_and_accurate(bench: Bench) ->
     walk.tell()
     bench.run(3.5)
     walk.tell(accuracy=50.0)
-    assert [told.is_valid for told in bench.of(controller_info.ValidityFromDrone)] == [1, 0]
+    assert [observed.is_valid for observed in bench.of(controller_info.ValidityFromDrone)] == [1, 0]
 
 
 def test_look_at_turns_the_drone_and_leaves_sticks_free(bench: Bench) -> None:
@@ -147,9 +147,9 @@ def test_follow_me_flies_to_the_requested_vector(bench: Bench) -> None:
     first = bench.of(follow_me.GeographicConfig)[-1]
     assert (first.distance, first.azimuth) == pytest.approx((math.hypot(10, 10), math.pi), abs=0.3)
     # 20 m away to the east of him, 30 degrees up.
-    (told,) = bench.send(follow_me.ConfigureGeographic(0, 20.0, 30.0 * RAD, 90.0 * RAD))
-    assert isinstance(told, follow_me.GeographicConfig)
-    assert (told.use_default, told.distance, told.elevation) == pytest.approx((0, 20.0, 30.0 * RAD))
+    (observed,) = bench.send(follow_me.ConfigureGeographic(0, 20.0, 30.0 * RAD, 90.0 * RAD))
+    assert isinstance(observed, follow_me.GeographicConfig)
+    assert (observed.use_default, observed.distance, observed.elevation) == pytest.approx((0, 20.0, 30.0 * RAD))
     walk.walk(20.0)
     pose = bench.pose
     expected = (10.0, 20.0 * math.cos(30.0 * RAD), 10.0)
@@ -166,7 +166,9 @@ def test_target_seen_only_is_assumed_on_the_ground(bench: Bench) -> None:
         if not bench.firmware.follow.engaged:
             bench.send(follow_me.Start(Mode.GEOGRAPHIC))
     assert state(bench) == (Mode.GEOGRAPHIC, Behavior.FOLLOW)
-    assert [told.state for told in bench.of(follow_me.TargetImageDetectionState)] == [follow_me.ImageDetectionStatus.OK]
+    assert [observed.state for observed in bench.of(follow_me.TargetImageDetectionState)] == [
+        follow_me.ImageDetectionStatus.OK
+    ]
     assert math.hypot(bench.pose.north, bench.pose.east) < 0.5
     bench.send(follow_me.TargetImageDetection(0.0, 0.5, 0.0, 200, 0, 0))  # above the horizon
     assert bench.of(follow_me.TargetImageDetectionState)[-1].state is follow_me.ImageDetectionStatus.LOST

@@ -101,7 +101,7 @@ def test_a_custom_home_out_of_reach_is_not_taken(bench: Bench) -> None:
 
 def test_the_pilot_as_home(bench: Bench) -> None:
     bench.send(rth.SetPreferredHomeType(RthHomeType.PILOT))
-    assert bench.of(rth.HomeType)[-1].type is RthHomeType.TAKEOFF  # where the pilot is nobody knows yet
+    assert bench.of(rth.HomeType)[-1].type is RthHomeType.TAKEOFF  # where the pilot is no one knows yet
     pilot = geo.destination(HOME[0], HOME[1], 20.0, 20.0)
     answer = bench.send(ardrone3.SendControllerGPS(*pilot, 35.0, 2.0, 3.0))
     assert answer[0] == ardrone3.GPSFixStateChanged(1)  # what Parrot's XML promises

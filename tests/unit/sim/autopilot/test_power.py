@@ -96,16 +96,16 @@ def test_reachability_on_ground_or_without_home_is_unknown() -> None:
 
 def test_the_announcement_counts_down() -> None:
     looked = endurance()
-    told = []
+    observed = []
     for second in range(40):
         charge = 10.0 + 70.0 * RATE + (35 - second) * RATE  # 35 s before it has to begin
         for message in looked.tick(float(second), charge, at(400.0), (0.0, 0.0), flying=True, returning=False):
             if isinstance(message, rth.RthAutoTrigger):
-                told.append((second, message.reason, message.delay))
+                observed.append((second, message.reason, message.delay))
         if looked.return_due:
             break
     soon = AutoTriggerReason.BATTERY_CRITICAL_SOON
-    assert told == [(second, soon, 35 - second) for second in range(5, 35)]
+    assert observed == [(second, soon, 35 - second) for second in range(5, 35)]
     assert second == 35
     assert looked.returned() == [rth.RthAutoTrigger(AutoTriggerReason.NONE, 0)]
 
@@ -174,9 +174,9 @@ def test_the_pilot_has_the_last_word(bench: Bench, when: str) -> None:
         bench.run_until(lambda: bool(returns(bench)))
         bench.send(rth.Abort())
         assert returns(bench)[-1] == (RthState.AVAILABLE, StateReason.STOPPED)
-    told = len(returns(bench))
+    observed = len(returns(bench))
     bench.run(30.0)
-    assert len(returns(bench)) == told
+    assert len(returns(bench)) == observed
     assert bench.of(rth.RthAutoTrigger)[-1].reason is AutoTriggerReason.NONE
 
 
@@ -200,12 +200,12 @@ def test_announced_landing_happens(bench: Bench) -> None:
     bench.run_until(lambda: bool(bench.of(ardrone3.ForcedLandingAutoTrigger)))  # it is looked at once a second
     bench.faults.battery = None
     bench.run_until(lambda: bench.state is S.EMERGENCY_LANDING)
-    told = bench.of(ardrone3.ForcedLandingAutoTrigger)
+    observed = bench.of(ardrone3.ForcedLandingAutoTrigger)
     # From 5 % to 4.5 % it takes 7.5 s.
-    assert [event.delay for event in told] == [8, 7, 6, 5, 4, 3, 2, 1, 0]
-    assert {event.reason for event in told} == {ForcedLandingReason.BATTERY_CRITICAL_SOON}
+    assert [event.delay for event in observed] == [8, 7, 6, 5, 4, 3, 2, 1, 0]
+    assert {event.reason for event in observed} == {ForcedLandingReason.BATTERY_CRITICAL_SOON}
     bench.run(2.5)
-    assert [event.delay for event in bench.of(ardrone3.ForcedLandingAutoTrigger)[len(told) :]] == [0, 0]
+    assert [event.delay for event in bench.of(ardrone3.ForcedLandingAutoTrigger)[len(observed) :]] == [0, 0]
     bench.run_until(lambda: bench.state is S.LANDED)
     assert bench.of(ardrone3.ForcedLandingAutoTrigger)[-1].reason is ForcedLandingReason.NONE
     assert bench.of(ardrone3.AlertStateChanged)[-1].state is AlertState.ALMOST_EMPTY_BATTERY

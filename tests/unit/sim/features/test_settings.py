@@ -44,7 +44,7 @@ def test_a_range(
     assert event(default, low, high) in bench.firmware.settings.report()
     middle = (low + high) / 2.0
     assert answer(middle) == event(middle, low, high)
-    assert answer(middle) == event(middle, low, high)  # told again, though nothing changed
+    assert answer(middle) == event(middle, low, high)  # reported again, though nothing changed
     assert answer(low - 1.0) == event(low, low, high)
     assert answer(high + 1.0) == event(high, low, high)
     assert answer(math.nan) == event(high, low, high)

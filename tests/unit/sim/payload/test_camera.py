@@ -64,7 +64,7 @@ def photo_mode(
 
 
 def shoot(bench: Bench, mode: camera.SetPhotoMode | None = None) -> list[Message]:
-    """Take a photo and wait until it is on the card; what was told of it."""
+    """Take a photo and wait until it is on the card; what was reported about it."""
     bench.send(camera.SetCameraMode(0, PHOTO))
     if mode is not None:
         bench.send(mode)
@@ -147,7 +147,7 @@ def exposure(
 )
 def test_a_setting(bench: Bench, command: Message, answer: Message) -> None:
     assert bench.send(command) == [answer]
-    assert bench.send(command) == [answer]  # told again, though nothing changed
+    assert bench.send(command) == [answer]  # reported again, though nothing changed
 
 
 def test_a_style_keeps_its_own_parameters() -> None:
@@ -365,8 +365,8 @@ def test_fine_zoom_follows_the_resolution(bench: Bench) -> None:
 
 def test_a_photo(bench: Bench) -> None:
     bench.send(common.CurrentDateTime("20261121T101112+0100"))
-    told = shoot(bench)
-    assert told == [
+    observed = shoot(bench)
+    assert observed == [
         camera.PhotoState(0, Availability.AVAILABLE, State.ACTIVE),
         camera.PhotoProgress(0, PhotoResult.TAKING_PHOTO, 0, ""),
         camera.PhotoProgress(0, PhotoResult.PHOTO_TAKEN, 1, ""),
@@ -392,11 +392,11 @@ def test_a_raw_photo_is_two_files(bench: Bench) -> None:
 
 
 def test_burst_reports_shots_at_a_limited_rate(bench: Bench) -> None:
-    told = shoot(bench, photo_mode(CameraPhotoMode.BURST))
-    counts = [m.photo_count for m in told if isinstance(m, camera.PhotoProgress) and m.result.name == "PHOTO_TAKEN"]
+    observed = shoot(bench, photo_mode(CameraPhotoMode.BURST))
+    counts = [m.photo_count for m in observed if isinstance(m, camera.PhotoProgress) and m.result.name == "PHOTO_TAKEN"]
     # A shot each 71 ms, a report each 100 ms at most, and always one of the last.
     assert counts == [2, 4, 6, 8, 10, 12, 14]
-    assert mediastore.Counters(0, 1, 0, 14) in told
+    assert mediastore.Counters(0, 1, 0, 14) in observed
 
 
 def test_the_files_of_a_burst_arrive_one_by_one(bench: Bench) -> None:
@@ -424,10 +424,10 @@ def test_the_files_of_a_burst_arrive_one_by_one(bench: Bench) -> None:
     ],
 )
 def test_bracketing_is_reported_at_its_end(bench: Bench, preset: BracketingPreset, count: int) -> None:
-    told = shoot(bench, photo_mode(CameraPhotoMode.BRACKETING, bracketing=preset))
-    results = [(m.result.name, m.photo_count) for m in told if isinstance(m, camera.PhotoProgress)]
+    observed = shoot(bench, photo_mode(CameraPhotoMode.BRACKETING, bracketing=preset))
+    results = [(m.result.name, m.photo_count) for m in observed if isinstance(m, camera.PhotoProgress)]
     assert results == [("TAKING_PHOTO", 0), ("PHOTO_TAKEN", count), ("PHOTO_SAVED", count)]
-    assert mediastore.Counters(0, 1, 0, count) in told
+    assert mediastore.Counters(0, 1, 0, count) in observed
 
 
 def test_a_time_lapse_goes_on_until_it_is_stopped(bench: Bench) -> None:
@@ -546,7 +546,7 @@ def test_recording_by_itself(bench: Bench) -> None:
     assert bench.of(camera.RecordingProgress)[-1].result is RecordingResult.STOPPED
 
 
-# -- what is told at the connection
+# -- what is reported at the connection
 
 
 def last(message: camera.RecordingCapabilities | camera.PhotoCapabilities) -> bool:

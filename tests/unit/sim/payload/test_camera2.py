@@ -154,8 +154,8 @@ def test_a_recording(bench: Bench) -> None:
     assert state.recording is not None
     assert state.recording.duration == pytest.approx(2000, abs=60)
     bench.send(camera2.StopRecording(camera_id=0))
-    told = [(m.type.name, m.media_id, m.stop_reason.name) for m in bench.of(camera2.Recording)]
-    assert told == [("START", "", "USER_REQUEST"), ("STOP", "10000001", "USER_REQUEST")]
+    observed = [(m.type.name, m.media_id, m.stop_reason.name) for m in bench.of(camera2.Recording)]
+    assert observed == [("START", "", "USER_REQUEST"), ("STOP", "10000001", "USER_REQUEST")]
     bench.send(camera2.StartRecording(camera_id=0))
     bench.run(1.0)
     configure(bench, camera_mode=PHOTO)
@@ -206,8 +206,8 @@ def test_locks_and_metadata(bench: Bench) -> None:
     assert white is not None
     assert white.mode is camera2.WhiteBalanceLockMode.LOCKED
     state(camera2.SetMediaMetadata(camera_id=0, metadata=camera2.MediaMetadata(copyright="me")))
-    told = state(camera2.SetMediaMetadata(camera_id=0, metadata=camera2.MediaMetadata(custom_id="7")))
-    assert told.media_metadata == camera2.MediaMetadata(copyright="me", custom_id="7", custom_title="")
+    observed = state(camera2.SetMediaMetadata(camera_id=0, metadata=camera2.MediaMetadata(custom_id="7")))
+    assert observed.media_metadata == camera2.MediaMetadata(copyright="me", custom_id="7", custom_title="")
 
 
 def test_a_flight_plan_speaks_the_older_words(bench: Bench) -> None:

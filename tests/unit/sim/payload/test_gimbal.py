@@ -159,7 +159,7 @@ def test_offsets_are_set_while_they_are_being_set(bench: Bench) -> None:
 
 def test_calibration_on_the_ground_only(bench: Bench) -> None:
     assert bench.send(gimbal.Calibrate(0)) == [gimbal.CalibrationState(GimbalCalibrationState.IN_PROGRESS, 0)]
-    bench.send(target(pitch=-30.0))  # nobody turns it meanwhile
+    bench.send(target(pitch=-30.0))  # no one turns it meanwhile
     bench.run_until(lambda: bool(bench.of(gimbal.CalibrationResult)))
     assert bench.events[-2:] == [
         gimbal.CalibrationState(GimbalCalibrationState.OK, 0),

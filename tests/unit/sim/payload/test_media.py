@@ -134,9 +134,9 @@ class Told:
 
 
 def test_ids_and_description() -> None:
-    told = Told()
-    told.photo()
-    media = told.photo(2)
+    observed = Told()
+    observed.photo()
+    media = observed.photo(2)
     assert media.id == "10000002"
     description = media.describe()
     assert [resource["resource_id"] for resource in description["resources"]] == [
@@ -153,47 +153,47 @@ def test_ids_and_description() -> None:
         "/data/media/100000020001.JPG",
         "/data/thumb/100000020001.JPG",
     )
-    resource = told.store.resource("100000020001.JPG")
+    resource = observed.store.resource("100000020001.JPG")
     assert resource is not None
     assert resource.md5() == hashlib.md5(resource.content()).hexdigest()
     assert resource.content() != media.resources[1].content()
-    assert told.store.by_thumbnail("100000020001.JPG") is resource
-    assert told.store.by_thumbnail("nothing") is None
+    assert observed.store.by_thumbnail("100000020001.JPG") is resource
+    assert observed.store.by_thumbnail("nothing") is None
 
 
 def test_each_media_change_is_notified() -> None:
-    told = Told()
-    first, burst = told.photo(), told.photo(3)
-    assert told.names() == ["media_created", "media_created", *["resource_created"] * 2]
-    assert told.events[-1] == mediastore.Counters(0, 2, 0, 4)
-    told.store.add(first, [told.store.develop(first, MediaKind.JPG, 2, PARIS, DATE)])
-    assert told.names() == ["media_updated", "resource_created"]
-    assert told.store.remove_resource("100000010001.JPG")
-    assert told.names() == ["resource_removed"]
-    assert told.store.remove_resource("100000010002.JPG")
-    assert told.names() == ["resource_removed", "media_removed"]
-    assert told.store.remove(burst.id)
-    assert told.names() == [*["resource_removed"] * 3, "media_removed"]
-    assert told.store.used == 0
-    assert told.events[-1] == mediastore.Counters(0, 0, 0, 0)
-    assert not told.store.remove(burst.id)
-    assert not told.store.remove_resource("100000010001.JPG")
-    told.photo()
-    told.names()
-    told.store.remove_all()
-    assert told.names() == ["all_media_removed"]
-    assert told.photo().id == "10000004"  # a number is never given twice
+    observed = Told()
+    first, burst = observed.photo(), observed.photo(3)
+    assert observed.names() == ["media_created", "media_created", *["resource_created"] * 2]
+    assert observed.events[-1] == mediastore.Counters(0, 2, 0, 4)
+    observed.store.add(first, [observed.store.develop(first, MediaKind.JPG, 2, PARIS, DATE)])
+    assert observed.names() == ["media_updated", "resource_created"]
+    assert observed.store.remove_resource("100000010001.JPG")
+    assert observed.names() == ["resource_removed"]
+    assert observed.store.remove_resource("100000010002.JPG")
+    assert observed.names() == ["resource_removed", "media_removed"]
+    assert observed.store.remove(burst.id)
+    assert observed.names() == [*["resource_removed"] * 3, "media_removed"]
+    assert observed.store.used == 0
+    assert observed.events[-1] == mediastore.Counters(0, 0, 0, 0)
+    assert not observed.store.remove(burst.id)
+    assert not observed.store.remove_resource("100000010001.JPG")
+    observed.photo()
+    observed.names()
+    observed.store.remove_all()
+    assert observed.names() == ["all_media_removed"]
+    assert observed.photo().id == "10000004"  # a number is never given twice
 
 
 def test_an_index_takes_its_time() -> None:
-    told = Told()
-    told.store.unplug()
-    told.store.index(10.0)
-    told.store.tick(10.4)
-    assert told.store.state is MediastoreState.INDEXING
-    told.store.tick(10.6)
-    assert told.store.indexed
-    states = [(data["old_state"], data["new_state"]) for _, data in told.notes]
+    observed = Told()
+    observed.store.unplug()
+    observed.store.index(10.0)
+    observed.store.tick(10.4)
+    assert observed.store.state is MediastoreState.INDEXING
+    observed.store.tick(10.6)
+    assert observed.store.indexed
+    states = [(data["old_state"], data["new_state"]) for _, data in observed.notes]
     assert states == [("INDEXED", "NOT_INDEXED"), ("NOT_INDEXED", "INDEXING"), ("INDEXING", "INDEXED")]
 
 

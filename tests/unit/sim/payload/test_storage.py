@@ -169,22 +169,22 @@ def test_monitoring(bench: Bench) -> None:
 )
 def test_formatting(bench: Bench, command: Message, steps: tuple[FormattingStep, ...]) -> None:
     shoot(bench)
-    told = format(bench, command)
-    states = [message.file_system_state for message in told if isinstance(message, user_storage.State)]
+    observed = format(bench, command)
+    states = [message.file_system_state for message in observed if isinstance(message, user_storage.State)]
     assert states == [FsState.FORMATTING, FsState.READY]
-    progress = [message for message in told if isinstance(message, user_storage.FormatProgress)]
+    progress = [message for message in observed if isinstance(message, user_storage.FormatProgress)]
     assert tuple(dict.fromkeys(message.step for message in progress)) == steps
     assert progress[-1] == user_storage.FormatProgress(FormattingStep.CREATING_FS, 100)
-    assert user_storage.Info("films", 64_000_000_000) in told
-    assert user_storage.FormatResult(FormattingResult.SUCCESS) in told
-    index = [message.state for message in told if isinstance(message, mediastore.State)]
+    assert user_storage.Info("films", 64_000_000_000) in observed
+    assert user_storage.FormatResult(FormattingResult.SUCCESS) in observed
+    index = [message.state for message in observed if isinstance(message, mediastore.State)]
     assert index == [MediastoreState.NOT_AVAILABLE, MediastoreState.INDEXING, MediastoreState.INDEXED]
-    assert [message for message in told if isinstance(message, mediastore.Counters)] == [
+    assert [message for message in observed if isinstance(message, mediastore.Counters)] == [
         mediastore.Counters(-1, -1, -1, -1),
         mediastore.Counters(0, 0, 0, 0),
     ]
     # There is no photo to be had meanwhile, and there is one afterwards.
-    available = [message.available for message in told if isinstance(message, camera.PhotoState)]
+    available = [message.available for message in observed if isinstance(message, camera.PhotoState)]
     assert available == [Availability.NOT_AVAILABLE, Availability.AVAILABLE]
     assert len(bench.firmware.payload.media) == 0
 

@@ -53,7 +53,7 @@ class Studio:
             deliver(data)
         self._noted.set()
 
-    def told(self, name: str) -> list[dict[str, Any]]:
+    def observed(self, name: str) -> list[dict[str, Any]]:
         return [args for noted, args in self.notes if noted == name]
 
     async def until(self, happened: Callable[[], bool]) -> None:
@@ -114,7 +114,7 @@ async def test_the_live_stream_plays() -> None:
         described = await client.describe()
         assert [media.control for media in described.media] == ["video"]
         eye = await client.setup("live/video")
-        setup = held.told("setup")
+        setup = held.observed("setup")
         assert setup == [{"session": client.session, "stream": "DefaultVideo", "client": ["127.0.0.1", *eye.ports]}]
         answer = await client.play()
         assert answer.header("Range") == "npt=now-"
@@ -141,7 +141,7 @@ async def test_the_live_stream_plays() -> None:
         await eye.until(lambda: eye.reports)
         report = eye.reports[0]
         assert isinstance(report, rtcp.SenderReport)
-        # (The time is told in whole microseconds, which may end the 90 kHz tick before the one of the time itself.)
+        # (The time is reported in whole microseconds, which may end the 90 kHz tick before the one of the time itself.)
         assert (report.timestamp - int(report.time * 0.09)) % (1 << 32) in (0, 1)
         assert said.timestamp == max(1, round(held.bench.firmware.time * 1e6))
 
@@ -217,7 +217,7 @@ async def test_pictures_of_a_world_that_turns_late_are_of_different_moments() ->
     await held.server.close()
     times = [picture.metadata.timestamp for picture in seen if picture.metadata is not None]
     assert len(set(times)) == len(times) >= 95
-    assert held.told("end")[0]["pictures"] == pytest.approx(100, abs=5)
+    assert held.observed("end")[0]["pictures"] == pytest.approx(100, abs=5)
 
 
 async def test_pause_stops_pictures_and_play_starts_with_a_key_picture() -> None:
@@ -250,7 +250,7 @@ async def test_both_cameras_of_an_ai_in_one_session() -> None:
         assert (await client.ask("TEARDOWN", "live/disparity")).status == 200
         await front.look(2)
         assert (await client.ask("TEARDOWN")).status == 200
-        ended = {args["stream"]: args["reason"] for args in held.told("end")}
+        ended = {args["stream"]: args["reason"] for args in held.observed("end")}
         assert ended == {"Front camera": "teardown", "Disparity map": "teardown"}
         assert (await client.ask("GET_PARAMETER")).status == 454
 
@@ -289,7 +289,7 @@ async def test_a_recording_plays_to_its_end() -> None:
         assert (described.duration, [media.title for media in described.media]) == (0.5, ["DefaultVideo"])
         eye = await client.setup(f"{resource}/video")
         assert (await client.play(resource)).header("Range") == "npt=0.000-0.500"
-        await held.until(lambda: bool(held.told("finished")))
+        await held.until(lambda: bool(held.observed("finished")))
         await eye.until(lambda: len(eye.pictures) >= 15)
         assert len(eye.pictures) == 15
         assert eye.pictures[0].is_key
@@ -297,7 +297,7 @@ async def test_a_recording_plays_to_its_end() -> None:
         # At the end there is nothing left; from the middle there is the rest.
         assert (await client.play(resource)).header("Range") == "npt=0.500-0.500"
         assert (await client.play(resource, Range="npt=0.3-")).header("Range") == "npt=0.300-0.500"
-        await held.until(lambda: len(held.told("finished")) == 2)
+        await held.until(lambda: len(held.observed("finished")) == 2)
         await eye.until(lambda: len(eye.pictures) >= 21)
         assert len(eye.pictures) == 21
         assert eye.pictures[15].is_key
@@ -340,8 +340,8 @@ async def test_silent_rtsp_client_expires_and_active_one_stays() -> None:
         eye = await other.setup("live/video")
         await other.play()
         client = asyncio.create_task(speak(other))
-        await held.until(lambda: bool(held.told("end")))
-        assert [(end["session"], end["reason"]) for end in held.told("end")] == [(silent.session, "timeout")]
+        await held.until(lambda: bool(held.observed("end")))
+        assert [(end["session"], end["reason"]) for end in held.observed("end")] == [(silent.session, "timeout")]
         await eye.look(2)
         client.cancel()
         assert (await silent.ask("PLAY")).status == 454
@@ -364,9 +364,9 @@ async def test_reports_of_the_client_keep_its_session_and_are_counted() -> None:
             eye.report(report, server.ports[1])
             eye.report(b"\xff\xff", server.ports[1])
             await eye.look(5)
-        assert held.told("end") == []
+        assert held.observed("end") == []
         assert (await client.ask("TEARDOWN")).status == 200
-        (end,) = held.told("end")
+        (end,) = held.observed("end")
         assert (end["lost"], end["reason"]) == (7, "teardown")
         assert end["reports"] >= 5
         assert end["pictures"] >= 45
@@ -385,7 +385,7 @@ async def test_a_session_outlives_its_connection() -> None:
 
 async def test_the_server_ends_with_clients_looking() -> None:
     async with viewer_of_a_closed_server() as (held, client):
-        assert held.told("end")[0]["reason"] == "closed"
+        assert held.observed("end")[0]["reason"] == "closed"
         assert await asyncio.wait_for(client.reader.read(), LIMIT) == b""
 
 
@@ -443,7 +443,7 @@ async def test_garbage_is_answered_and_the_connection_closed(garbage: bytes, sta
         client.writer.write(garbage)
         assert (await client.answer()).status == status
         assert await asyncio.wait_for(client.reader.read(), LIMIT) == b""
-        await held.until(lambda: bool(held.told("malformed")))
+        await held.until(lambda: bool(held.observed("malformed")))
         await other.describe()
 
 

@@ -1,4 +1,4 @@
-"""Faults of the simulated drone's link, datagram by datagram and on real sockets; what it does when nobody is there."""
+"""Faults of the simulated drone's link, datagram by datagram and on real sockets; what it does when no one is there."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ async def test_one_direction_alone_can_be_dead(real: SimulatedDrone) -> None:
     await session.close()
 
 
-# -- nobody is there
+# -- no one is there
 
 
 def test_link_loss_without_home_keeps_the_place() -> None:

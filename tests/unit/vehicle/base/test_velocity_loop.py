@@ -216,7 +216,7 @@ def test_the_tilt_that_a_speed_needs() -> None:
     assert math.degrees(tilt_for(5.0)) == pytest.approx(20.4, abs=0.1)  # 10 m/s through the air: 40 * (10 / 15)^2 or so
 
 
-# What the drone tells.
+# What the drone reports.
 
 
 def test_hover_in_wind_estimates_the_air() -> None:

@@ -427,7 +427,7 @@ def test_fence_acts_before_the_boundary() -> None:
     assert watch.breaches == 0
     assert watch.healthy
     watch.done(2)
-    # It brakes; nobody has taken it over, so nothing is said again.
+    # It brakes; no one has taken it over, so nothing is said again.
     assert watch.look(sight(90.0, speed=(6.0, 0.0), orders=2), 1.0) is None
     # It comes to rest two metres too far: nothing better can be done, but everybody hears of it.
     assert watch.look(sight(102.0, orders=2), 3.0) is Reaction.WARN
@@ -577,7 +577,7 @@ def test_the_ceiling_is_the_drones_to_keep() -> None:
 
 
 def beyond(ato: float, action: Reaction = Reaction.HOLD, *, orders: int = 2) -> FenceWatch:
-    """Somebody has flown to this height, which is beyond floor or ceiling, and what that brings about was done."""
+    """A person has flown to this height, which is beyond floor or ceiling, and what that brings about was done."""
     watch = watching(action)
     watch.floor = 10.0
     assert watch.look(sight(ato=12.0), 0.0) is None
@@ -597,7 +597,7 @@ def test_beyond_floor_or_ceiling_the_zones_hold(ato: float, kind: Breach) -> Non
     assert (watch.state, watch.breach, watch.breaches) == (State.OUTSIDE, kind, 1)
     watch.done(4)
     assert watch.look(sight(90.0, speed=(5.0, 0.0), ato=ato, orders=4), 3.0) is None  # it brakes
-    assert watch.look(sight(103.0, ato=ato, orders=5), 4.0) is Reaction.HOLD  # somebody has flown on
+    assert watch.look(sight(103.0, ato=ato, orders=5), 4.0) is Reaction.HOLD  # a person has flown on
     assert watch.verdict.text == "3 m beyond inclusion 0"
     assert not watch.verdict.ahead
     assert (watch.breach, watch.breaches, watch.breached_at) == (Breach.BOUNDARY, 2, 4.0)
@@ -621,7 +621,7 @@ def test_beyond_the_zones_the_floor_holds() -> None:
 
 
 def test_beyond_two_boundaries_nothing_is_done_again() -> None:
-    """Both estimates go to and fro over their boundaries for two minutes, and somebody flies it all the time."""
+    """Both estimates go to and fro over their boundaries for two minutes, and a person flies it all the time."""
     watch = beyond(8.0)
     assert watch.look(sight(103.0, ato=8.0, orders=3), 2.0) is Reaction.HOLD
     watch.done(4)

@@ -37,7 +37,7 @@ async def files() -> AsyncIterator[FilesOnDrone]:
         yield FilesOnDrone(pair.drone.flight_plan)
 
 
-def told(mission: tuple[Item, ...], flown: FlightPlanFile, after: int) -> list[tuple[int, ...]]:
+def observed(mission: tuple[Item, ...], flown: FlightPlanFile, after: int) -> list[tuple[int, ...]]:
     """What is done with the lines that the drone flies."""
     progress, found = MissionProgress().in_file("", flown, after), []
     for line in range(after + 1, len(flown.origins)):
@@ -52,7 +52,7 @@ async def test_same_mission_continues_inside_its_file(files: FilesOnDrone) -> No
     flown, again, line = await files.beginning_with(leg(WHOLE, AIR, 3), WHOLE)
     assert flown is whole
     assert again == name
-    assert told(WHOLE, flown, line) == [(3,), (4,)]
+    assert observed(WHOLE, flown, line) == [(3,), (4,)]
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,7 @@ async def test_an_edited_mission_has_the_new_numbers(
     flown, again, line = await files.beginning_with(leg(mission, AIR, first), mission)
     assert again != name
     assert line == -1
-    assert told(mission, flown, line) == done
+    assert observed(mission, flown, line) == done
 
 
 async def test_file_of_an_earlier_mission_is_not_reused(files: FilesOnDrone) -> None:
@@ -90,4 +90,4 @@ async def test_equal_file_of_other_items_is_not_continued(files: FilesOnDrone) -
     await files.beginning_with(long, mission)
     flown, _, line = await files.beginning_with(short, mission)
     assert line == -1
-    assert told(mission, flown, line) == [(4,), (5,)]
+    assert observed(mission, flown, line) == [(4,), (5,)]
