@@ -16,9 +16,9 @@ from functools import partial
 from typing import Any, TypeAlias, TypeVar
 
 from anafi_mav import models
-from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.codec.secret_fields import without_secrets
-from anafi_mav.arsdk.codec.wire import Message, PackedMessage, Received, UnknownMessage
+from anafi_mav.arsdk.codec.value_events import MAX_LAYOUTS, Received, ValueLayout, join
+from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.link.controller import ControllerSession
 from anafi_mav.arsdk.link.handshake import DISCOVERY_PORT, DeviceInfo
 from anafi_mav.arsdk.messages import ardrone3, common, drone_manager, rth, skyctrl
@@ -39,7 +39,7 @@ from anafi_mav.drone.automatic.follow_me import FollowMe
 from anafi_mav.drone.automatic.poi import Poi
 from anafi_mav.drone.controller.controller import MODELS as CONTROLLERS
 from anafi_mav.drone.controller.controller import Controller, is_motion
-from anafi_mav.drone.element import Element, Reducer
+from anafi_mav.drone.element import Element, Reducer, defer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
 from anafi_mav.drone.features import Feature, Support, features
 from anafi_mav.drone.payload.camera import Camera
@@ -59,7 +59,7 @@ from anafi_mav.drone.status.home import Home, modern
 from anafi_mav.drone.status.link import Link
 from anafi_mav.drone.status.product import MODELS, Identity, Product
 from anafi_mav.drone.status.sound import Sound
-from anafi_mav.drone.values import VALUES, OnValues, Values
+from anafi_mav.drone.values import OnValues, Values
 from anafi_mav.drone.video.route import Direct, Mux, VideoRoute
 from anafi_mav.drone.video.stream_choice import StreamChoice
 from anafi_mav.drone.video.video import Video
@@ -192,8 +192,8 @@ class Drone:
         }
         self._subscriptions: tuple[tuple[Callback, frozenset[type[Message]]], ...] = ()
         """Each callback with the kinds of messages that it is not called with."""
-        self._holders: Mapping[type[Message], Sequence[dict[bytes, PackedMessage]]] = {}
-        """Events of values that no callback is called with, and the tables of the elements that keep them."""
+        self._holders: dict[ValueLayout, Sequence[Element[Any]] | None] = {}
+        """The elements that keep events of values; None for those with an event that a callback is called with."""
         self._on_values: tuple[OnValues, ...] = ()
         self._set_subscriptions(())
 
@@ -726,11 +726,7 @@ class Drone:
 
     def _set_subscriptions(self, subscriptions: tuple[tuple[Callback, frozenset[type[Message]]], ...]) -> None:
         self._subscriptions = subscriptions
-        self._holders = {
-            kind: [self._elements[place].deferred for place, _ in self._routes.get(kind, ())]
-            for kind in VALUES
-            if all(kind in without for _, without in subscriptions)
-        }
+        self._holders = {}
 
     def subscribe_values(self, callback: OnValues) -> Callable[[], None]:
         """Call `callback(values, time)` with the events of values, which arrive often.
@@ -829,54 +825,73 @@ class Drone:
 
         Events of values wait undecoded in their elements, unless their messages are wanted.
         """
-        values: dict[type[Message], PackedMessage] = {}
-        deferrable, lost = self._deferrable(), session.lost
+        together: list[Values] = []
+        """To be reported: of each kind one."""
+        lost = session.lost
+        unpacked: Message | UnknownMessage
         for message in messages:  # only what is called from here can end the session
-            # Not by isinstance, which takes as long for these classes as a reducer.
-            if type(message) is PackedMessage:
-                kind = message.kind
-                tables = deferrable.get(kind)
-                if values and (tables is None or kind in values):
-                    self._report(values, now)
-                    values = {}
+            if type(message) is Values:  # not by isinstance, which takes as long for these classes as a reducer
+                holders = self._holders_of(message.layout)
+                if together and (holders is None or _has_kind(together, message.layout)):
+                    self._report(together, now)
+                    together = []
                     if lost.done():
                         return
-                values[kind] = message
-                if tables is not None:
-                    for table in tables:
-                        table[message.key] = message
+                if holders is not None:
+                    together.append(message)
+                    for element in holders:
+                        defer(element, message)
                     continue
-            elif values:
-                self._report(values, now)
-                values = {}
-                if lost.done():
-                    return
-            unpacked = wire.unpacked(message)
+                first, *others = message.split()
+                if others:
+                    self._receive(session, (first, *others), now)
+                    if lost.done():
+                        return
+                    continue
+                together.append(message)
+                (unpacked,) = message.messages()
+            else:
+                if together:
+                    self._report(together, now)
+                    together = []
+                    if lost.done():
+                        return
+                unpacked = message
             try:
                 self._handle(unpacked, now)
             except Exception as error:
                 session.report(error, unpacked)
             if lost.done():
                 return
-            deferrable = self._deferrable()
-        if values:
-            self._report(values, now)
+        if together:
+            self._report(together, now)
 
-    def _deferrable(self) -> Mapping[type[Message], Sequence[dict[bytes, PackedMessage]]]:
-        """Return the events of values of which no message is wanted, with the tables they wait in."""
+    def _holders_of(self, layout: ValueLayout) -> Sequence[Element[Any]] | None:
+        """Return the elements that keep events of values; None if one of them is wanted."""
         if message_log.isEnabledFor(logging.DEBUG):
-            return {}
+            return None
         waiting = self._commander.waiting
-        if not waiting:
-            return self._holders
-        return {kind: tables for kind, tables in self._holders.items() if kind not in waiting}
+        if waiting and not waiting.keys().isdisjoint(layout.kinds):
+            return None
+        try:
+            return self._holders[layout]
+        except KeyError:
+            if len(self._holders) >= MAX_LAYOUTS:
+                self._holders.clear()
+            is_deferrable = all(without.issuperset(layout.kinds) for _, without in self._subscriptions)
+            places = {place for kind in layout.kinds for place, _ in self._routes.get(kind, ())}
+            holders = [self._elements[place] for place in sorted(places)] if is_deferrable else None
+            self._holders[layout] = holders
+            return holders
 
-    def _report(self, values: Values, now: float) -> None:
+    def _report(self, together: Sequence[Values], now: float) -> None:
+        values = join(together)
         for callback in self._on_values:
             try:
                 callback(values, now)
             except Exception:
-                log.exception("%s: a subscriber failed on %s", self.name, ", ".join(kind.NAME for kind in values))
+                names = ", ".join(kind.NAME for kind in values.layout.kinds)
+                log.exception("%s: a subscriber failed on %s", self.name, names)
 
     def _handle(self, message: Message | UnknownMessage, now: float) -> None:
         """Update the states by a message, then call what waits for it."""
@@ -927,6 +942,11 @@ def _routes(tables: Sequence[Mapping[type[Message], Reducer]]) -> Routes:
 
 _OF_RETURN = frozenset({rth.State, ardrone3.NavigateHomeStateChanged})
 """The state of a return, and its legacy twin."""
+
+
+def _has_kind(together: Sequence[Values], layout: ValueLayout) -> bool:
+    """Return True if an event of one of these kinds waits to be reported."""
+    return any(kind in values for values in together for kind in layout.kinds)
 
 
 def _ignore(message: Message | UnknownMessage, now: float) -> None:

@@ -16,7 +16,8 @@ from typing import Any, ClassVar, Final, Generic, TypeAlias, TypeVar
 
 import msgspec
 
-from anafi_mav.arsdk.codec.wire import Message, PackedMessage
+from anafi_mav.arsdk.codec.value_events import ValueLayout, Values
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages.generic import ListFlags
 
 StateT = TypeVar("StateT")
@@ -57,7 +58,7 @@ class Position(msgspec.Struct, frozen=True):
 class Element(Generic[StateT]):
     """One part of the aircraft. Subclasses declare `NOTHING` and `REDUCERS`; some add verbs.
 
-    Events of values wait undecoded until the state is read, each only as long as none of the same value follows. The
+    Events of values wait undecoded until the state is read, only as long as none with the same layout follow. The
     result is that of reducing each at once: such an event replaces what an earlier one reported, and nothing else.
     """
 
@@ -68,8 +69,8 @@ class Element(Generic[StateT]):
     def __init__(self) -> None:
         self.settled: StateT = self.NOTHING
         """The state without the events that wait, for fields that no value changes. Only `state` sets it."""
-        self.deferred: Final[dict[bytes, PackedMessage]] = {}
-        """Events of values to reduce when the state is read, by their keys; always the same table."""
+        self.deferred: Final[dict[ValueLayout, Values]] = {}
+        """Events of values to reduce when the state is read, in their sequence; always the same table."""
 
     def reset(self) -> None:
         """Forget everything the drone reported."""
@@ -80,8 +81,10 @@ class Element(Generic[StateT]):
         """The last state reported by the drone."""
         if self.deferred:
             reducers, state = self.REDUCERS, self.settled
-            for message in self.deferred.values():
-                state = reducers[message.kind](state, message.unpack())
+            for values in self.deferred.values():
+                data = values.data
+                for reducer, read in values.layout.readers(reducers):
+                    state = reducer(state, read(data))
             self.state = state
         return self.settled
 
@@ -89,6 +92,14 @@ class Element(Generic[StateT]):
     def state(self, state: StateT) -> None:
         self.deferred.clear()
         self.settled = state
+
+
+def defer(element: Element[Any], values: Values) -> None:
+    """Let events of values wait in an element until its state is read."""
+    layout, deferred = values.layout, element.deferred
+    if len(deferred) > 1 and any(other is not layout and other.shares(layout) for other in deferred):
+        element.state = element.state  # in their sequence: they replace one another's
+    deferred[layout] = values
 
 
 class StateWatch:

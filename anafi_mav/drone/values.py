@@ -10,19 +10,18 @@ from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
 import anafi_mav.arsdk.messages  # noqa: F401  # declares them
-from anafi_mav.arsdk.codec.wire import Message, PackedMessage, decode, value_events
+from anafi_mav.arsdk.codec.value_events import ValueLayout as ValueLayout
+from anafi_mav.arsdk.codec.value_events import Values as Values
+from anafi_mav.arsdk.codec.wire import Message, decode, value_events
 
-SIZES: Mapping[type[Message], int] = dict(value_events())
+SIZES: Mapping[type[Message], int] = {value.kind: value.size for value in value_events().values()}
 """Bytes of the command of each kind; later firmware may append more."""
 
 VALUES = frozenset(SIZES)
 """The kinds of all of them."""
 
 unpack = decode
-"""Return the message in the bytes of a `PackedMessage`."""
-
-Values: TypeAlias = Mapping[type[Message], PackedMessage]
-"""Those that arrived together, one of each kind, in their sequence."""
+"""Return the message in the bytes of `Values.command`."""
 
 OnValues: TypeAlias = Callable[[Values, float], None]
 """(values, loop time of their arrival)."""

@@ -20,6 +20,7 @@ import pytest
 from support.olympe_server import CONTROLLER_PORT
 
 from anafi_mav.arsdk.codec import wire
+from anafi_mav.arsdk.codec.value_events import unpacked
 from anafi_mav.arsdk.codec.wire import MessageId, UnknownMessage
 from anafi_mav.arsdk.link.frame import FrameType, decode_frames, encode_frame, longest_command
 from anafi_mav.arsdk.link.transport import ACK_TIMEOUT, Delivered, ReceivedMessages, Role, Transport
@@ -197,7 +198,7 @@ def test_commands_of_every_size_are_read_from_parrot(version: int, parrot: Parro
                 for datagram in datagrams:
                     for event in transport.receive(datagram, 0.0):
                         assert isinstance(event, ReceivedMessages), event
-                        received += [wire.encode(wire.unpacked(message)) for message in event.messages]
+                        received += map(wire.encode, unpacked(event.messages))
                 assert received == sent[: len(received)], row
                 datagrams = parrot.give(version, transport.outgoing(0.0)).datagrams
                 if len(received) == len(sent):

@@ -11,6 +11,7 @@ from types import FunctionType, ModuleType
 
 import anafi_mav.arsdk.messages as tables
 from anafi_mav.arsdk.codec import wire
+from anafi_mav.arsdk.codec.value_events import unpacked
 from anafi_mav.arsdk.codec.wire import Bits, Blob, Buffer, Message, MessageId, Scalar, Text, UnknownMessage
 from anafi_mav.arsdk.link.frame import FrameType, encode_frame
 from anafi_mav.arsdk.link.transport import (
@@ -68,7 +69,7 @@ def throw(role: Role, version: int, count: int, seed: str) -> Outcome:
         for event in events:
             assert isinstance(event, ReceivedMessages | Delivered | Undelivered | Garbage), event
             if isinstance(event, ReceivedMessages):
-                messages += len([wire.unpacked(message) for message in event.messages])
+                messages += len(list(unpacked(event.messages)))
             garbage += isinstance(event, Garbage)
     end = _memory(victim)
     # It is as it was: it answers a ping.

@@ -19,9 +19,9 @@ import functools
 import inspect
 import struct
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, NamedTuple, Protocol, TypeAlias, TypeVar, final, get_args, get_origin
+from typing import Annotated, Any, ClassVar, NamedTuple, Protocol, TypeVar, final, get_args, get_origin
 
 import msgspec
 
@@ -137,27 +137,6 @@ class UnknownMessage(msgspec.Struct, frozen=True):
     """The packed arguments, without the four header bytes."""
 
 
-@final
-class PackedMessage(msgspec.Struct, frozen=True, gc=False):
-    """An event of values that is long enough, but not decoded yet.
-
-    A simulated drone sends attitude, speed and height thirty times a second, and most of them are replaced before they
-    are read.
-    """
-
-    kind: type[Message]
-    key: bytes
-    """Equal for events of which each replaces the one before: of one kind, and of one camera or gimbal."""
-    data: bytes
-    """The command bytes, as for `decode`."""
-
-    def unpack(self) -> Any:
-        """Return the message, of class `kind`."""
-        return _CODECS[self.data[:4]].decode(self.data)
-
-
-Received: TypeAlias = Message | UnknownMessage | PackedMessage
-
 MessageT = TypeVar("MessageT", bound=Message)
 
 
@@ -174,8 +153,19 @@ class Codec(Protocol):
 _CODECS: dict[bytes, Codec] = {}
 """By the four bytes of the header."""
 
-_VALUES: dict[bytes, tuple[type[Message], int, bool]] = {}
-"""Each event of values by the four bytes of its header: its kind and least length, and True if it has a number."""
+
+class ValueEvent(NamedTuple):
+    """Declaration of an event of values."""
+
+    kind: type[Message]
+    size: int
+    """Bytes of its command; later firmware may append more."""
+    name_size: int
+    """Bytes that say what it replaces: the header, and the number of a camera or gimbal."""
+
+
+_VALUES: dict[bytes, ValueEvent] = {}
+"""By the four bytes of the header."""
 
 
 def command(
@@ -209,7 +199,7 @@ def value(
             raise LocalProtocolError(f"{name}: its arguments are not those of an event of values")
         size = struct.calcsize("<" + "".join(scalar.code for scalar in scalars))
         declare(declared)
-        _VALUES[HEADER.pack(*declared.ID)] = declared, HEADER.size + size, of is not None
+        _VALUES[HEADER.pack(*declared.ID)] = ValueEvent(declared, HEADER.size + size, HEADER.size + (of is not None))
         return declared
 
     return register
@@ -238,12 +228,19 @@ def carry(id: MessageId, codec: Codec) -> None:
     _CODECS[HEADER.pack(*id)] = codec
 
 
-def value_events() -> Iterator[tuple[type[Message], int]]:
-    """Return the events of values declared so far, with the bytes of each.
+def value_events() -> Mapping[bytes, ValueEvent]:
+    """Return the events of values declared so far, by the four bytes of their headers."""
+    return _VALUES
 
-    `receive` leaves them packed.
+
+def value_reader(kind: type[MessageT], position: int) -> Callable[[bytes], MessageT]:
+    """Return the reader of an event of values whose command begins at a position.
+
+    The bytes that it reads have to be long enough.
     """
-    return ((kind, size) for kind, size, _ in _VALUES.values())
+    codec = _CODECS[HEADER.pack(*kind.ID)]
+    assert isinstance(codec, _Codec)
+    return codec.reader(position)
 
 
 def declared_messages() -> Iterator[type[Message]]:
@@ -337,8 +334,6 @@ class _Codec:
         if self._struct is not None:
             if len(data) < self._size:
                 return None
-            if not self._converters:
-                return self.message(*self._struct.unpack_from(data, HEADER.size))
             values = list(self._struct.unpack_from(data, HEADER.size))
         else:
             values = []
@@ -364,10 +359,32 @@ class _Codec:
                         return None
                     values.append(data[position : position + size])
                     position += size
+        self._convert(values)
+        return self.message(*values)
+
+    def reader(self, position: int) -> Callable[[bytes], Any]:
+        """Return the reader of a message of fixed size whose command begins at a position.
+
+        The bytes that it reads have to be long enough.
+        """
+        assert self._struct is not None
+        message, unpack, place = self.message, self._struct.unpack_from, position + HEADER.size
+
+        def read(data: bytes) -> Message:
+            return message(*unpack(data, place))
+
+        def read_enums(data: bytes) -> Message:
+            values = list(unpack(data, place))
+            self._convert(values)
+            return message(*values)
+
+        return read_enums if self._converters else read
+
+    def _convert(self, values: list[Any]) -> None:
+        """Put the members of enums in place of their numbers."""
         for index, python, members in self._converters:
             member = members.get(values[index])
             values[index] = python(values[index]) if member is None else member
-        return self.message(*values)
 
 
 def encode(message: Message | UnknownMessage) -> bytes:
@@ -392,27 +409,3 @@ def decode(data: bytes) -> Message | UnknownMessage | None:
     if codec is None:
         return UnknownMessage(MessageId(*HEADER.unpack_from(data)), bytes(data[HEADER.size :]))
     return codec.decode(data)
-
-
-def receive(commands: Iterable[bytes]) -> list[Received]:
-    """Decode the messages in these command bytes, and leave events of values packed.
-
-    Those that are too short are left out, as `decode` returns None for them.
-    """
-    messages: list[Received] = []
-    for data in commands:  # one loop for all: it runs 50 000 times a second
-        header = data[:4]
-        value = _VALUES.get(header)
-        if value is None:
-            if (message := decode(data)) is not None:
-                messages.append(message)
-            continue
-        kind, size, has_number = value
-        if len(data) >= size:
-            messages.append(PackedMessage(kind, data[:5] if has_number else header, data))
-    return messages
-
-
-def unpacked(received: Received) -> Message | UnknownMessage:
-    """Return a received message, decoded."""
-    return received.unpack() if isinstance(received, PackedMessage) else received

@@ -17,7 +17,8 @@ from typing import Protocol, TypeAlias, cast
 
 from typing_extensions import assert_never
 
-from anafi_mav.arsdk.codec.wire import Message, Received, UnknownMessage, unpacked
+from anafi_mav.arsdk.codec.value_events import Received, unpacked
+from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.link.transport import (
     Delivered,
     Event,
@@ -298,10 +299,9 @@ class Session(asyncio.DatagramProtocol):
                     assert_never(event)
 
     def _hand_on(self, messages: Sequence[Received], now: float) -> None:
-        for received in messages:
+        for message in unpacked(messages):
             if self.lost.done():
                 return
-            message = unpacked(received)
             try:
                 self.on_message(message, now)
             except Exception as error:

@@ -27,7 +27,8 @@ from typing import TypeAlias
 import msgspec
 
 from anafi_mav.arsdk.codec import wire
-from anafi_mav.arsdk.codec.wire import Buffer, Message, MessageId, Received, UnknownMessage
+from anafi_mav.arsdk.codec.value_events import Received, receive
+from anafi_mav.arsdk.codec.wire import Buffer, Message, MessageId, UnknownMessage
 from anafi_mav.arsdk.link.frame import (
     PACK_LIMIT,
     VERSIONS,
@@ -41,6 +42,7 @@ from anafi_mav.arsdk.link.frame import (
     pack,
     with_length,
 )
+from anafi_mav.arsdk.link.known_payloads import KNOWN_PAYLOADS
 from anafi_mav.errors import LocalProtocolError
 
 PING, PONG = 0, 1
@@ -214,6 +216,7 @@ class Transport:
         # The first frame has number 0 and must count as new, hence a wrap from the highest number.
         self._last_seq = dict.fromkeys(self._received_ids, self._seq_mask)
         self._unpacker = Unpacker(version)
+        self._known = KNOWN_PAYLOADS[version]
         self._longest = (longest_command(version, False), longest_command(version, True))
         """Bytes of a command in the unacknowledged queue, and in an acknowledged one."""
         self._noack: deque[tuple[int, bytes]] = deque()
@@ -264,10 +267,16 @@ class Transport:
                     self.counters["duplicate"] += 1
                     continue
                 self._last_seq[id] = seq
+                if type != _WITHACK and (values := self._known.read(payload)) is not None:
+                    self.counters["received"] += len(values.layout.kinds)
+                    events.append(ReceivedMessages((values,)))
+                    continue
                 commands, readable = self._unpacker.unpack(id, type == _WITHACK, payload)
-                self._commands(commands, events)
+                messages = self._commands(commands, events)
                 if not readable:
                     self._garbage("payload", events)
+                elif type != _WITHACK:
+                    self._known.learn(payload, commands, messages)
             elif type == _ACK and id - ACK_OFFSET in self._queues:
                 self._acknowledged(self._queues[id - ACK_OFFSET], payload, events)
             elif id == PING and type != _ACK:
@@ -283,13 +292,14 @@ class Transport:
             return (last - seq) & self._seq_mask <= self._seq_mask >> 1
         return -10 <= seq - last <= 0
 
-    def _commands(self, commands: list[bytes], events: list[Event]) -> None:
-        messages = wire.receive(commands)
+    def _commands(self, commands: list[bytes], events: list[Event]) -> Sequence[Received]:
+        messages = receive(commands)
         if messages:
             self.counters["received"] += len(messages)
             events.append(ReceivedMessages(messages))
         for _ in range(len(commands) - len(messages)):
             self._garbage("command", events)
+        return messages
 
     def _acknowledge(self, id: int, seq: int) -> None:
         self._ack_seq = (self._ack_seq + 1) & self._seq_mask

@@ -168,7 +168,7 @@ def main_frames(values: Values) -> bytes | None:
 
     None when the values are of another gimbal. Frames are compared thirty times a second, and hardly ever change.
     """
-    data = values[gimbal.Attitude].data
+    data = values.command(gimbal.Attitude)
     return data[_FRAMES] if data[_FRAMES.start - 1] == MAIN else None
 
 

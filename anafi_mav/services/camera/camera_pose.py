@@ -99,11 +99,11 @@ class EventSamples(PoseSource):
         """Add what the drone's events report."""
         if now < self._next and events.GpsLocationChanged not in values:
             return
-        for kind, packed in values.items():
-            if (track := self._tracks.get(kind)) is not None:
-                track.add_event(now, packed.data)
-            elif kind is events.GpsLocationChanged:
-                self._add_place(packed.unpack(), now)
+        for kind, track in self._tracks.items():
+            if kind in values:
+                track.add_event(now, values.command(kind))
+        if events.GpsLocationChanged in values:
+            self._add_place(values.message(events.GpsLocationChanged), now)
         self._next = min(track.newest for track in self._tracks.values()) + SPACING
 
     def _add_place(self, message: events.GpsLocationChanged, now: float) -> None:

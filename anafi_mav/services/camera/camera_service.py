@@ -108,7 +108,7 @@ class CameraService(Service):
     def _on_zoom_value(self, values: Values, now: float) -> None:
         for kind in Camera.ZOOM_EVENTS:
             if kind in values:
-                self._note_zoom(values[kind].data)
+                self._note_zoom(values.command(kind))
 
     def _note_zoom(self, level: float | bytes) -> None:
         if level != self._level:

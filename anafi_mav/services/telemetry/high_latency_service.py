@@ -137,7 +137,7 @@ class HighLatencyService(Service):
         return {self._on_speed: self._interest}
 
     def _on_speed(self, values: Values, now: float) -> None:
-        if math.isfinite(climb := values[events.SpeedChanged].unpack().speedZ):
+        if math.isfinite(climb := values.message(events.SpeedChanged).speedZ):
             self._climb = max(self._climb, abs(climb))
 
     def tick(self, now: float) -> float:

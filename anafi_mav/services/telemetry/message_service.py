@@ -174,7 +174,14 @@ class MessageService(Service):
         return {self._on_values: ValueInterest(self._values)}
 
     def _on_values(self, values: Values, now: float) -> None:
-        if self._tracker.mark_all(values, now):
+        """Send the messages that they update, soon; without one that is due they are counted."""
+        tracker, kinds = self._tracker, values.layout.kinds
+        if not (tracker.has_updates or self._sources.is_used):
+            ids = tracker.ids(kinds)
+            if now < self._intervals.next_on(self.host.channels, ids):
+                tracker.count(kinds, now)
+                return
+        if tracker.mark_all(kinds, now):
             self.host.drone.after_read(self._send_updated)
 
     def _on_update(self, message: Message, now: float) -> None:

@@ -84,10 +84,23 @@ class UpdateTracker:
             return (), self._at
         key = tuple(self._updated)
         self._updated = {}
-        bundle = self._bundles.get(key) or self._new_bundle(key)
+        return self.count(key, self._at), self._at
+
+    @property
+    def has_updates(self) -> bool:
+        """True when `take` would return updates."""
+        return bool(self._updated)
+
+    def ids(self, sources: tuple[Hashable, ...]) -> tuple[int, ...]:
+        """Return the messages that updates from all these sources affect."""
+        return (self._bundles.get(sources) or self._new_bundle(sources)).ids
+
+    def count(self, sources: tuple[Hashable, ...], at: float) -> tuple[int, ...]:
+        """Count updates from all these sources as taken, and return the messages that they affect."""
+        bundle = self._bundles.get(sources) or self._new_bundle(sources)
         bundle.count += 1
-        bundle.at = self._at
-        return bundle.ids, self._at
+        bundle.at = at
+        return bundle.ids
 
     def at(self, id: int) -> float | None:
         """When something was new for this message last; None: never."""

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from anafi_mav.drone.events import Message
-from anafi_mav.drone.values import Values
+from anafi_mav.drone.values import ValueLayout, Values
 
 EventHandler = Callable[[Any, float], None]
 """Handle an event (message, event-loop time in s). The drone's states contain it already."""
@@ -14,7 +14,7 @@ EventHandler = Callable[[Any, float], None]
 Subscriptions = Mapping[type[Message], EventHandler]
 
 ValueHandler = Callable[[Values, float], None]
-"""Handle events of values that arrived together (values by kind, event-loop time in s).
+"""Handle events of values that arrived together (values, event-loop time in s).
 
 The drone's states contain them already. They are decoded when a state is read, so that a handler with nothing to do
 reads none.
@@ -49,8 +49,8 @@ class ValueInterest:
 ValueSubscriptions = Mapping[ValueHandler, ValueInterest]
 """The interest of each handler."""
 
-MAX_SETS = 64
-"""Sets of values that arrive together of which the handlers are remembered; a drone in operation sends a few."""
+MAX_REMEMBERED = 64
+"""Layouts of values that arrive together of which the handlers are remembered; a drone in operation sends a few."""
 
 
 def in_order(tables: Iterable[Subscriptions]) -> dict[type[Message], tuple[EventHandler, ...]]:
@@ -67,19 +67,21 @@ class ValueHandlers:
 
     def __init__(self, tables: Iterable[ValueSubscriptions]) -> None:
         self._all = [(handler, interest) for table in tables for handler, interest in table.items()]
-        self._of: dict[tuple[type[Message], ...], list[ValueHandler]] = {}
+        self._of: dict[ValueLayout, list[ValueHandler]] = {}
         for _, interest in self._all:
             interest.on_switch(self._of.clear)
 
     def call(self, values: Values, now: float) -> None:
         """Call each handler of one of these values."""
-        kinds = tuple(values)
-        handlers = self._of.get(kinds)
+        layout = values.layout
+        handlers = self._of.get(layout)
         if handlers is None:
-            if len(self._of) >= MAX_SETS:
+            if len(self._of) >= MAX_REMEMBERED:
                 self._of.clear()
-            handlers = self._of[kinds] = [
-                handler for handler, interest in self._all if interest.is_on and not interest.kinds.isdisjoint(kinds)
+            handlers = self._of[layout] = [
+                handler
+                for handler, interest in self._all
+                if interest.is_on and not interest.kinds.isdisjoint(layout.kinds)
             ]
         for handler in handlers:
             handler(values, now)

@@ -457,7 +457,7 @@ class MissionFlight(PlainTask):
     def _on_position(self, values: Values, now: float) -> None:
         if self.machine.state is not State.ENDING:
             return
-        for kind in values:
+        for kind in values.layout.kinds:
             if kind in PROOF and self.machine.state is State.ENDING:
                 self._handle(self.machine.reported(self._report(), kind))
 

@@ -477,8 +477,8 @@ class OffboardFlight(PlainTask):
         return {self._on_motion: ValueInterest(MOTION)}
 
     def _on_motion(self, values: Values, now: float) -> None:
-        for kind in values:
-            if kind in MOTION:
+        for kind in MOTION:
+            if kind in values:
                 self._unread[kind] = now
         if self._vehicle.flying_state in MOTORS_OFF and self._stream.engagement is None:
             return  # the motion of a drone that stands is read when it is needed

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 
 import anafi_mav.arsdk.messages as tables
 from anafi_mav.arsdk.codec import wire
+from anafi_mav.arsdk.codec.value_events import unpacked
 from anafi_mav.arsdk.codec.wire import Bits, Blob, Message, MessageId, OpenEnum, Scalar, Text, UnknownMessage
 from anafi_mav.arsdk.link import handshake
 from anafi_mav.arsdk.link.frame import decode_frames, encode_frame
@@ -112,7 +113,7 @@ class Weather:
     def _collect(self, end: int, events: list[Any]) -> None:
         for event in events:
             if isinstance(event, ReceivedMessages):
-                self.heard[end] += map(wire.unpacked, event.messages)
+                self.heard[end] += unpacked(event.messages)
             elif isinstance(event, Delivered):
                 self.delivered[end].append(event.token)
             elif isinstance(event, Undelivered):

@@ -9,13 +9,15 @@ from typing import Annotated, Any
 
 import pytest
 from support.scripted_device import ScriptedDevice
+from support.values import arrived
 
 from anafi_mav.arsdk.codec import wire
-from anafi_mav.arsdk.codec.wire import Message, PackedMessage
+from anafi_mav.arsdk.codec.value_events import join, receive, unpacked
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, camera, gimbal
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.drone import Drone, Velocity
-from anafi_mav.drone.element import Element, StateWatch
+from anafi_mav.drone.element import StateWatch, defer
 from anafi_mav.drone.expectation import Commander
 from anafi_mav.drone.payload.gimbal import Gimbal
 from anafi_mav.drone.piloting.state import Attitude
@@ -27,24 +29,12 @@ BOUNDS = (b"\0\0\0\0", b"\xff\xff\xff\xff", b"\0\0\xc0\x7f", b"\0\0\x80\x7f", b"
 """Zero, ones, not a number, infinity, minus zero, one: as floats, as integers or as halves of doubles."""
 
 
-def packed(message: Message) -> PackedMessage:
-    (received,) = wire.receive([wire.encode(message)])
-    assert isinstance(received, PackedMessage)
-    return received
-
-
-def defer(element: Element[Any], message: Message) -> None:
-    """Let an event of values wait in an element, as `Drone` does."""
-    event = packed(message)
-    element.deferred[event.key] = event
-
-
-def noise(kind: type[Message], rng: random.Random) -> PackedMessage:
+def noise(kind: type[Message], rng: random.Random) -> Values:
     """An event of values with any bytes, of one of two cameras or gimbals if it is of one."""
     arguments = b"".join(rng.choice(BOUNDS) if rng.random() < 0.3 else rng.randbytes(4) for _ in range(16))
-    (received,) = wire.receive([struct.pack("<BBHB", *kind.ID, rng.randrange(2)) + arguments])
-    assert isinstance(received, PackedMessage)
-    assert received.kind is kind
+    (received,) = receive([struct.pack("<BBHB", *kind.ID, rng.randrange(2)) + arguments])
+    assert isinstance(received, Values)
+    assert received.layout.kinds == (kind,)
     return received
 
 
@@ -61,9 +51,11 @@ async def test_deferred_values_give_the_states_of_values_reduced_at_once() -> No
         kinds = [kind for kind in element.REDUCERS if kind in VALUES]
         state: Any = element.NOTHING
         for step in range(2000):
-            event = noise(rng.choice(kinds), rng)
-            state = element.REDUCERS[event.kind](state, event.unpack())
-            element.deferred[event.key] = event
+            together = [noise(kind, rng) for kind in rng.sample(kinds, rng.randint(1, len(kinds)))]
+            for event in together:
+                (message,) = event.messages()
+                state = element.REDUCERS[type(message)](state, message)
+            defer(element, join(together))
             if rng.random() < 0.2:
                 assert shown(element.state) == shown(state), f"{type(element).__name__}, step {step}"
         assert shown(element.state) == shown(state)
@@ -73,8 +65,8 @@ async def test_deferred_values_give_the_states_of_values_reduced_at_once() -> No
 def test_value_that_is_too_short_is_not_received(kind: type[Message]) -> None:
     whole = noise(kind, random.Random(2))
     size = next(size for size in range(64) if wire.decode(whole.data[:size]) is not None and size >= 4)
-    assert wire.receive([whole.data[: size - 1]]) == []
-    assert repr(wire.unpacked(whole)) == repr(wire.decode(whole.data[:size]))
+    assert receive([whole.data[: size - 1]]) == []
+    assert repr(list(unpacked([whole]))) == repr([wire.decode(whole.data[:size])])
 
 
 def test_event_of_values_has_arguments_of_fixed_size_and_a_byte_as_number() -> None:
@@ -93,7 +85,7 @@ def test_newer_value_replaces_that_of_the_same_gimbal_alone() -> None:
     element = Gimbal(Commander())
     for id, pitch in ((0, 10.0), (1, 20.0), (0, 30.0)):
         frames = (gimbal.FrameOfReference.RELATIVE,) * 3
-        defer(element, gimbal.Attitude(id, *frames, 0.0, pitch, 0.0, 0.0, 0.0, 0.0))
+        defer(element, arrived(gimbal.Attitude(id, *frames, 0.0, pitch, 0.0, 0.0, 0.0, 0.0)))
     assert [element[id].attitude.relative.pitch for id in (0, 1)] == [30.0, 20.0]  # type: ignore[union-attr]
 
 
@@ -101,14 +93,14 @@ def test_watch_notices_a_deferred_value() -> None:
     gps = Gps()
     watch = StateWatch(gps)
     assert watch.has_changed()
-    defer(gps, ardrone3.GpsLocationChanged(48.0, 2.0, 100.0, 1, 1, 1))
+    defer(gps, arrived(ardrone3.GpsLocationChanged(48.0, 2.0, 100.0, 1, 1, 1)))
     assert watch.has_changed()
     assert not watch.has_changed()
 
 
 def test_reset_forgets_deferred_values() -> None:
     gps = Gps()
-    defer(gps, ardrone3.GpsLocationChanged(48.0, 2.0, 100.0, 1, 1, 1))
+    defer(gps, arrived(ardrone3.GpsLocationChanged(48.0, 2.0, 100.0, 1, 1, 1)))
     gps.reset()
     assert gps.state == Gps.NOTHING
     assert gps.settled == Gps.NOTHING
@@ -118,7 +110,7 @@ async def test_settled_state_has_events_but_no_waiting_values() -> None:
     piloting = Drone("127.0.42.1").piloting
     landed = ardrone3.FlyingStateChanged(FlyingState.LANDED)
     piloting.state = piloting.REDUCERS[ardrone3.FlyingStateChanged](piloting.state, landed)
-    defer(piloting, ardrone3.SpeedChanged(1.0, 2.0, 3.0))
+    defer(piloting, arrived(ardrone3.SpeedChanged(1.0, 2.0, 3.0)))
     assert (piloting.settled.flying, piloting.settled.velocity) == (FlyingState.LANDED, None)
     assert (piloting.state.flying, piloting.state.velocity) == (FlyingState.LANDED, Velocity(1.0, 2.0, 3.0))
     assert piloting.settled.velocity == Velocity(1.0, 2.0, 3.0)
@@ -143,8 +135,9 @@ class Journal:
         return -1.0 if attitude is None else attitude.roll
 
     def _on_values(self, values: Values, now: float) -> None:
-        assert [value.kind for value in values.values()] == list(values)
-        self.lines.append((*(type(value.unpack()).__name__ for value in values.values()), self._roll()))
+        messages = tuple(values.messages())
+        assert tuple(map(type, messages)) == values.layout.kinds
+        self.lines.append((*(type(message).__name__ for message in messages), self._roll()))
         if camera.ZoomLevel in values:
             self._last.set()
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+from support.values import arrived
 
-from anafi_mav.arsdk.codec import wire
 from anafi_mav.clock import SystemClock
 from anafi_mav.drone import Drone, events
 from anafi_mav.drone.events import Message
@@ -61,7 +61,7 @@ def test_handler_of_values_is_called_once_for_those_that_arrive_together() -> No
     called: list[str] = []
 
     def handler(name: str) -> Callable[[Values, float], None]:
-        return lambda values, now: called.append(f"{name}: {len(values)} at {now}")
+        return lambda values, now: called.append(f"{name}: {len(values.layout.kinds)} at {now}")
 
     handlers = ValueHandlers(
         [
@@ -77,8 +77,7 @@ def test_handler_of_values_is_called_once_for_those_that_arrive_together() -> No
         (events.AltitudeChanged(1.0),),
     ):
         for now in (1.5, 2.5):
-            packed = [one for one in wire.receive(map(wire.encode, values)) if isinstance(one, wire.PackedMessage)]
-            handlers.call({one.kind: one for one in packed}, now)
+            handlers.call(arrived(*values), now)
     assert called == [
         *("vehicle: 2 at 1.5", "speed: 2 at 1.5", "vehicle: 2 at 2.5", "speed: 2 at 2.5"),
         *("height: 1 at 1.5", "height: 1 at 2.5"),
@@ -95,12 +94,11 @@ def test_handler_of_values_is_called_while_its_interest_is_on() -> None:
             task.switch(False)
 
     handlers = ValueHandlers([{lambda values, now: called.append(f"task at {now}"): task, first: speed}])
-    (packed,) = wire.receive([wire.encode(events.SpeedChanged(0.0, 0.0, 0.0))])
-    assert isinstance(packed, wire.PackedMessage)
+    values = arrived(events.SpeedChanged(0.0, 0.0, 0.0))
     for now, is_on in ((1.0, False), (2.0, True), (3.0, False), (4.0, True), (5.0, False)):
         if now != 5.0:  # the handler switched it off
             task.switch(is_on)
-        handlers.call({packed.kind: packed}, now)
+        handlers.call(values, now)
     assert called == [
         *("first at 1.0", "task at 2.0", "first at 2.0", "first at 3.0", "task at 4.0", "first at 4.0"),
         "first at 5.0",

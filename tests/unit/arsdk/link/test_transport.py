@@ -8,6 +8,7 @@ import pytest
 from support.faulty_wire import Faults, FaultyWire
 
 from anafi_mav.arsdk.codec import wire
+from anafi_mav.arsdk.codec.value_events import unpacked
 from anafi_mav.arsdk.link.frame import Frame, FrameType, decode_frames, encode_frame, with_length
 from anafi_mav.arsdk.link.transport import (
     MAX_QUEUED,
@@ -62,7 +63,7 @@ def ack(version: int, id: int, seq: int) -> bytes:
 
 def messages(events: list[Event]) -> list[object]:
     frames = [event.messages for event in events if isinstance(event, ReceivedMessages)]
-    return [wire.unpacked(message) for frame in frames for message in frame]
+    return [message for frame in frames for message in unpacked(frame)]
 
 
 # -- queues

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 
 import pytest
+from support.values import arrived
 
-from anafi_mav.arsdk.codec import wire
 from anafi_mav.drone import events
 from anafi_mav.drone.events import FrameOfReference, Message
-from anafi_mav.drone.values import Values
 from anafi_mav.services.camera.camera_pose import EventSamples
 from anafi_mav.services.camera.pose_track import FURTHEST, SAMPLES, SPACING, PoseTrack, SampleTrack
 
@@ -114,13 +113,6 @@ def test_pose_is_complete_once_newer_samples_have_arrived() -> None:
     assert poses.is_complete(1.1)
 
 
-def reported(*messages: Message) -> Values:
-    """Return events as they arrive."""
-    packed = [one for one in wire.receive(map(wire.encode, messages)) if isinstance(one, wire.PackedMessage)]
-    assert len(packed) == len(messages)
-    return {one.kind: one for one in packed}
-
-
 def attitude_of_gimbal(id: int, yaw: float) -> Message:
     frame = FrameOfReference.RELATIVE
     return events.GimbalAttitudeChanged(id, frame, frame, frame, yaw, 99.0, 99.0, 99.0, -30.0, 5.0)
@@ -134,8 +126,8 @@ def test_samples_of_events_are_read_from_their_bytes() -> None:
         events.AltitudeChanged(12.5),
         events.AttitudeChanged(99.0, 99.0, 0.5),
     )
-    samples.add(reported(heading, speed, height, attitude_of_gimbal(0, 20.0)), 1.0)
-    samples.add(reported(events.GpsLocationChanged(48.0, 2.0, 100.0, 1, 1, 1)), 1.0)
+    samples.add(arrived(heading, speed, height, attitude_of_gimbal(0, 20.0)), 1.0)
+    samples.add(arrived(events.GpsLocationChanged(48.0, 2.0, 100.0, 1, 1, 1)), 1.0)
     pose = poses.pose(1.0)
     assert pose.place == pytest.approx((48.0, 2.0))
     assert pose.height == 12.5
@@ -148,20 +140,20 @@ def test_samples_of_events_are_read_from_their_bytes() -> None:
 
 def test_events_without_values_are_no_samples() -> None:
     samples = EventSamples()
-    samples.add(reported(events.AltitudeChanged(12.5), attitude_of_gimbal(0, 20.0)), 1.0)
-    samples.add(reported(events.AltitudeChanged(math.nan), attitude_of_gimbal(1, 80.0)), 1.2)
+    samples.add(arrived(events.AltitudeChanged(12.5), attitude_of_gimbal(0, 20.0)), 1.0)
+    samples.add(arrived(events.AltitudeChanged(math.nan), attitude_of_gimbal(1, 80.0)), 1.2)
     assert samples.heights.value(1.2) == (12.5,)
     gimbal = samples.gimbals.value(1.2)
     assert gimbal is not None
     assert gimbal[2] == pytest.approx(math.radians(20.0))
-    samples.add(reported(events.GpsLocationChanged(500.0, 500.0, 500.0, -1, -1, -1)), 1.2)
+    samples.add(arrived(events.GpsLocationChanged(500.0, 500.0, 500.0, -1, -1, -1)), 1.2)
     assert not PoseTrack(samples).is_complete(1.2)
 
 
 def test_events_closer_than_the_spacing_are_left_out() -> None:
     samples = EventSamples()
     for number in range(4):
-        samples.add(reported(events.AltitudeChanged(float(number))), 1.0 + 0.75 * SPACING * number)
+        samples.add(arrived(events.AltitudeChanged(float(number))), 1.0 + 0.75 * SPACING * number)
     assert samples.heights.value(1.0 + 0.75 * SPACING) == pytest.approx((1.0,))
     assert samples.heights.newest == 1.0 + 1.5 * SPACING
 
@@ -170,13 +162,13 @@ def test_events_closer_than_the_spacing_leave_out_no_place_and_no_kind_that_is_d
     samples = EventSamples()
     heading, speed = events.AttitudeChanged(0.0, 0.0, 0.5), events.SpeedChanged(10.0, 0.0, 0.0)
     kinds = heading, speed, events.AltitudeChanged(12.5), attitude_of_gimbal(0, 20.0)
-    samples.add(reported(*kinds), 1.0)
-    samples.add(reported(heading, events.GpsLocationChanged(48.0, 2.0, 100.0, 1, 1, 1)), 1.0 + 0.5 * SPACING)
+    samples.add(arrived(*kinds), 1.0)
+    samples.add(arrived(heading, events.GpsLocationChanged(48.0, 2.0, 100.0, 1, 1, 1)), 1.0 + 0.5 * SPACING)
     assert (samples.headings.newest, samples.places.newest) == (1.0, 1.0 + 0.5 * SPACING)
-    samples.add(reported(speed), 1.0 + 1.5 * SPACING)
-    samples.add(reported(*kinds), 1.0 + 2.0 * SPACING)  # only speed is too near to its last sample
+    samples.add(arrived(speed), 1.0 + 1.5 * SPACING)
+    samples.add(arrived(*kinds), 1.0 + 2.0 * SPACING)  # only speed is too near to its last sample
     newest = samples.headings.newest, samples.velocities.newest, samples.heights.newest, samples.gimbals.newest
     assert newest == tuple(1.0 + share * SPACING for share in (2.0, 1.5, 2.0, 2.0))
     samples.clear()
-    samples.add(reported(*kinds), 1.0 + 2.5 * SPACING)
+    samples.add(arrived(*kinds), 1.0 + 2.5 * SPACING)
     assert samples.headings.newest == 1.0 + 2.5 * SPACING

@@ -63,6 +63,18 @@ def test_updates_of_one_loop_iteration_are_one_bundle() -> None:
     assert tracker.take() == ((), 4.0)
 
 
+def test_counted_updates_are_those_of_a_bundle_that_is_taken() -> None:
+    taken, counted = registered(), registered()
+    for number in range(1, 26):
+        assert bundled(taken, "ab", 0.2 * number) == counted.count(("a", "b"), 0.2 * number)
+    assert not counted.has_updates
+    assert counted.ids(("a", "b")) == (1, 2, 3)
+    assert [counted.at(id) for id in (1, 2, 4)] == [taken.at(id) for id in (1, 2, 4)] == [5.0, 5.0, None]
+    assert counted.interval(1, 5.0) == taken.interval(1, 5.0) == pytest.approx(0.2)
+    assert counted.mark("c", 6.0)
+    assert counted.has_updates
+
+
 def test_how_often_a_message_is_new() -> None:
     tracker = registered()
     assert tracker.interval(1, 0.0) is None
