@@ -28,7 +28,7 @@ from support.fault_scenarios import (
 from support.mav import NAN, Client
 from support.missions import LAND as LAND_ITEM
 from support.missions import put, start, takeoff, way
-from support.setpoints import local, streaming
+from support.setpoints import attitude, local, streaming
 from support.world import HOLD, LAND, POSITION, RETURN, World, world
 
 from anafi_mav.arsdk.messages import ardrone3
@@ -249,6 +249,20 @@ async def test_landing_of_the_pilot_after_a_land_that_was_never_sent_is_ended_by
         await watched(5.0)  # until another Hold counts
         assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == REJECTED
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
+
+
+async def test_landing_of_another_controller_begins_level_under_tilting_setpoints() -> None:
+    """What a firmware keeps of the last PCMD must not carry it sideways to the ground."""
+    async with world(speed=1.0) as w:
+        await w.take_off(8.0)
+        async with streaming(w.client, attitude(pitch=-0.15)):
+            assert (await w.client.command(SET_MODE, *PX4_OFFBOARD)).result == ACCEPTED
+            await w.drone.wait_log(lambda e: e.name.endswith("PCMD") and e.args["pitch"] > 0, 5.0)
+            another_controller(w, ardrone3.Landing())
+            await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landing", 5.0)
+            await w.drone.wait_log(lambda e: e.name.endswith("PCMD") and e.args["pitch"] == 0, 1.0)
+            await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
+        assert sticks(w)[-1] == (0, 0, 0, 0, 0)
 
 
 # Callers without the right.

@@ -86,7 +86,7 @@ class LandingEnd:
         finally:
             self._commander.cancel(answer.token)  # whatever ended this: it must not arrive on the ground
             answer.close()
-            self._sticks.centre_after_gaz()
+            self._sticks.centre_in_landing()
 
     async def _hold_gaz(self, ended: asyncio.Future[bool]) -> None:
         """Send full gaz every 50 ms until the drone reports another state than a landing.

@@ -95,6 +95,8 @@ class Piloting(PilotingSettings):
     def _on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
         self._moves.on_flying_state(message, now)
         self._motors.on_flying_state(message, now)
+        if message.state is FlyingState.LANDING:
+            self._sticks.landing_begun()
 
     def _obeyed(self, order: type[Message]) -> None:
         self._stopping.pop(order, None)

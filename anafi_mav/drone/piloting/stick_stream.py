@@ -53,8 +53,8 @@ class StickStream:
         self._home = home
         self._sticks = StickSchedule()
         self._next = Alarm(self.pump)
-        self._after_gaz = False
-        """The centred PCMDs that follow the gaz against a landing are sent although the drone is said to land."""
+        self._levels = False
+        """Centred PCMDs are sent although the drone is said to land: they follow a deflection."""
         self.landings_asked = 0
         """Landings that were ordered and have not been answered: nothing is sent that could cancel one."""
 
@@ -90,7 +90,7 @@ class StickStream:
         The caller has checked `blocked`.
         """
         now = loop_time()
-        self._after_gaz = False
+        self._levels = False
         self._sticks.command(position, now, now - age)
         self._next.cancel()
         self._send_due(now, at_once=True)
@@ -108,19 +108,24 @@ class StickStream:
         if self._flight.state.flying == FlyingState.LANDING and not self.landings_asked:
             self._send(self._sticks.single(position, loop_time()))
 
-    def centre_after_gaz(self) -> None:
+    def centre_in_landing(self) -> None:
         """Centre for two seconds, in a landing too.
 
-        A firmware that keeps the last PCMD must not keep the gaz.
+        A firmware that keeps the last PCMD must keep neither the gaz against the landing nor the tilt before it.
         """
-        self._after_gaz = True
+        self._levels = True
         self.centre()
+
+    def landing_begun(self) -> None:
+        """Let go of a deflection, which a landing that this program did not command has found."""
+        if self._sticks.active and self._sticks.deflected and not self.landings_asked and not self._pilot_has_source():
+            self.centre_in_landing()
 
     def pump(self) -> None:
         """Send the PCMD that is due and come back for the next."""
         self._next.cancel()
         lands = self._flight.state.flying == FlyingState.LANDING and not self.landings_asked
-        if self.dead is not None and not (lands and self._after_gaz and self._commander.connected):
+        if self.dead is not None and not (lands and self._levels and self._commander.connected):
             self._sticks.stop()
         self._send_due(loop_time())
 
@@ -143,7 +148,7 @@ class StickStream:
 
     def silence(self) -> None:
         """Stop sending PCMDs: something else flies the drone now."""
-        self._after_gaz = False
+        self._levels = False
         self._sticks.stop()
         self._next.cancel()
 

@@ -130,6 +130,11 @@ class StickSchedule:
         return self._remaining is None
 
     @property
+    def deflected(self) -> bool:
+        """The position that was sent last is off the middle."""
+        return self._last != CENTRED
+
+    @property
     def deadline(self) -> float | None:
         """When the next PCMD is due; None when none is."""
         return self._next if self._remaining != 0 else None
@@ -146,9 +151,8 @@ class StickSchedule:
 
     def centre(self, now: float) -> None:
         """Let go: centred from now on, for two seconds. The end of a deflection waits for nothing."""
-        deflected = self._last != CENTRED
         self._position, self._remaining = CENTRED, CENTRED_REPEATS
-        self._next = now if deflected else max(now, self._paid_until - MIN_SPACING)
+        self._next = now if self.deflected else max(now, self._paid_until - MIN_SPACING)
 
     def stop(self) -> None:
         """Send nothing any more."""

@@ -65,6 +65,19 @@ async def test_gaz_against_landing_ends_after_a_second_centred(drone: Drone, dev
     assert gaz(device)[-20:] == [LEVEL] * 20
 
 
+async def test_landing_of_another_levels_the_sticks_that_it_finds_deflected(
+    drone: Drone, device: ScriptedDevice
+) -> None:
+    await reported(drone, device, FlyingState.FLYING)
+    drone.piloting.pilot(PilotingCommand(roll_deg=10.0, pitch_deg=0.0, yaw_rate_dps=0.0, climb_mps=0.0))
+    await device.until(ardrone3.PCMD, 2)
+    count = len(gaz(device))
+    assert gaz(device)[-1][1] > 0
+    await reported(drone, device, FlyingState.LANDING)
+    await device.until(ardrone3.PCMD, count + 5)
+    assert set(gaz(device)[count:]) == {LEVEL}
+
+
 async def test_touchdown_ends_the_gaz_and_nothing_starts_the_motors(drone: Drone, device: ScriptedDevice) -> None:
     await reported(drone, device, FlyingState.LANDING)
     ending = await begun(drone.piloting.end_landing())
