@@ -20,9 +20,9 @@ from support.fault_scenarios import (
     REJECTED,
     SET_MODE,
     TAKEOFF_CMD,
+    another_controller,
     goto,
     home_being_undone,
-    somebody_else,
     until,
     watched,
 )
@@ -66,7 +66,7 @@ async def test_takeoff_is_refused_when_another_controller_takes_off_in_its_wait(
         mark, began = w.client.mark(), now()
         w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=UP)
         await watched(0.5)
-        somebody_else(w, ardrone3.TakeOff())
+        another_controller(w, ardrone3.TakeOff())
         assert await answer(w, mark, TAKEOFF_CMD) == REJECTED
         await watched(6.0)
         assert motion(w, began) == []
@@ -80,7 +80,7 @@ async def test_mission_start_without_arming_is_refused_when_another_controller_t
         mark = w.client.mark()
         w.client.send_command(START)
         await watched(0.5)
-        somebody_else(w, ardrone3.TakeOff())
+        another_controller(w, ardrone3.TakeOff())
         assert await answer(w, mark, START) == REJECTED
 
 
@@ -106,7 +106,7 @@ async def test_calibration_is_refused_when_another_controller_takes_off_in_its_w
         mark, began = w.client.mark(), now()
         w.client.send_command(CALIBRATION, 0.0, 1.0)
         await watched(0.5)
-        somebody_else(w, ardrone3.TakeOff())
+        another_controller(w, ardrone3.TakeOff())
         assert await answer(w, mark, CALIBRATION) == REJECTED
         assert heard(w, "MagnetoCalibration", since=began) == []
 
@@ -186,7 +186,7 @@ async def test_hold_leaves_a_return_that_the_pilot_begins_in_its_wait() -> None:
         mark, began = w.client.mark(), now()
         w.client.send_command(SET_MODE, *PX4_HOLD)
         await watched(0.2)
-        somebody_else(w, rth.ReturnToHome())
+        another_controller(w, rth.ReturnToHome())
         assert await answer(w, mark, SET_MODE) == REJECTED
         await watched(2.0)
         assert heard(w, "abort", since=began) == []
@@ -216,7 +216,7 @@ async def test_task_leaves_a_return_that_another_controller_begins_in_its_wait(n
             case _:
                 w.client.send_command(START)
         await watched(1.0)
-        somebody_else(w, rth.ReturnToHome())
+        another_controller(w, rth.ReturnToHome())
         results = dict(await until(w.client, mark, 2))
         results.pop(dialect.MAV_CMD_DO_SET_HOME)
         assert [*results.values()] == [REJECTED]
