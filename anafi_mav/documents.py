@@ -73,6 +73,13 @@ class _Loader(yaml.SafeLoader):
                 seen.add(key.value)
         return node
 
+    def construct_scalar(self, node: yaml.ScalarNode | yaml.MappingNode) -> Any:
+        """Return the text of a node; half a character, an escape like \\ud800, is none."""
+        value = super().construct_scalar(node)
+        if isinstance(value, str) and not value.isascii() and any("\ud800" <= one <= "\udfff" for one in value):
+            raise yaml.constructor.ConstructorError(None, None, "half a character (surrogate)", node.start_mark)
+        return value
+
 
 _short = reprlib.Repr()
 _short.maxstring = 60

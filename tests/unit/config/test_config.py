@@ -282,6 +282,7 @@ MISTAKES = {
     "drones:\n  - a: b: c": "fleet.yaml, line 2, column 9: mapping values are not allowed here",
     "allow_kill: true\nallow_kill: false": "fleet.yaml, line 2, column 1: the key 'allow_kill' stands twice in one mapping",
     "a: !!python/object:os.system x": "fleet.yaml, line 1, column 4: could not determine a constructor for the tag 'tag:yaml.org,2002:python/object:os.system'",
+    'pose: "\\ud800"': "fleet.yaml, line 1, column 7: half a character (surrogate)",
     "a: 2026-02-31": "fleet.yaml: day is out of range for month",
     "[" * 5000: "fleet.yaml: lists or mappings inside each other without end",
 }  # fmt: skip
