@@ -18,6 +18,7 @@ import logging
 import os
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Iterable
 from pathlib import Path
@@ -107,6 +108,8 @@ class StateLock:
         self._file: int | None = None
         self._own: int | None = None
         """The folder itself, where it can be locked: a person may delete a lock file that looks old."""
+        self._access = threading.Lock()
+        """Held while the file is written, by a thread, or closed: its descriptor may be another file's later."""
 
     def acquire(self) -> Holder | None:
         """Lock the folder and return None, or return the gateway that holds it.
@@ -148,21 +151,22 @@ class StateLock:
 
     def write(self, drones: Iterable[HeldDrone], web: str = "") -> None:
         """Replace what the file says. A full disk is no reason to end a flight."""
-        if self._file is None:
-            return
         line = msgspec.json.encode(Holder(VERSION, os.getpid(), tuple(drones), web)) + b"\n"
-        with contextlib.suppress(OSError):
+        with self._access, contextlib.suppress(OSError):
+            if self._file is None:
+                return
             os.lseek(self._file, 0, os.SEEK_SET)
             os.write(self._file, line)  # readers take the first line: what follows it for an instant is old
             os.ftruncate(self._file, len(line))
 
     def release(self) -> None:
         """Unlock the folder. Safe to call twice."""
-        if self._file is not None:
-            with contextlib.suppress(OSError):
-                os.ftruncate(self._file, 0)
-            os.close(self._file)
-            self._file = None
+        with self._access:
+            if self._file is not None:
+                with contextlib.suppress(OSError):
+                    os.ftruncate(self._file, 0)
+                os.close(self._file)
+                self._file = None
         if self._own is not None:
             os.close(self._own)
             self._own = None

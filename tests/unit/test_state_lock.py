@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -65,6 +66,26 @@ def test_state_lock_whose_file_was_deleted_is_still_held(tmp_path: Path) -> None
     first.release()
     assert second.acquire() is None
     second.release()
+
+
+def test_state_lock_that_is_released_while_it_is_written_closes_no_other_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A thread writes the file, and the event loop releases it."""
+    lock = StateLock(tmp_path)
+    assert lock.acquire() is None
+    releasing, lseek = threading.Thread(target=lock.release), os.lseek
+
+    def release_meanwhile(file: int, *where: int) -> int:
+        place = lseek(file, *where)
+        releasing.start()
+        releasing.join(0.1)  # it waits for the write
+        return place
+
+    monkeypatch.setattr(os, "lseek", release_meanwhile)
+    lock.write((ALPHA,))
+    releasing.join()
+    assert (tmp_path / FILE).read_bytes() == b""
 
 
 def test_state_lock_of_a_killed_process_is_free(tmp_path: Path) -> None:
