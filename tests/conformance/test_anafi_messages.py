@@ -119,7 +119,7 @@ async def test_checklist() -> None:
         w.drone.faults.magneto_required = True
         observed = await w.client.wait("ANAFI_CHECKLIST", lambda m: m.checks_failed)
         assert observed.checks_failed == dialect.ANAFI_CHECK_MAGNETO_CALIBRATION
-        assert observed.checks_reported & observed.checks_failed
+        assert observed.checks_told & observed.checks_failed
         on, off = alarms.State.ON, alarms.State.OFF
         w.drone.inject(alarms.Alarms(alarms.Type.HORIZONTAL_GEOFENCE_REACHED, on, FIRST))
         w.drone.inject(alarms.Alarms(alarms.Type.MAGNETO_PERTURBATION, off, LAST))
