@@ -126,8 +126,7 @@ async def test_checklist() -> None:
         observed = await w.client.wait("ANAFI_CHECKLIST", lambda m: m.alarms_raised)
         assert observed.alarms_raised == dialect.ANAFI_ALARM_HORIZONTAL_GEOFENCE
         assert (
-            observed.alarms_reported
-            == dialect.ANAFI_ALARM_HORIZONTAL_GEOFENCE | dialect.ANAFI_ALARM_MAGNETO_PERTURBATION
+            observed.alarms_told == dialect.ANAFI_ALARM_HORIZONTAL_GEOFENCE | dialect.ANAFI_ALARM_MAGNETO_PERTURBATION
         )
 
 

@@ -14,6 +14,7 @@ from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.codec.value_events import unpacked
 from anafi_mav.arsdk.codec.wire import Bits, Blob, Buffer, Message, MessageId, Scalar, Text, UnknownMessage
 from anafi_mav.arsdk.link.frame import FrameType, encode_frame
+from anafi_mav.arsdk.link.known_payloads import KnownPayloads
 from anafi_mav.arsdk.link.transport import (
     MAX_QUEUED,
     Delivered,
@@ -79,15 +80,18 @@ def throw(role: Role, version: int, count: int, seed: str) -> Outcome:
 
 
 def _memory(victim: Transport) -> tuple[int, int]:
-    """Bytes of what can be reached from the transport, code left out, and the number of pieces of memory that the
-    process has. Asked twice this costs nothing, where tracemalloc makes every frame take six times as long."""
+    """Return the bytes of what can be reached from the transport, and the pieces of memory that the process has.
+
+    Left out are code, and what all transports share, which has a limit. Called twice this costs nothing, where
+    tracemalloc makes every frame take six times as long.
+    """
     gc.collect()
     blocks = sys.getallocatedblocks()
     found: dict[int, object] = {}
     waiting: list[object] = [victim]
     while waiting:
         thing = waiting.pop()
-        if id(thing) not in found and not isinstance(thing, type | ModuleType | FunctionType):
+        if id(thing) not in found and not isinstance(thing, type | ModuleType | FunctionType | KnownPayloads):
             found[id(thing)] = thing
             waiting += gc.get_referents(thing)
     return sum(map(sys.getsizeof, found.values())), blocks
