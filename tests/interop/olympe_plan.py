@@ -59,7 +59,7 @@ class Plan(Visit):
         self.flying_state("in the air", "hovering")
         self.expect("point of interest", StartPilotedPOIV2(48.8789, 2.3680, 0.0, "locked_gimbal"))
         self.expect("no more", StopPilotedPOI())
-        self.expect("start anew", Start(filepath=uid, type=type))
+        self.expect("start again", Start(filepath=uid, type=type))
         self.expect("stop", Stop())
         self.expect("landing", Landing())
         self.flying_state("on the ground", "landed")
