@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from anafi_mav import texts, units
 from anafi_mav.drone import MoveEnd, Position
+from anafi_mav.drone.piloting.piloting import Piloting
 from anafi_mav.texts import Subject
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import check_height, check_place
@@ -53,6 +54,10 @@ class Goto(PlainTask):
     @property
     def rules(self) -> TaskRules:
         return GOTO
+
+    def is_flown(self, piloting: Piloting) -> bool:
+        """Return True when the drone flies there."""
+        return piloting.move is not None and piloting.move.target is not None and self.is_to(piloting.move.target)
 
     def is_to(self, target: Position) -> bool:
         """True when a moveTo with this target (height above take-off) flies there."""
@@ -158,20 +163,18 @@ class GuidedFlight:
 
         `condition` checks what the client has set of place and height; None: the place.
         """
-        control, before, epoch = self._vehicle.control, self.goto, self._vehicle.control.epoch
+        control, piloting = self._vehicle.control, self._vehicle.drone.piloting
+        setpoint, epoch = None if isinstance(control.active, Goto) else self.goto, control.epoch
         condition = condition or (lambda: self.check(goto.place, None))
         try:
             async with control.acquire(goto, by=by, below=Hover(goto.mode), condition=condition) as grant:
                 grant.begin()
                 await self.move(goto)
         except BaseException:
-            if before is not None and control.epoch != epoch and self._flies_to(before):
-                control.adopt(before, below=Hover(before.mode))  # a failed change of height or speed ends no goto
+            # The move of a single setpoint goes on as a goto does, whose task `acquire` makes active again.
+            if setpoint is not None and control.epoch != epoch and control.is_free and setpoint.is_flown(piloting):
+                control.adopt(setpoint, below=Hover(setpoint.mode))
             raise
-
-    def _flies_to(self, goto: Goto) -> bool:
-        move = self._vehicle.drone.piloting.move
-        return move is not None and move.target is not None and goto.is_to(move.target)
 
     async def move(self, goto: Goto) -> None:
         """Let the drone begin the move of the active task; no await before the moveTo."""

@@ -36,6 +36,7 @@ from support.world import HOME, World, world
 from anafi_mav.arsdk.messages import ardrone3, rth
 
 START, ORBIT = dialect.MAV_CMD_MISSION_START, dialect.MAV_CMD_DO_ORBIT
+PAUSE = dialect.MAV_CMD_DO_PAUSE_CONTINUE
 CALIBRATION = dialect.MAV_CMD_PREFLIGHT_CALIBRATION
 UP = 8.0
 PITCH_STICK = 3
@@ -223,3 +224,24 @@ async def test_task_leaves_a_return_that_another_controller_begins_in_its_wait(n
         await watched(2.0)
         assert heard(w, "abort", since=began) == []
         assert w.drone.firmware.homing.active
+
+
+# What flew before goes on.
+
+
+async def test_goto_goes_on_in_its_mode_when_a_request_is_refused_after_its_wait() -> None:
+    """The drone flies on to the target, so the goto is active again: Continue after a Pause flies it."""
+    async with world(speed=1.0) as w:
+        await w.take_off(UP)
+        assert await goto(w, 60.0, UP) == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 2.0, 20.0)
+        await home_being_undone(w)
+        mark = w.client.mark()
+        w.client.send_command(ORBIT, 100.0, 2.0, 0.0, 0.0, frame=5, x=HOME[0], y=HOME[1], z=HOME[2] + UP)
+        await watched(0.5)
+        assert (await upload(w.client, square(HOME[:2], 80.0), FENCE)).type == ACCEPTED
+        assert await answer(w, mark, ORBIT) == DENIED
+        assert (await w.client.command(PAUSE, 0)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["vn"]) < 0.1, 10.0)
+        assert (await w.client.command(PAUSE, 1)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 55.0, 30.0)

@@ -133,6 +133,11 @@ class Control:
         return self._situation.next
 
     @property
+    def is_free(self) -> bool:
+        """True while no task is active or being acquired, and the drone neither lands nor returns."""
+        return self._situation.task is None and self._situation.pending is None and self._situation.act is None
+
+    @property
     def next_below(self) -> FlightTask | None:
         """The hovering mode that a pending request leads to; None without one, and for Hold."""
         now = self._situation
@@ -220,9 +225,9 @@ class Control:
     ) -> AsyncIterator[Grant]:
         """Acquire control for a task, in an action; the block prepares and starts it.
 
-        The task becomes active by `Grant.begin`, at the end of the block at the latest. When the block raises, the
-        hovering mode of before is active again; after `begin` it is the one below the task. A newer request cancels the
-        action, and is not disturbed by either.
+        The task becomes active by `Grant.begin`, at the end of the block at the latest. When the request fails, the
+        hovering mode of before is active again; after `begin` it is the one below the task. So is the task of before if
+        the drone flies it on. A newer request cancels the action, and is not disturbed by either.
 
         `below`: the hovering mode after the task; None: Hold. `pauses`: streams do not leave it. `rules`: for this
         request, instead of the task's own. `condition`: what the request needs beyond them. A caller checks nothing
@@ -242,7 +247,7 @@ class Control:
                 raise Refused(rules.what, texts.PILOT)
 
         check()
-        number = self.epoch + 1
+        before, number = self.active, self.epoch + 1
         own = task if rules.lasts and not rules.is_hover else None
         hover = task if rules.is_hover else below
         attempt = Attempt(own, number, hover, rules.keeps_below, pauses, rules.is_urgent)
@@ -264,6 +269,8 @@ class Control:
         except BaseException as error:
             self.handle(Event.FAIL, Input(attempt))
             self.handle(Event.FINISH, Input(task=own, number=number))
+            if before is not None and self.is_free and before.is_flown(piloting):
+                self.adopt(before, keeps_below=True)
             if isinstance(error, CommandRejected):
                 reason = self._aircraft.lacking(rules.needs) or texts.from_below(error.reason)
                 raise Refused(rules.what, reason) from error

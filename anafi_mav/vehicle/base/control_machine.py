@@ -6,7 +6,8 @@ the drone is in this module:
 * At most one task is active. Below it is a hovering mode (Hold, Guided, Position), which is active after the task.
 * A request is an `Attempt`, a value with a number. What is reported of an attempt that a newer request has replaced
   changes nothing.
-* While a request is pending nothing flies. If it fails, the hovering mode of before is active again, never a task.
+* While a request is pending nothing flies. If it fails, the hovering mode of before is active again, never a task:
+  a move that the drone has flown on with is adopted (`Control.acquire`).
 * A landing, a return or a motor cut that no task commanded ends the active task, and leaves the hovering mode.
 * A pause lasts until another mode or a command: streams cannot leave it.
 * One task at most follows the active one (the successor of a take-off): any request withdraws it.

@@ -19,6 +19,7 @@ from typing import Protocol
 from msgspec import Struct
 
 from anafi_mav import texts
+from anafi_mav.drone.piloting.piloting import Piloting
 from anafi_mav.texts import Subject
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.right import Extent
@@ -133,6 +134,12 @@ class FlightTask(Protocol):
         Never waits, never raises, and does nothing when the task is not active. Only `Control` calls it.
         """
 
+    def is_flown(self, piloting: Piloting) -> bool:
+        """Return True when the drone flies this task on although it has ended.
+
+        A move goes on until another command.
+        """
+
 
 class PlainTask:
     """Base of flight tasks: what most of them have in common."""
@@ -147,6 +154,10 @@ class PlainTask:
     def end(self) -> list[asyncio.Task[None]]:
         """End this task: another one flies now."""
         return []
+
+    def is_flown(self, piloting: Piloting) -> bool:
+        """Return True when the drone flies this task on although it has ended."""
+        return False
 
 
 @dataclass(frozen=True)
