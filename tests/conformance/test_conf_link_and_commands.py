@@ -80,7 +80,8 @@ async def test_conf_004_first_heartbeat_of_a_connection_is_the_autopilots() -> N
     """Six clients connect at different times of the second."""
     async with world() as w:
         for sysid in range(241, 247):
-            await asyncio.sleep(0.17)
+            for _ in range(2):
+                await w.client.wait("ATTITUDE")
             client = await w.connect(sysid)
             first = await client.wait(("HEARTBEAT", "CAMERA_HEARTBEAT"), since=0)
             assert (first.get_srcComponent(), first.autopilot) == (1, dialect.MAV_AUTOPILOT_PX4)

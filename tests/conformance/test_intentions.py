@@ -127,9 +127,10 @@ async def test_two_pauses_over_a_slow_link_are_continued_with_the_goto() -> None
         await leaves(w, 3.0)
         w.drone.faults.down = w.drone.faults.up = Impairment(delay=0.3)
         marks = [client.mark() for client in w.clients]
+        began = asyncio.get_running_loop().time()
         w.clients[1].send_command(PAUSE, 0)
-        await asyncio.sleep(0.2)
-        w.client.send_command(PAUSE, 0)
+        await w.drone.wait_log(lambda e: e.name.endswith("CancelMoveTo"), 2.0, since=began)
+        w.client.send_command(PAUSE, 0)  # the drone's answer is on its way
         assert (await until(w.clients[1], marks[1], 1))[0] == (PAUSE, CANCELLED)
         assert (await until(w.client, marks[0], 1))[0] == (PAUSE, ACCEPTED)
         count = len(moves(w))
@@ -144,9 +145,9 @@ async def test_continue_before_a_pause_has_begun_is_not_accepted_without_effect(
         w.drone.faults.down = w.drone.faults.up = Impairment(delay=0.3)
         w.clients[1].send_command(TURN, 180.0, 0, 1, 1)
         await w.drone.wait_log(lambda e: e.name.endswith(".moveBy") and e.args["dPsi"] != 0.0, 5.0)
-        mark = w.client.mark()
+        mark, began = w.client.mark(), asyncio.get_running_loop().time()
         w.client.send_command(PAUSE, 0)
-        await asyncio.sleep(0.2)
+        await w.drone.wait_log(lambda e: e.kind == "command" and "PCMD" not in e.name, 2.0, since=began)
         assert (await w.clients[1].command(PAUSE, 1)).result == REJECTED
         assert (await until(w.client, mark, 1))[0] == (PAUSE, ACCEPTED)
         assert (await w.client.command(PAUSE, 1)).result == ACCEPTED

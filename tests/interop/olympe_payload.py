@@ -82,7 +82,7 @@ class Payload(Visit):
         idle = camera.photo_state(cam_id=0, state="inactive", _policy="wait", _timeout=LIMIT)
         self.expect(name, camera.take_photo(0) >> idle)
         ok = all(self.heard(one) for one in (saved, observed, files))
-        self.say(f"{name}, told", ok)
+        self.say(f"{name}, reported", ok)
         self.result[name] = saved.received_events().last().args["media_id"] if ok else None
 
     def record(self) -> None:
@@ -106,7 +106,7 @@ class Payload(Visit):
         done = event.Photo(type="stop", stop_reason="capture_done", _policy="wait", _timeout=LIMIT)
         observed = self.drone.media(media_created(_timeout=LIMIT))
         self.expect("photo", command.StartPhoto(camera_id=0) & done)
-        self.say("photo, told", self.heard(observed))
+        self.say("photo, reported", self.heard(observed))
         configure("burst", photo_mode="burst", photo_burst_value="14_over_1s")
         done = event.Photo(type="stop", stop_reason="capture_done", _policy="wait", _timeout=LIMIT)
         self.expect("photos of a burst", command.StartPhoto(camera_id=0) & done)

@@ -57,9 +57,6 @@ FINAL_WITHIN = 45.0
 GAZ_FOR = 1.0
 """s of full gaz at most that end a landing (arsdk: ardrone3.xml 1-0-3)."""
 
-REPEATED = 0.6
-"""s by which the report that a landing has ended may be later on a link with loss: it is repeated every 150 ms."""
-
 RESENT_WITHIN = 0.5
 """s in which a command reaches the drone though datagrams are lost."""
 
@@ -761,15 +758,20 @@ def _judge_sticks(flight: Flight) -> None:
             ]
             spans.append((s.at, min(ends, default=math.inf)))
     late = flight.delay + SLACK
-    landings, down = _landings(flight.w), flight.drawn.down
-    reported = down.delay + (REPEATED if down.loss else 0.0)
+    landings = _landings(flight.w)
+    # A client's TAKEOFF ends a landing with gaz until it is answered, also one whose end has not been reported yet.
+    takeoffs = [
+        (s.at, min((at for at, _ in _finals(flight, s)), default=math.inf)) for s in flight.sent if s.command == TAKEOFF
+    ]
     for entry in flight.w.drone.log:
         if entry.kind != "command" or entry.name != "ardrone3.Piloting.PCMD" or entry.t < flight.began:
             continue
         args = entry.args
         gaz_alone = args["gaz"] == 100 and not (args["roll"] or args["pitch"] or args["yaw"])
-        if gaz_alone and any(a <= entry.t <= b + GAZ_FOR + late + reported for a, b in landings):
+        if gaz_alone and any(a <= entry.t <= b + GAZ_FOR + late + flight.drawn.down.delay for a, b in landings):
             continue  # it ends a landing
+        if gaz_alone and any(a <= entry.t <= b + late for a, b in takeoffs):
+            continue
         tilted = args["flag"] and (args["roll"] or args["pitch"])
         if (tilted or args["yaw"] or args["gaz"]) and not any(a <= entry.t <= b + late for a, b in spans):
             last = max((b for a, b in spans if a <= entry.t), default=-math.inf)

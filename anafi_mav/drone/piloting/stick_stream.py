@@ -117,7 +117,7 @@ class StickStream:
         self.centre()
 
     def landing_begun(self) -> None:
-        """Let go of a deflection, which a landing that this program did not command has found."""
+        """Centre sticks that are deflected when a landing begins that this program did not command."""
         if self._sticks.active and self._sticks.deflected and not self.landings_asked and not self._pilot_has_source():
             self.centre_in_landing()
 
