@@ -26,7 +26,7 @@ class _KnownFrame:
     __slots__ = ("fixed", "id", "layout", "unpack")
 
     def __init__(self, data: bytes, id: int, number: slice, places: Sequence[tuple[int, int]]) -> None:
-        """`id`: of its queue, `number`: where its sequence number is, `places`: where each command is."""
+        """`id`: of its queue, `number`: place of its sequence number, `places`: of its commands."""
         values = wire.value_events()
         found = {}
         format, position = f"<{number.start}s{number.stop - number.start}x", number.stop
@@ -43,19 +43,23 @@ class _KnownFrame:
 
 
 class KnownFrames:
-    """Unacknowledged frames of events of values, each alone in its datagram, which are read as a whole.
+    """Unacknowledged frames of events of values, each alone in its datagram.
 
-    The first one with the same events is read command by command. `version` is that of the protocol.
+    They are read as a whole. The first one with the same events is read command by command.
     """
 
     def __init__(self, version: int) -> None:
+        """`version`: of the protocol."""
         self._number = sequence_number(version)
         self._unpack_number = struct.Struct("<" + f"{self._number.start}x" + ("B" if version == 1 else "H")).unpack_from
         self._by_size: dict[int, list[_KnownFrame]] = {}
         self._count = 0
 
     def read(self, data: bytes) -> tuple[int, int, Values] | None:
-        """Return queue, sequence number and values of a frame whose like has arrived before; None for any other."""
+        """Return queue, sequence number and values of a frame.
+
+        None if none like it has arrived before.
+        """
         for known in self._by_size.get(len(data), ()):
             if known.unpack(data) == known.fixed:
                 return known.id, self._unpack_number(data)[0], Values(known.layout, data)

@@ -294,18 +294,17 @@ class Transport:
     def _is_new(self, type: int, id: int, seq: int) -> bool:
         """Return False for the copy of a frame, which is counted."""
         last = self._last_seq[id]
-        if type == _WITHACK:
-            is_copy = (last - seq) & self._seq_mask <= self._seq_mask >> 1
-        else:
-            is_copy = -10 <= seq - last <= 0
-        if is_copy:
+        if (last - seq) & self._seq_mask <= self._seq_mask >> 1 if type == _WITHACK else -10 <= seq - last <= 0:
             self.counters["duplicate"] += 1
             return False
         self._last_seq[id] = seq
         return True
 
     def _unpack(self, frame: Frame, events: list[Event], datagram: bytes | None) -> None:
-        """Read the commands of a frame. `datagram`: the one that has this frame alone; None: it has others."""
+        """Read the commands of a frame.
+
+        `datagram`: the one that has this frame alone; None: it has others.
+        """
         is_acknowledged = frame.type == _WITHACK
         commands, readable = self._unpacker.unpack(frame.id, is_acknowledged, frame.payload)
         messages = self._commands(commands, events)
