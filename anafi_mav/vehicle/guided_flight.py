@@ -178,7 +178,8 @@ class GuidedFlight:
     async def _fly(self, target: Callable[[], Goto], by: By) -> None:
         """Fly to a target that is known when what flew before has ended.
 
-        `target` raises `Refused` for one that is not flown to. It is called on both sides of each wait: a drone at speed is elsewhere after it.
+        `target` raises `Refused` for one that is not flown to. It is called on both sides of each wait: a drone at
+        speed is elsewhere after it.
         """
         control, piloting = self._vehicle.control, self._vehicle.drone.piloting
         setpoint, epoch = None if isinstance(control.active, Goto) else self.goto, control.epoch
