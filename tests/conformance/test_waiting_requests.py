@@ -202,7 +202,7 @@ async def test_change_of_altitude_is_refused_when_the_pilot_moves_a_stick_before
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 2.0, 20.0)
         pilot = w.drone.skycontroller
         assert pilot is not None
-        w.drone.faults.untold = frozenset({ardrone3.MoveToChanged.NAME})
+        w.drone.faults.unreported = frozenset({ardrone3.MoveToChanged.NAME})
         client, mark = await w.connect(sysid=250), w.client.mark()
         w.client.send_command(GOTO, -1, 1, 0, NAN, frame=6, x=HOME[0] - 0.0005, y=HOME[1], z=UP)
         await w.drone.wait_log(lambda e: e.kind == "command" and e.args.get("latitude", 90.0) < HOME[0], 5.0)
