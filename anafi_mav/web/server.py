@@ -100,7 +100,7 @@ _NO_HTTP = (HttpProcessingError, web.RequestPayloadError)
 
 
 def _is_ours(record: logging.LogRecord) -> bool:
-    """Return False for a request or a body that is no HTTP: bytes of a peer are no error."""
+    """False for the log line of a request or body that is no HTTP: not an error of ours."""
     return record.exc_info is None or not isinstance(record.exc_info[1], _NO_HTTP)
 
 
