@@ -401,7 +401,7 @@ class System:
 
     def stop_of(self, inbound: Inbound) -> Effect | None:
         """Return the effect of a message that stops the flight; None for any other."""
-        is_command = inbound.message.get_msgId() in COMMANDS
+        is_command = inbound.id in COMMANDS
         component = self.owner(inbound.message) if is_command else self._autopilot
         return stop_of(inbound, component.commands.action_of)
 
@@ -685,7 +685,7 @@ class System:
         for text in (texts.COMMAND_WITHOUT_DRONE, self.absence):
             for part in self._texts.messages(Severity.WARNING, text) if text is not None else ():
                 self._node.send(part, sysid=self.sysid, compid=AUTOPILOT, to=inbound.channel)
-        if message.get_msgId() in COMMANDS:
+        if inbound.id in COMMANDS:
             compid = message.target_component or self.owner(message).compid
             answer = _answer(inbound, dialect.MAV_RESULT_FAILED)
             self._node.send(answer, sysid=self.sysid, compid=compid, to=inbound.channel)
@@ -700,7 +700,7 @@ class System:
     def _refuse(self, inbound: Inbound) -> None:
         """Answer a command to one of the components in `ABSENT` alone: it is unsupported."""
         message = inbound.message
-        if message.get_msgId() in COMMANDS and message.target_system == self.sysid and message.target_component:
+        if inbound.id in COMMANDS and message.target_system == self.sysid and message.target_component:
             answer = _answer(inbound, dialect.MAV_RESULT_UNSUPPORTED)
             self._node.send(answer, sysid=self.sysid, compid=message.target_component, to=inbound.channel)
 
@@ -725,8 +725,8 @@ class System:
         self._dropped.forget(is_gone)
         self.payload_history.forget_clients(is_gone)
         self.vehicle.holds.forget_clients(is_gone)
-        for service in self.services:
-            service.channel_closed(channel)
+        for component in self.components:
+            component.channel_closed(channel)
 
 
 def _answer(inbound: Inbound, result: int) -> dialect.MAVLink_command_ack_message:

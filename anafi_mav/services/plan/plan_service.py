@@ -166,7 +166,7 @@ class PlanService(Service):
 
     def _receive(self, inbound: Inbound) -> None:
         message = inbound.message
-        if message.get_msgId() in _ITEMS and (handler := self._item_commands.get(message.current)) is not None:
+        if inbound.id in _ITEMS and (handler := self._item_commands.get(message.current)) is not None:
             handler(inbound)
             return
         self._perform(self._protocol.receive(message, self._peer(inbound), self.host.clock.monotonic()))
