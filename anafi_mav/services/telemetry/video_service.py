@@ -74,7 +74,7 @@ def _link_flags(state: LinkState) -> int:
     if state.perturbed is None:
         return 0
     return int(
-        dialect.ANAFI_LINK_FLAGS_TOLD
+        dialect.ANAFI_LINK_FLAGS_REPORTED
         | (dialect.ANAFI_LINK_FLAGS_4G_INTERFERENCE if state.interference_4g else 0)
         | (dialect.ANAFI_LINK_FLAGS_PERTURBED if state.perturbed else 0)
     )
