@@ -252,6 +252,7 @@ class System:
         """Runs while heartbeats still say Mission."""
         self._warned_at: dict[str, float] = {}
         self._dropped = DroppedInputs()
+        self.use_input = self._dropped.use
         self._muted: set[Channel] = set()
         self._addressed: tuple[Sequence[Channel], Sequence[Channel]] = ([], [])
         """The open channels when it was last looked, and those of them that this system sends to."""
@@ -350,7 +351,7 @@ class System:
         for task in tuple(self._tasks):
             task.cancel()
         self.vehicle.link_down()
-        self._dropped = DroppedInputs()
+        self._dropped.forget(lambda client: True)
         self.active = False
         self._node.remove_hosts(self.sysid)
 
@@ -480,10 +481,6 @@ class System:
         logger.warning("%s: system %s: %s", self.drone.name, system_of(client), report.text)
         if (channel := channel_of(client)) is not None:
             self.text(report.severity, report.text, channel)
-
-    def use_input(self, client: Hashable, stream: InputStream) -> None:
-        """Note that an input of a stream is flown: what was reported of earlier ones is over."""
-        self._dropped.use(client, stream)
 
     def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """Run in the background; cancelled when the drone's link goes down."""
