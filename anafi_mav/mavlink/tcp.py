@@ -136,7 +136,7 @@ class TcpIn(Listener):
         return peer
 
     def _proved(self, peer: _ServedPeer) -> None:
-        """Give a client that has proved to hold the key a place of a known one, as soon as there is one."""
+        """Give a client that holds the key a place of a known one, once there is one."""
         now = self._clock.monotonic()
         if peer in self._table and self._make_room(self._shown(peer), now, known=True):
             self._table.add(peer, now, known=True)
