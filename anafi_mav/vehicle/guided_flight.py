@@ -6,6 +6,7 @@ The drone makes each move by itself. The flight task is the target, a `Goto`.
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -15,7 +16,6 @@ from anafi_mav.drone.piloting.piloting import Piloting
 from anafi_mav.texts import Subject
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import check_height, check_place
-from anafi_mav.vehicle.base.control import Condition
 from anafi_mav.vehicle.base.flight_task import Hover, Needs, PlainTask, Preparation, TaskRules
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
@@ -140,35 +140,54 @@ class GuidedFlight:
     ) -> None:
         """Go to a place, height (m, above take-off) and heading (rad).
 
-        None keeps the present value; for the place also the target of a move under way (as PX4 does), for the heading
-        see `move_heading`. Returns when the drone moves; a change of height without a GPS fix returns at its end.
+        None keeps the value that the drone has when its move begins: where it comes to rest, and its height. For the
+        place that is also the target of a move under way (as PX4 does), for the heading see `move_heading`. Returns
+        when the drone moves; a change of height without a GPS fix returns at its end.
 
         `speed` (m/s over ground) counts for this move only. `mode` is Hold or Guided.
         """
         vehicle = self._vehicle
-        here, present = vehicle.place, vehicle.drone.piloting.state.altitude
-        if here is None and place is None and ato is not None:
+        if vehicle.place is None and place is None and ato is not None:
             await self._climb(ato, yaw, mode, by)
             return
-        if here is None:
-            raise Refused(texts.GOTO, texts.NO_FIX)
-        if (target := present if ato is None else ato) is None:
-            raise Refused(texts.GOTO, texts.HEIGHT_UNKNOWN)
-        standing = self._standing or here if self.goto is None else self.goto.place
-        goto = Goto(place or standing, target, yaw, speed, mode)
-        await self.go(goto, by=by, condition=lambda: self.check(place, ato))
+        kept = self._standing if self.goto is None else self.goto.place
 
-    async def go(self, goto: Goto, *, by: By, condition: Condition | None = None) -> None:
+        def target() -> Goto:
+            where, height = place or kept or vehicle.stopping_place, ato
+            if where is None or vehicle.place is None:
+                raise Refused(texts.GOTO, texts.NO_FIX)
+            if height is None and (height := vehicle.drone.piloting.state.altitude) is None:
+                raise Refused(texts.GOTO, texts.HEIGHT_UNKNOWN)
+            self.check(place, ato)
+            return Goto(where, height, yaw, speed, mode)
+
+        await self._fly(target, by)
+
+    async def go(self, goto: Goto, *, by: By, ato: float | None = None) -> None:
         """Fly to a place, or change the move to it. Returns when the drone is on its way.
 
-        `condition` checks what the client has set of place and height; None: the place.
+        `ato`: the height of it, where the client has set it and it is to be checked, as the place is.
+        """
+
+        def target() -> Goto:
+            self.check(goto.place, ato)
+            return goto
+
+        await self._fly(target, by)
+
+    async def _fly(self, target: Callable[[], Goto], by: By) -> None:
+        """Fly to a target that is known when what flew before has ended.
+
+        `target` raises `Refused` for one that is not flown to. It is called on both sides of each wait: a drone at
+        speed is elsewhere after it.
         """
         control, piloting = self._vehicle.control, self._vehicle.drone.piloting
         setpoint, epoch = None if isinstance(control.active, Goto) else self.goto, control.epoch
-        condition = condition or (lambda: self.check(goto.place, None))
+        goto = target()
         try:
-            async with control.acquire(goto, by=by, below=Hover(goto.mode), condition=condition) as grant:
-                grant.begin()
+            async with control.acquire(goto, by=by, below=Hover(goto.mode), condition=target) as grant:
+                goto = target()
+                grant.begin(goto)
                 await self.move(goto)
         except BaseException:
             # The move of a single setpoint goes on as a goto does, whose task `acquire` makes active again.
