@@ -93,10 +93,10 @@ what the drone does by itself is notified by `Vehicle`, once it has noted all of
 class Grant:
     """A request whose predecessors have ended."""
 
-    def __init__(self, control: Control, attempt: Attempt[FlightTask]) -> None:
+    def __init__(self, control: Control, attempt: Attempt[FlightTask], found: Any) -> None:
         self._control = control
         self.attempt = attempt
-        self.found: Any = None
+        self.found = found
         """Result of the request's condition at the last check: what it flies is decided by that."""
 
     def begin(self, task: FlightTask | None = None, *, pauses: bool | None = None) -> None:
@@ -257,25 +257,26 @@ class Control:
         own = task if rules.lasts and not rules.is_hover else None
         hover = task if rules.is_hover else below
         attempt = Attempt(own, number, hover, rules.keeps_below, pauses, rules.is_urgent)
-        grant = Grant(self, attempt)
-        grant.found = found
+        grant: Grant | None = None
         try:
             has_waited = await self._release(attempt, rules.wait)
             self.handle(Event.RELEASED, Input(attempt))
             if rules.start is Preparation.STOP:
                 await piloting.stop()
             if has_waited or rules.start is Preparation.STOP:  # else no event was received since the first check
-                grant.found = check()
+                found = check()
             # A return that is commanded and not reported. Raises when it is the drone's own.
             if Needs.NO_DESCENT in rules.needs and await piloting.cancel_return_home():
-                grant.found = check()
+                found = check()
             if rules.start is Preparation.HOVER:
                 piloting.hover()
+            grant = Grant(self, attempt, found)
             yield grant
             grant.begin()
         except BaseException as error:
             self.handle(Event.FAIL, Input(attempt))
-            self.handle(Event.FINISH, Input(task=grant.attempt.task, number=number))
+            if grant is not None:
+                self.handle(Event.FINISH, Input(task=grant.attempt.task, number=number))
             if before is not None and self.is_free and before.is_flown(piloting):
                 self.adopt(before, keeps_below=True)
             if isinstance(error, CommandRejected):
