@@ -272,14 +272,17 @@ class FlightActions:
         return sum(map(belongs, self._tasks.values()))
 
     def end_older(self) -> list[asyncio.Task[None]]:
-        """Cancel all actions that may fly and are older than the calling one; all of them outside of an action."""
+        """Cancel the actions that may fly and are older than the calling one.
+
+        Outside of an action these are all.
+        """
         older = self.cancel_older(lambda action: action.flies)
         for call in self._replaced:
             call(self.client)
         return older
 
     def cancel_older(self, belongs: Callable[[FlightAction], bool]) -> list[asyncio.Task[None]]:
-        """Cancel the actions for which `belongs` returns True, as far as they are older than the calling one.
+        """Cancel the actions that belong to a group and are older than the calling one.
 
         A newer action than the calling one continues: it will replace this one.
         """
