@@ -355,7 +355,7 @@ class OffboardFlight(PlainTask):
             control.succeed(self)
             return
         async with control.acquire(self, by=by, condition=lambda: self._pilot_for(client)) as grant:
-            self._engage(Event.ENGAGE, self._pilot_for(client), client)
+            self._engage(Event.ENGAGE, grant.found, client)
             grant.begin()
             self._begin()
 
