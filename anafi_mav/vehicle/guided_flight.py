@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 from anafi_mav import texts, units
 from anafi_mav.drone import MoveEnd, Position
+from anafi_mav.drone.events import AttitudeChanged
+from anafi_mav.drone.expectation import loop_time
 from anafi_mav.drone.piloting.piloting import Piloting
 from anafi_mav.texts import Subject
 from anafi_mav.vehicle.base.aircraft import Aircraft
@@ -30,6 +32,11 @@ SAME_HEIGHT = 0.1
 Some millimetres distinguish two of them.
 """
 
+AT_REST = 0.01
+"""rad between two reports of the heading, 0.2 s apart, of a drone that does not turn."""
+
+REST_WAIT = 2.0
+"""s until a turn counts from the newest heading, whether or not the drone turns. MaxRotationSpeed ends within one."""
 
 _SHORT = {MoveEnd.ERROR: texts.MOVE_FAILED, MoveEnd.CANCELED: texts.MOVE_CANCELLED}
 """Ends of a move short of its target, with the reason for the text."""
@@ -229,15 +236,35 @@ class GuidedFlight:
             turn = 0.0 if yaw is None or state.attitude is None else units.wrap_pi(yaw - state.attitude.yaw)
             await vehicle.drone.piloting.move_by(0.0, 0.0, state.altitude - ato, turn)
 
-    async def turn(self, angle: float, rate_dps: float | None, mode: FlightMode, by: By) -> None:
-        """Turn by `angle` where the drone hovers; return when it has turned.
+    async def turn(
+        self, angle_from: Callable[[float], float], rate_dps: float | None, mode: FlightMode, by: By
+    ) -> None:
+        """Turn where the drone hovers; return when it has turned.
 
-        `angle` is in rad, clockwise +; `rate_dps` in deg/s (None: the drone's own).
+        `angle_from` returns the angle to turn (rad, clockwise +) from the heading (rad) at which the drone has come to
+        rest; `rate_dps` in deg/s (None: the drone's own).
         """
-        vehicle = self._vehicle
-        async with vehicle.control.acquire(Hover(mode), by=by, rules=_rules_of_offset(texts.TURN)) as grant:
+        vehicle, hover, rules = self._vehicle, Hover(mode), _rules_of_offset(texts.TURN)
+        async with vehicle.control.acquire(hover, by=by, rules=rules) as grant:
             grant.begin()
+            angle = angle_from(await self._resting_heading())
+            vehicle.control.check(hover, by, rules)
             await vehicle.drone.piloting.move_by(0.0, 0.0, 0.0, angle, turn_rate_dps=rate_dps)
+
+    async def _resting_heading(self) -> float:
+        """Return the heading (rad) once the drone turns no further, or after `REST_WAIT`.
+
+        A moveBy turns from the heading at its beginning, and what flew before may have turned the drone: its newest
+        report is up to 0.2 s old, and it turns on for a moment after a stop.
+        """
+        drone, until = self._vehicle.drone, loop_time() + REST_WAIT
+        attitude = drone.piloting.state.attitude
+        before = None if attitude is None else attitude.yaw
+        while True:
+            yaw = (await drone.expect(AttitudeChanged, timeout=REST_WAIT)).yaw
+            if (before is not None and abs(units.wrap_pi(yaw - before)) < AT_REST) or loop_time() > until:
+                return yaw
+            before = yaw
 
     @property
     def _standing(self) -> GeoPoint | None:

@@ -214,13 +214,17 @@ class GuidedService(Service):
         attitude = vehicle.drone.piloting.state.attitude
         if not vehicle.in_air or attitude is None:
             raise Refused(texts.TURN, texts.HEADING_UNKNOWN if vehicle.in_air else vehicle.activity)
-        now = attitude.yaw * units.DEG_PER_RAD
-        turn = heading_of(angle, 0.0 if math.isnan(way) else way, relative == 1.0, now)
+
+        def angle_from(yaw: float) -> float:
+            turn = heading_of(angle, 0.0 if math.isnan(way) else way, relative == 1.0, yaw * units.DEG_PER_RAD)
+            return turn * units.RAD_PER_DEG
+
         if (goto := vehicle.guided.goto) is not None:
-            await vehicle.guided.go(goto.with_heading((now + turn) * units.RAD_PER_DEG), by=command.right)
+            heading = attitude.yaw + angle_from(attitude.yaw)
+            await vehicle.guided.go(goto.with_heading(heading), by=command.right)
         else:
             await vehicle.guided.turn(
-                turn * units.RAD_PER_DEG, rate if rate > 0.0 else None, command.flavour.guided_mode, command.right
+                angle_from, rate if rate > 0.0 else None, command.flavour.guided_mode, command.right
             )
 
     async def _pause_or_continue(self, command: Command) -> None:
