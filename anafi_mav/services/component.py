@@ -30,7 +30,7 @@ from anafi_mav.services.command.operator_need import ACKNOWLEDGEMENTS, need_of, 
 from anafi_mav.services.commands import Action, Effect
 from anafi_mav.services.definition_link import DefinitionLink
 from anafi_mav.services.dropped_inputs import InputStream
-from anafi_mav.services.flavours import Flavour, flavour_of
+from anafi_mav.services.flavours import Flavour, by_flavour
 from anafi_mav.services.ftp.ftp_service import FtpService
 from anafi_mav.services.gateway_uris import GatewayUris
 from anafi_mav.services.memory import Memory
@@ -241,11 +241,7 @@ class Component:
 
         If `build` returns None, nothing is sent.
         """
-        groups: dict[str, tuple[Flavour, list[Channel]]] = {}
-        for channel in self.channels if to is None else to:
-            flavour = flavour_of(channel)
-            groups.setdefault(flavour.name, (flavour, []))[1].append(channel)
-        for flavour, channels in groups.values():
+        for flavour, channels in by_flavour(self.channels if to is None else to):
             message = build(flavour)
             if message is not None:
                 self.send(message, channels)
