@@ -298,6 +298,19 @@ async def test_return_not_reported_as_finished_hovers_with_a_text() -> None:
         await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
 
 
+async def test_return_not_reported_as_finished_ends_with_the_landing() -> None:
+    """Quirk rth-finished-missing: a return of the flight before neither ends the next climb nor shows mode Return."""
+    async with world(speed=FAST, quirks=("rth-finished-missing",)) as w:
+        await away(w)
+        mark = w.client.mark()
+        return_by_itself(w)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.returning, since=mark)
+        await w.drone.wait_log(lambda e: not w.drone.firmware.homing.active, 30.0, since=w.drone.log[-1].t)
+        assert (await w.client.command(LAND, timeout=20.0)).result == ACCEPTED
+        await landed(w, mark)
+        await w.take_off(6.0)
+
+
 async def test_return_ending_far_from_home_hovers() -> None:
     """The drone reports finished where its home is not: a wind, or another home than the reported one."""
     async with world(speed=FAST) as w:

@@ -14,6 +14,7 @@ from msgspec.structs import replace
 
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, common, precise_home, rth
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.precise_home import PreciseHomeMode, PreciseHomeState
 from anafi_mav.arsdk.messages.rth import (
     AutoTriggerReason,
@@ -115,11 +116,19 @@ def _auto_trigger(state: HomeState, message: rth.RthAutoTrigger) -> HomeState:
     return replace(state, auto_trigger=message.reason, auto_trigger_delay_s=message.delay if planned else None)
 
 
+def _flying_state(state: HomeState, message: ardrone3.FlyingStateChanged) -> HomeState:
+    """End a return on the ground: without a report of its end it would go on in the next flight."""
+    if message.state != FlyingState.LANDED or not state.returning:
+        return state
+    return replace(state, rth=None, reason=None)
+
+
 class Home(Commanding[HomeState]):
     """Home and the settings of a return. `Piloting.return_home` flies there."""
 
     NOTHING = HomeState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
+        ardrone3.FlyingStateChanged: _flying_state,
         ardrone3.HomeChanged: lambda state, message: replace(
             state, location=position(message.latitude, message.longitude, message.altitude)
         ),
