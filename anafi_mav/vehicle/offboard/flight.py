@@ -477,8 +477,9 @@ class OffboardFlight(PlainTask):
         return {self._on_motion: ValueInterest(MOTION)}
 
     def _on_motion(self, values: Values, now: float) -> None:
+        places = values.layout.places
         for kind in MOTION:
-            if kind in values:
+            if kind in places:
                 self._unread[kind] = now
         if self._vehicle.flying_state in MOTORS_OFF and self._stream.engagement is None:
             return  # the motion of a drone that stands is read when it is needed
