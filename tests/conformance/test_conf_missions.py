@@ -38,6 +38,7 @@ from support.missions import (
     whole,
 )
 from support.plans import ACCEPTED, FENCE, MISSION, UNSUPPORTED_FRAME, Item, around, square, upload
+from support.setpoints import said as text_said
 from support.world import ARMED, world
 
 from anafi_mav.arsdk.messages import ardrone3
@@ -216,6 +217,13 @@ async def test_conf_049_mission_with_items_outside_the_fence_is_refused() -> Non
         assert ack.result == dialect.MAV_RESULT_DENIED
         await said(w, "Item 3 refused: ", since=mark)
         assert w.commands("common.Mavlink.Start") == []
+
+
+async def test_missing_takeoff_before_height_above_sea_level_is_reported_so_at_upload() -> None:
+    there = around(PLACE, (20.0, 0.0))[0]
+    async with world(web=True) as w:
+        await put(w, [Item(dialect.MAV_CMD_NAV_WAYPOINT, *there, z=55.0, p4=math.nan)])
+        await text_said(w.client, "no take-off item: the drone climbs to 55 m AMSL first")
 
 
 # Stopped, and gone on with.

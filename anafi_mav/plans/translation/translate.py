@@ -15,7 +15,7 @@ from itertools import chain
 from anafi_mav import mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.formats.parrot import Version
-from anafi_mav.plans.plan import DO_JUMP, Item, Loss
+from anafi_mav.plans.plan import DO_JUMP, GLOBAL, GLOBAL_INT, Item, Loss
 from anafi_mav.plans.rules.flight_plan_writer import FlightPlanWriter
 from anafi_mav.plans.rules.parts import (
     FaultKind,
@@ -361,6 +361,18 @@ def _way_up(items: Sequence[Item], first: int) -> int | None:
     return None
 
 
+def _height_named(item: Item, height: float) -> str:
+    """Return an item's height with its reference.
+
+    `height` is m above take-off. That of an item above mean sea level is unknown to `examine`, so the item's own
+    number stands for it.
+    """
+    named = item.params[6]
+    if item.frame in (GLOBAL, GLOBAL_INT) and named is not None:
+        return f"{named:g} m AMSL"
+    return f"{height:g} m above take-off"
+
+
 def _rise(writer: FlightPlanWriter, items: Sequence[Item], first: int) -> None:
     """Write the take-off from the ground.
 
@@ -379,7 +391,7 @@ def _rise(writer: FlightPlanWriter, items: Sequence[Item], first: int) -> None:
     there = writer.destination(items[number])
     climbs = there.height > writer.place.height
     writer.say(
-        f"no take-off item: the drone climbs to {there.height:g} m above take-off first"
+        f"no take-off item: the drone climbs to {_height_named(items[number], there.height)} first"
         if climbs
         else "no take-off item"
     )

@@ -15,7 +15,7 @@ from support.plan_samples import LAT, LON, action, waypoint
 from anafi_mav import mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.formats.parrot import Version
-from anafi_mav.plans.plan import DO_JUMP, GLOBAL, RELATIVE, TERRAIN, Item, Loss
+from anafi_mav.plans.plan import DO_JUMP, GLOBAL, GLOBAL_INT, RELATIVE, TERRAIN, Item, Loss
 from anafi_mav.plans.rules.rule import Fidelity
 from anafi_mav.plans.rules.rules import TABLE
 from anafi_mav.plans.translation.translate import (
@@ -152,6 +152,15 @@ def test_mission_without_takeoff_gets_one_in_front() -> None:
     in_the_air = translate(items, 1, AIR)
     assert [line.split()[1] for line in lines(in_the_air)] == ["178", "16"]
     assert in_the_air.notes == ()
+
+
+@pytest.mark.parametrize("frame", [GLOBAL, GLOBAL_INT])
+def test_missing_takeoff_before_a_height_above_sea_level_is_reported_above_sea_level(frame: int) -> None:
+    items = [waypoint(1, 0, 55.0, frame=frame)]  # 20 m above the take-off point, which examine does not know
+    flight = translate(items, 1, GROUND)
+    assert lines(flight)[1] == f"3 16 0.0 1.0 0.0 30.0 {LAT} {LON} 20.0"
+    assert flight.notes == (Loss("no take-off item: the drone climbs to 55 m AMSL first", 0),)
+    assert examine(items, 1).approximations == flight.notes
 
 
 def test_waypoint_below_the_takeoff_height_needs_no_descent_first() -> None:
