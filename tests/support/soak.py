@@ -563,9 +563,10 @@ class Logged(logging.Handler):
 def errors_logged() -> Iterator[list[str]]:
     """What is logged within the block, complaints of the garbage collector about what was made in it included.
 
-    What exists before the first test is frozen (`support.heap`): to collect is cheap.
+    To collect is cheap, for it looks through nothing that was made before (as in `support.heap`).
     """
     gc.collect()  # the complaints about what was made before
+    gc.freeze()
     handler = Logged()
     logging.getLogger().addHandler(handler)
     try:

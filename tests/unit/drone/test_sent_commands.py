@@ -107,6 +107,21 @@ def test_withdrawn_take_off_is_ruled_out_by_a_delivered_landing(sent: SentComman
     assert sent.is_unwanted(other, 2.2)  # should it begin all the same, it is stopped
 
 
+def test_motors_after_a_take_off_that_the_drone_has_ignored_are_another_controllers(sent: SentCommands) -> None:
+    one = launch()
+    sent.place(one, 0.0)
+    one.apply(Event.DELIVERED)
+    one.delivered_at = 1.0
+    assert sent.has_started_motors(9.0)  # awaited still
+    one.apply(Event.WITHDRAWN, 1.5)
+    assert sent.has_started_motors(2.0)
+    assert not sent.has_started_motors(2.1)  # silent for more than a second: refused
+    assert sent.attribute(flying(FlyingState.MOTOR_RAMPING), 2.1) is None
+    assert not one.answered
+    assert sent.attribute(flying(FlyingState.MOTOR_RAMPING), 2.0) is one
+    assert sent.has_started_motors(2.1)  # it has reacted
+
+
 def test_delivered_take_off_is_refused_when_motors_stop(sent: SentCommands) -> None:
     one = launch()
     sent.place(one, 0.0)

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from anafi_mav.drone import Limits
+from anafi_mav.texts import MOTION_UNKNOWN
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.velocity_loop import MotionEstimate, VelocityController
 from anafi_mav.vehicle.offboard.setpoints import AttitudeSetpoint, MotionSetpoint, PositionReference
@@ -44,6 +45,13 @@ def test_heading_from_the_nose_is_resolved_once() -> None:
 def test_heading_from_an_unknown_nose_is_refused() -> None:
     with pytest.raises(Refused, match="heading"):
         Steering(VelocityController(MotionEstimate())).resolve(turned(0.5), NO_VEHICLE)
+
+
+def test_velocity_of_a_drone_whose_motion_is_unknown_is_refused() -> None:
+    steering = Steering(VelocityController(MotionEstimate()))
+    setpoint = MotionSetpoint(PositionReference.LOCAL, velocity=(1.0, 0.0, 0.0))
+    with pytest.raises(Refused, match=MOTION_UNKNOWN):
+        steering.close_loop(setpoint, LIMITS, 0.0, located=True)
 
 
 def test_attitude_becomes_sticks() -> None:

@@ -133,6 +133,7 @@ def test_offboard_session_ends_with_its_setpoints() -> None:
         (MotionSetpoint(PositionReference.LOCAL, velocity=(1.0, 0.0, 0.0), acceleration=(1.0, 0.0, 0.0)), 1.5, 0.45),
         (MotionSetpoint(PositionReference.LOCAL, velocity=(1.0, 0.0, 0.0), position=(9.0, 0.0, 0.0)), 1.5, 0.45),
         (MotionSetpoint(PositionReference.LOCAL, acceleration=(1.0, 0.0, 0.0)), 1.5, 0.45),
+        (MotionSetpoint(PositionReference.LOCAL, yaw=1.0), 1.5, 0.45),
         (LEVEL, 1.5, 0.45),
     ],
 )
@@ -191,6 +192,13 @@ def test_a_crowd_of_senders_is_bounded() -> None:
     assert stream.receive("one more", LEVEL, SILENCE).objection("one more") is None  # the others have fallen silent
 
 
+def test_setpoints_of_a_known_sender_count_in_a_crowd() -> None:
+    stream = crowd().engage(Event.ENGAGE, 3).receive(3, NOSE_DOWN, 0.1)
+    assert stream.setpoint == NOSE_DOWN
+    assert stream.deadline == 0.1 + SILENCE
+    assert len(stream.received) == MAX_PILOTS  # what others have sent stays
+
+
 def test_pilot_whose_silence_is_noticed_late_is_not_crowded_out() -> None:
     """The timer of a busy host is late: what flies has a setpoint, and a deadline, until it is ended."""
     stream = crowd().engage(Event.ENGAGE, 3).receive("one more", LEVEL, SILENCE + 0.1)
@@ -226,11 +234,14 @@ def test_newest_of_single_setpoints_is_flown() -> None:
 def test_a_second_setpoint_makes_a_stream_of_the_first() -> None:
     assert is_single(OffboardStream(), PLACE, 0.0)
     assert not is_single(OffboardStream(), LEVEL, 0.0)  # it has no end
+    velocity = MotionSetpoint(PositionReference.LOCAL, velocity=(1.0, 0.0, 0.0))
+    assert not is_single(OffboardStream(), velocity, 0.0)
     stream = OffboardStream().receive("a", PLACE, 0.0).engage(Event.ENGAGE_SINGLE, "a")
     assert not is_single(stream, PLACE, TOGETHER - 0.01)
     assert is_single(stream, PLACE, TOGETHER)
     assert is_single(stream, PLACE, 0.1, sender="b")
     stream = stream.receive("a", PLACE, 0.4).after(Event.ENGAGE)
+    assert not is_single(stream, PLACE, 0.8)
     assert stream.expire(0.4 + SILENCE).state is State.IDLE
 
 
@@ -267,6 +278,37 @@ def test_climb_is_counted_for_a_second_without_a_gap(engaged: bool) -> None:
     stayed = counted.after(Event.STAY)
     assert stayed.state is (State.ENGAGED if engaged else State.IDLE)
     assert climbing(0.0, 0.4, engaged=engaged).expire(0.4 + SILENCE).state is State.IDLE
+
+
+def test_gap_of_the_whole_silence_begins_the_second_again() -> None:
+    assert climbing(0.0, SILENCE).climbs_since == SILENCE
+    assert climbing(0.0, SILENCE - 0.01).climbs_since == 0.0
+
+
+@pytest.mark.parametrize("engaged", [False, True])
+def test_setpoint_that_stays_begins_the_second_again(engaged: bool) -> None:
+    stream = climbing(0.0, 0.4, 0.8, engaged=engaged).receive("a", LEVEL, 0.9).after(Event.STAY)
+    again = stream.receive("a", UP, 1.0).climb("a", 1.0)
+    assert (again.state, again.climbs_since) == (State.CLIMBING if engaged else State.COUNTING, 1.0)
+
+
+def test_engagement_that_asks_to_climb_remains_of_the_client_that_chose_offboard() -> None:
+    """Mode Offboard chosen by a client does not become ArduPilot's Guided by a setpoint that climbs."""
+    stream = OffboardStream().receive("a", LEVEL, 0.0).engage(Event.ENGAGE, "a", "chooser")
+    assert stream.climbs_since is None
+    lifting = stream.receive("a", UP, 0.2).climb("a", 0.2).climb("a", 0.6).climb("a", 1.0).climb("a", 1.2)
+    assert lifting.state is State.LIFTING
+    assert lifting.climbs_since is None
+    assert lifting.engagement is not None
+    assert (lifting.pilot, lifting.engagement.chosen_by) == ("a", "chooser")
+
+
+def test_facts_of_an_engagement_are_noted_while_it_lasts() -> None:
+    idle = OffboardStream().receive("a", LEVEL, 0.0)
+    assert idle.note(chosen_by="b") == idle
+    noted = idle.engage(Event.ENGAGE, "a").note(chosen_by="b").engagement
+    assert noted is not None
+    assert (noted.pilot, noted.state, noted.chosen_by) == ("a", State.ENGAGED, "b")
 
 
 def test_climb_of_another_client_does_not_count() -> None:
