@@ -82,18 +82,19 @@ class Alarm:
 class Schedule(Generic[KeyT]):
     """When each of several keys is due; all of them can be brought forward together. No clock."""
 
-    __slots__ = ("_all_at", "_due", "_keys", "next")
+    __slots__ = ("_due", "_keys", "all_at", "next")
 
     def __init__(self, keys: Iterable[KeyT]) -> None:
         self._keys: Sequence[KeyT] = tuple(keys)
         self._due = dict.fromkeys(self._keys, NEVER)
-        self._all_at = NEVER
+        self.all_at = NEVER
+        """When every key is due at the latest (s)."""
         self.next = NEVER
         """When the first of them is due (s)."""
 
     def bring_forward(self, at: float) -> bool:
         """Make every key due at this time (s) at the latest; return True if `next` changes."""
-        self._all_at = min(self._all_at, at)
+        self.all_at = min(self.all_at, at)
         if at >= self.next:
             return False
         self.next = at
@@ -102,10 +103,10 @@ class Schedule(Generic[KeyT]):
     def run(self, now: float, call: Callable[[KeyT], float]) -> None:
         """Call `call` for each due key, in sequence; it returns when the key is due again (s)."""
         keys = self._keys
-        if now >= self._all_at:
-            self._all_at = NEVER
+        if now >= self.all_at:
+            self.all_at = NEVER
         else:
             keys = [key for key, at in self._due.items() if now >= at]
         for key in keys:
             self._due[key] = call(key)
-        self.next = min(self._all_at, min(self._due.values(), default=NEVER))
+        self.next = min(self.all_at, min(self._due.values(), default=NEVER))

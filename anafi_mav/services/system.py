@@ -495,7 +495,8 @@ class System:
 
     def look_soon(self) -> None:
         """Have the services tick within `LOOK_EVERY`: something has happened."""
-        if self.active and self._schedule.bring_forward(self.clock.monotonic() + LOOK_EVERY):
+        at = self.clock.monotonic() + LOOK_EVERY
+        if self.active and at < self._schedule.all_at and self._schedule.bring_forward(at):
             self._set_ticker()
 
     def times(self, at: float | None = None, pose: VehiclePose = UNKNOWN_POSE) -> Times:
