@@ -194,8 +194,8 @@ class Vehicle(Aircraft):
         self.operators = OperatorControl()
         """The operator among the stations, if one has requested control."""
         self.control.policies = (
-            self.pilot_switch.refusal,
-            lambda request: operator_refusal_of(self.operators, request),
+            lambda request: self.pilot_switch.refusal(request) if drone.controller.present else None,
+            lambda request: operator_refusal_of(self.operators, request) if self.operators.operator else None,
         )
         self.controller_inputs = ControllerInputs(drone.controller)
         self.follow = FollowFlight(self, lambda: self.offboard.motion, clock)

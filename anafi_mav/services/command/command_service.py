@@ -195,7 +195,7 @@ class CommandService(Service):
         action = self._actions.get(inbound.message.command)
         if action is None:
             return None
-        is_long = inbound.message.get_msgId() == dialect.MAVLINK_MSG_ID_COMMAND_LONG
+        is_long = inbound.id == dialect.MAVLINK_MSG_ID_COMMAND_LONG
         decode: _Decode = from_long if is_long else from_int
         return decode(inbound.message, action, inbound.client, flavour_of(inbound.channel))
 

@@ -443,6 +443,21 @@ def test_files_of_the_newcomers_index_exist() -> None:
     assert [file for file in files if not [*PACKAGE.glob(file)]] == []
 
 
+def test_names_of_the_newcomers_index_stand_in_their_files() -> None:
+    text = (REPOSITORY / "docs" / "architecture.md").read_text(encoding="utf-8")
+    part = text.partition("## Where does")[2].partition("\n## ")[0]
+    pairs = re.findall(r"`(\w+)(?:\(\))?`(?: in|:) `([\w/]+\.py)`", part)
+    assert len(pairs) > 8
+    missing = [
+        (name, file)
+        for name, file in pairs
+        if not re.search(
+            rf"\b(?:def|class) {name}\b|^\s*{name}\b.* =", (PACKAGE / file).read_text("utf-8"), re.MULTILINE
+        )
+    ]
+    assert missing == []
+
+
 def test_linter_holds_every_room_of_services_apart() -> None:
     with (REPOSITORY / "pyproject.toml").open("rb") as file:
         contracts = tomllib.load(file)["tool"]["importlinter"]["contracts"]
