@@ -205,6 +205,9 @@ class Service:
 
     hears_observers: ClassVar[bool] = False
 
+    is_watch: ClassVar[bool] = False
+    """True when `tick` ends a flight or an input, or warns: it then waits for no other drone's messages."""
+
     def __init__(self, host: Host) -> None:
         self.host = host
 
@@ -302,7 +305,8 @@ class Service:
 
         Called at that time, once a second, and within `LOOK_EVERY` after whatever it may depend on: a message of a
         client, an event of the drone that is not one of `SAMPLES`, a change of the vehicle, the end of a task that the
-        host has spawned, and `Host.look_soon`.
+        host has spawned, and `Host.look_soon`. The ticks of a watch (`is_watch`) are first; others may be some ms
+        later when many drones have something due.
         """
         return NEVER
 
