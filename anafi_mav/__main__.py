@@ -24,6 +24,7 @@ except KeyboardInterrupt:
 def main() -> int:
     """Run the command line; returns the exit status."""
     _end_at_once_on_interrupt(INTERRUPTED)
+    _open_closed_streams()
     gc.disable()
     from anafi_mav.cli import main as run
 
@@ -32,6 +33,18 @@ def main() -> int:
     if "zenoh" in sys.modules:
         _end_without_finalization(status)
     return status
+
+
+def _open_closed_streams() -> None:
+    """Open the standard streams that the parent has closed (`>&-`) on the null device.
+
+    Python has None for them, and the first socket would get their number: what a library writes to stderr would go to a
+    drone.
+    """
+    for number, name, mode in (0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w"):
+        if getattr(sys, name) is None:
+            os.open(os.devnull, os.O_RDWR)  # gets the lowest free number, which is this one
+            setattr(sys, name, open(number, mode, closefd=False))  # noqa: SIM115
 
 
 def _collect_garbage() -> None:

@@ -419,11 +419,11 @@ def parameters() -> str:
 
     parts = [PARAMETERS, PARAMETERS_NATIVE]
     for one in sorted(NATIVE_NAMES, key=lambda parameter: parameter.name):
-        told = f"{one.short}. {one.long}".strip() if one.long else one.short
+        text = f"{one.short}. {one.long}".strip() if one.long else one.short
         where = f"`{one.source}`" if "." in one.source else one.source
         both = f"{twins(one.name, PX4_NAMES)} | {twins(one.name, ARDUPILOT_NAMES)}"
         parts.append(
-            f"| `{one.name}` | {told} | {one.unit or '–'} | {values(one)} | {both} | {where} | {one.models} |\n"
+            f"| `{one.name}` | {text} | {one.unit or '–'} | {values(one)} | {both} | {where} | {one.models} |\n"
         )
     for title, names in (("PX4", PX4_NAMES), ("ArduPilot", ARDUPILOT_NAMES)):
         parts.append(PARAMETERS_FACTS.format(title=title))

@@ -1,7 +1,7 @@
 """Let the drone follow a target that walks north: MAVSDK (4.x) and its plugin follow_me.
 
-anafi-mav                                       # in one terminal
-python examples/follow.py                          # in another
+anafi-mav                            # in one terminal
+python examples/follow.py            # in another
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Upload a fence and see a target outside it refused: MAVSDK (4.x) and its plugin geofence.
 
-anafi-mav                                       # in one terminal
-python examples/geofence.py                        # in another
+anafi-mav                              # in one terminal
+python examples/geofence.py            # in another
 """
 
 from __future__ import annotations

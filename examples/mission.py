@@ -1,7 +1,7 @@
 """Upload a mission, fly it and follow its progress: MAVSDK (4.x) and its plugin mission.
 
-anafi-mav                                       # in one terminal
-python examples/mission.py                         # in another
+anafi-mav                             # in one terminal
+python examples/mission.py            # in another
 """
 
 from __future__ import annotations

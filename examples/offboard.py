@@ -1,7 +1,7 @@
 """Fly velocities and a position from a program: MAVSDK (4.x) and its plugin offboard.
 
-anafi-mav                                       # in one terminal
-python examples/offboard.py                        # in another
+anafi-mav                              # in one terminal
+python examples/offboard.py            # in another
 """
 
 from __future__ import annotations

@@ -119,7 +119,7 @@ async def give(ground: Ground, plan: Plan, source: str) -> list[str]:
     parts = {kind: lists.wire(kind, source, with_home=ground.first_item_is_home) for kind in NAMES}
     if not any(parts.values()):
         raise PlanError(source, "it is empty: nothing to upload")
-    with told(ground) as texts:
+    with collect_texts(ground) as texts:
         for kind, items in parts.items():
             if items:
                 await give_list(ground, kind, items, texts)
@@ -127,7 +127,7 @@ async def give(ground: Ground, plan: Plan, source: str) -> list[str]:
 
 
 @contextlib.contextmanager
-def told(ground: Ground) -> Iterator[list[str]]:
+def collect_texts(ground: Ground) -> Iterator[list[str]]:
     """Print what the vehicle says meanwhile; also a list of it."""
     said: list[str] = []
     texts = Texts()

@@ -8,6 +8,7 @@ Every line is cleaned of control characters: names and texts of drones and vehic
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
 import json
 import math
@@ -28,6 +29,12 @@ _LAST_COLUMN = 24
 
 _UNFOLDED = 100_000
 """Characters that no row of a table has."""
+
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""Errors of a file that takes no more: the disk, the user's part of it, or the file itself is full."""
+
+_losses: list[str] = []
+"""Why lines of stdout are lost; empty while none is."""
 
 _bars: list[Progress] = []
 """Bars on the screen: what is said meanwhile is printed above them."""
@@ -64,6 +71,11 @@ class TableRows(NamedTuple):
 
     head: Sequence[str]
     rows: Sequence[Sequence[str]]
+
+
+def has_lost_output() -> bool:
+    """True when a full disk did not take a line of stdout; a reader that has left is no loss."""
+    return bool(_losses)
 
 
 def is_live() -> bool:
@@ -155,7 +167,7 @@ def progress(what: str, total: int | None) -> Iterator[Callable[[int, int], None
 
 def _write(stream: TextIO, line: str, style: str) -> None:
     line = printable(line)
-    with contextlib.suppress(OSError):  # the reader may be gone (`anafi-mav | head`): no reason to end a flight
+    try:
         if stream.isatty():
             from rich.console import Console
             from rich.text import Text
@@ -165,3 +177,7 @@ def _write(stream: TextIO, line: str, style: str) -> None:
         else:
             encoding = stream.encoding or "utf-8"  # a terminal without umlauts is no reason to end a flight
             print(line.encode(encoding, "backslashreplace").decode(encoding), file=stream, flush=True)
+    except OSError as error:  # the reader may be gone (`anafi-mav | head`): no reason to end a flight
+        if stream is sys.stdout and error.errno in _FULL and not _losses:
+            _losses.append(f"stdout cannot be written: {error.strerror}")
+            complain(_losses[0])

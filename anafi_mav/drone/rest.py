@@ -206,11 +206,11 @@ class Rest:
 async def _refusal(what: str, response: aiohttp.ClientResponse) -> str:
     if response.status == NOT_INDEXED:
         return NOT_INDEXED_YET
-    told = ""
+    reason = ""
     with suppress(aiohttp.ClientError, asyncio.TimeoutError, msgspec.DecodeError, AttributeError):
         answer = msgspec.json.decode(await response.content.read(1 << 12))
-        told = f": {answer['error']}" if isinstance(answer, dict) and "error" in answer else ""
-    return f"{what}: HTTP {response.status} {response.reason or ''}".rstrip() + told
+        reason = f": {answer['error']}" if isinstance(answer, dict) and "error" in answer else ""
+    return f"{what}: HTTP {response.status} {response.reason or ''}".rstrip() + reason
 
 
 class _Translated:

@@ -6,22 +6,16 @@ those that arrive together are reported with one call: of thirty a second most a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import TypeAlias
 
 import anafi_mav.arsdk.messages  # noqa: F401  # declares them
 from anafi_mav.arsdk.codec.value_events import ValueLayout as ValueLayout
 from anafi_mav.arsdk.codec.value_events import Values as Values
-from anafi_mav.arsdk.codec.wire import Message, decode, value_events
+from anafi_mav.arsdk.codec.wire import Message, value_events
 
-SIZES: Mapping[type[Message], int] = {value.kind: value.size for value in value_events().values()}
-"""Bytes of the command of each kind; later firmware may append more."""
-
-VALUES = frozenset(SIZES)
+VALUES: frozenset[type[Message]] = frozenset(value.kind for value in value_events().values())
 """The kinds of all of them."""
-
-unpack = decode
-"""Return the message in the bytes of `Values.command`."""
 
 OnValues: TypeAlias = Callable[[Values, float], None]
 """(values, loop time of their arrival)."""

@@ -14,6 +14,12 @@ from anafi_mav import mav_enums
 WAYPOINT = mav_enums.MAV_CMD_NAV_WAYPOINT
 DO_JUMP = mav_enums.MAV_CMD_DO_JUMP
 
+SLOWEST, FASTEST = 0.1, 100.0
+"""m/s. A speed beyond these is a number in the wrong field, or in another unit.
+
+Within them the drone limits itself.
+"""
+
 HEADED = frozenset(
     {
         mav_enums.MAV_CMD_NAV_WAYPOINT,

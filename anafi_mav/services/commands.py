@@ -238,19 +238,12 @@ class Command(Struct, frozen=True):
     """Sender: (channel, system id, component id)."""
     flavour: Flavour = PX4
     """The autopilot that the sender takes us for."""
-    at: float = 0.0
-    """When it arrived, on the monotonic clock."""
+    right: Right = Right(None, Extent.COMMANDED, 0)
+    """The right that its client has by it; its handler decides what it may end. Empty until it is carried out."""
     confirmation: int = 0
     """Above 0 in a COMMAND_LONG that is sent again because no answer was received."""
-    counted: bool = True
-    """Its effect is HOLD, and its client sent no other such command in the 5 s before."""
     component: int = dialect.MAV_COMP_ID_AUTOPILOT1
     """The component that carries it out."""
-
-    @property
-    def right(self) -> Right:
-        """The right that its client has by it; its handler decides what it may end."""
-        return Right(self.client, Extent.ALL, self.at, self.counted)
 
     @property
     def effect(self) -> Effect:

@@ -265,7 +265,7 @@ class SimulatedDrone:
         """Send an event as the drone's firmware does, although nothing of it has happened.
 
         The state of the simulated drone stays as it is, and what the drone reports next may contradict the event. Like
-        every event it is logged, unless its buffer is not acknowledged, and is subject to `faults.untold`.
+        every event it is logged, unless its buffer is not acknowledged, and is subject to `faults.unreported`.
         """
         self._emit(event)
 
@@ -388,9 +388,9 @@ class SimulatedDrone:
             scrambler.advance(self.time)
         session = self._session
         if session is not None and now >= self._telemetry.next and self._in_reach:
-            untold = self.faults.untold
+            unreported = self.faults.unreported
             for message in self._telemetry.due(now):
-                if message.NAME not in untold:
+                if message.NAME not in unreported:
                     self._report(message, session.send)
         if now >= self._next_pose:
             self._next_pose = max(self._next_pose + POSE_PERIOD, now)
@@ -546,7 +546,7 @@ class SimulatedDrone:
         """True for an event that this firmware does not send."""
         if isinstance(message, common.FlightId) and Quirk.NO_FLIGHT_ID in self.faults.quirks:
             return True
-        return message.NAME in self.faults.untold
+        return message.NAME in self.faults.unreported
 
     def _emit(self, message: Message) -> None:
         if not self._unreported(message):

@@ -145,16 +145,16 @@ class WebServer:
         order = query.get("sort_order", "oldest")
         if order not in _ORDERS:
             return _refuse(400, f"sort_order: expected oldest or newest, got {order!r}")
-        told = [media.describe() for media in self._media]
+        found = [media.describe() for media in self._media]
         if "run_id" in query:
-            told = [media for media in told if media["run_id"] == query["run_id"]]
+            found = [media for media in found if media["run_id"] == query["run_id"]]
         if "media_type" in query:
-            told = [media for media in told if media["type"] == query["media_type"].upper()]
+            found = [media for media in found if media["type"] == query["media_type"].upper()]
         if "storage" in query:
-            told = [media for media in told if media["resources"][0]["storage"] == query["storage"]]
+            found = [media for media in found if media["resources"][0]["storage"] == query["storage"]]
         if "custom_id" in query:
-            told = []  # nothing here has one
-        return web.json_response(told[::-1] if _ORDERS[order] else told)
+            found = []  # nothing here has one
+        return web.json_response(found[::-1] if _ORDERS[order] else found)
 
     async def _one(self, request: web.Request) -> web.Response:
         if not self._media.indexed:

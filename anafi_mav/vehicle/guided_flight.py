@@ -6,16 +6,18 @@ The drone makes each move by itself. The flight task is the target, a `Goto`.
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from anafi_mav import texts, units
 from anafi_mav.drone import MoveEnd, Position
+from anafi_mav.drone.events import AttitudeChanged
+from anafi_mav.drone.expectation import loop_time
 from anafi_mav.drone.piloting.piloting import Piloting
 from anafi_mav.texts import Subject
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import check_height, check_place
-from anafi_mav.vehicle.base.control import Condition
 from anafi_mav.vehicle.base.flight_task import Hover, Needs, PlainTask, Preparation, TaskRules
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
@@ -30,6 +32,11 @@ SAME_HEIGHT = 0.1
 Some millimetres distinguish two of them.
 """
 
+AT_REST = 0.01
+"""rad between two reports of the heading, 0.2 s apart, of a drone that does not turn."""
+
+REST_WAIT = 2.0
+"""s until a turn counts from the newest heading, whether or not the drone turns. MaxRotationSpeed ends within one."""
 
 _SHORT = {MoveEnd.ERROR: texts.MOVE_FAILED, MoveEnd.CANCELED: texts.MOVE_CANCELLED}
 """Ends of a move short of its target, with the reason for the text."""
@@ -140,35 +147,54 @@ class GuidedFlight:
     ) -> None:
         """Go to a place, height (m, above take-off) and heading (rad).
 
-        None keeps the present value; for the place also the target of a move under way (as PX4 does), for the heading
-        see `move_heading`. Returns when the drone moves; a change of height without a GPS fix returns at its end.
+        None keeps the value that the drone has when its move begins: where it comes to rest, and its height. For the
+        place that is also the target of a move under way (as PX4 does), for the heading see `move_heading`. Returns
+        when the drone moves; a change of height without a GPS fix returns at its end.
 
         `speed` (m/s over ground) counts for this move only. `mode` is Hold or Guided.
         """
         vehicle = self._vehicle
-        here, present = vehicle.place, vehicle.drone.piloting.state.altitude
-        if here is None and place is None and ato is not None:
+        if vehicle.place is None and place is None and ato is not None:
             await self._climb(ato, yaw, mode, by)
             return
-        if here is None:
-            raise Refused(texts.GOTO, texts.NO_FIX)
-        if (target := present if ato is None else ato) is None:
-            raise Refused(texts.GOTO, texts.HEIGHT_UNKNOWN)
-        standing = self._standing or here if self.goto is None else self.goto.place
-        goto = Goto(place or standing, target, yaw, speed, mode)
-        await self.go(goto, by=by, condition=lambda: self.check(place, ato))
+        kept = self._standing if self.goto is None else self.goto.place
 
-    async def go(self, goto: Goto, *, by: By, condition: Condition | None = None) -> None:
+        def target() -> Goto:
+            where, height = place or kept or vehicle.stopping_place, ato
+            if where is None or vehicle.place is None:
+                raise Refused(texts.GOTO, texts.NO_FIX)
+            if height is None and (height := vehicle.drone.piloting.state.altitude) is None:
+                raise Refused(texts.GOTO, texts.HEIGHT_UNKNOWN)
+            self.check(place, ato)
+            return Goto(where, height, yaw, speed, mode)
+
+        await self._fly(target, by)
+
+    async def go(self, goto: Goto, *, by: By, ato: float | None = None) -> None:
         """Fly to a place, or change the move to it. Returns when the drone is on its way.
 
-        `condition` checks what the client has set of place and height; None: the place.
+        `ato`: the height of it, where the client has set it and it is to be checked, as the place is.
+        """
+
+        def target() -> Goto:
+            self.check(goto.place, ato)
+            return goto
+
+        await self._fly(target, by)
+
+    async def _fly(self, target: Callable[[], Goto], by: By) -> None:
+        """Fly to a target that is known when what flew before has ended.
+
+        `target` raises `Refused` for one that is not flown to. It is called on both sides of each wait: a drone at
+        speed is elsewhere after it.
         """
         control, piloting = self._vehicle.control, self._vehicle.drone.piloting
         setpoint, epoch = None if isinstance(control.active, Goto) else self.goto, control.epoch
-        condition = condition or (lambda: self.check(goto.place, None))
+        goto = target()
         try:
-            async with control.acquire(goto, by=by, below=Hover(goto.mode), condition=condition) as grant:
-                grant.begin()
+            async with control.acquire(goto, by=by, below=Hover(goto.mode), condition=target) as grant:
+                goto = target()
+                grant.begin(goto)
                 await self.move(goto)
         except BaseException:
             # The move of a single setpoint goes on as a goto does, whose task `acquire` makes active again.
@@ -210,15 +236,35 @@ class GuidedFlight:
             turn = 0.0 if yaw is None or state.attitude is None else units.wrap_pi(yaw - state.attitude.yaw)
             await vehicle.drone.piloting.move_by(0.0, 0.0, state.altitude - ato, turn)
 
-    async def turn(self, angle: float, rate_dps: float | None, mode: FlightMode, by: By) -> None:
-        """Turn by `angle` where the drone hovers; return when it has turned.
+    async def turn(
+        self, angle_from: Callable[[float], float], rate_dps: float | None, mode: FlightMode, by: By
+    ) -> None:
+        """Turn where the drone hovers; return when it has turned.
 
-        `angle` is in rad, clockwise +; `rate_dps` in deg/s (None: the drone's own).
+        `angle_from` returns the angle to turn (rad, clockwise +) from the heading (rad) at which the drone has come to
+        rest; `rate_dps` in deg/s (None: the drone's own).
         """
-        vehicle = self._vehicle
-        async with vehicle.control.acquire(Hover(mode), by=by, rules=_rules_of_offset(texts.TURN)) as grant:
+        vehicle, hover, rules = self._vehicle, Hover(mode), _rules_of_offset(texts.TURN)
+        async with vehicle.control.acquire(hover, by=by, rules=rules) as grant:
             grant.begin()
+            angle = angle_from(await self._resting_heading())
+            vehicle.control.check(hover, by, rules)
             await vehicle.drone.piloting.move_by(0.0, 0.0, 0.0, angle, turn_rate_dps=rate_dps)
+
+    async def _resting_heading(self) -> float:
+        """Return the heading (rad) once the drone turns no further, or after `REST_WAIT`.
+
+        A moveBy turns from the heading at its beginning, and what flew before may have turned the drone: its newest
+        report is up to 0.2 s old, and it turns on for a moment after a stop.
+        """
+        drone, until = self._vehicle.drone, loop_time() + REST_WAIT
+        attitude = drone.piloting.state.attitude
+        before = None if attitude is None else attitude.yaw
+        while True:
+            yaw = (await drone.expect(AttitudeChanged, timeout=REST_WAIT)).yaw
+            if (before is not None and abs(units.wrap_pi(yaw - before)) < AT_REST) or loop_time() > until:
+                return yaw
+            before = yaw
 
     @property
     def _standing(self) -> GeoPoint | None:

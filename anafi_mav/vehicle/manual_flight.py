@@ -21,7 +21,7 @@ from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.flight_task import STOP_WAIT, PlainTask, TaskRules
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.right import Extent, Right, system_of
+from anafi_mav.vehicle.base.right import Extent, system_of
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.joystick_override import JoystickOverride, Override
 from anafi_mav.vehicle.offboard.silence import SILENCE
@@ -131,7 +131,7 @@ class ManualFlight(PlainTask):
 
     async def _override(self, sender: Hashable, sticks: Sticks) -> None:
         """Stop what flies, in mode Position, and let the joystick fly. Raises as `Vehicle.hold`."""
-        await self._vehicle.hold(FlightMode.POSITION, Right(sender, Extent.COMMANDED))
+        await self._vehicle.hold(FlightMode.POSITION, self._vehicle.right(sender, Extent.COMMANDED))
         self.override.take_over(sender, sticks.climb)
         self._vehicle.text(Severity.WARNING, texts.JOYSTICK_OVERRIDE.fill(system=system_of(sender) or 0))
 

@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 
-from anafi_mav import texts
+from anafi_mav import geo, texts
 from anafi_mav.clock import NEVER, Clock
 from anafi_mav.drone import Drone
 from anafi_mav.drone.element import Position
@@ -50,6 +50,7 @@ from anafi_mav.vehicle.base.right import Extent, Right, system_of
 from anafi_mav.vehicle.base.roll_sign import RollSign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
+from anafi_mav.vehicle.base.velocity_loop import TILT_LAG
 from anafi_mav.vehicle.controller_inputs import ControllerInputs
 from anafi_mav.vehicle.fence.rally import RallyPoints
 from anafi_mav.vehicle.follow_flight import FollowFlight
@@ -84,6 +85,9 @@ POSITION_OLD = 3.0
 
 LOCATIONS_MISSED = 3
 """A drone that reports its location more rarely (a slowed simulator) may miss as many."""
+
+BRAKING = 3.0
+"""m/s2 that an ANAFI brakes with: 2 to 4 (anafi_ros paper IV)."""
 
 LANDS_AFTER_RETURN = 2.0
 """s after a return that the drone ends by landing within which the landing begins."""
@@ -212,6 +216,16 @@ class Vehicle(Aircraft):
     @property
     def position_is_old(self) -> bool:
         return self._clock.monotonic() > self._position_expiry
+
+    @property
+    def stopping_place(self) -> GeoPoint | None:
+        here, velocity = self.place, self.drone.piloting.state.velocity
+        if here is None or velocity is None:
+            return here
+        # The location is up to a second old, and the drone flies on while it brakes.
+        age = self._clock.monotonic() - self.link_facts.located_at
+        seconds = age + TILT_LAG + math.hypot(velocity.north, velocity.east) / (2.0 * BRAKING)
+        return GeoPoint(*geo.destination(*here, velocity.north * seconds, velocity.east * seconds))
 
     @property
     def _position_expiry(self) -> float:

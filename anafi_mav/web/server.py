@@ -96,10 +96,12 @@ NO_TOKEN = "token missing or wrong: open the link that `anafi-mav status --link`
 RequestCallback = Callable[[web.Request], Awaitable[web.StreamResponse]]
 """Answers one request."""
 
+_NO_HTTP = (HttpProcessingError, web.RequestPayloadError)
+
 
 def _is_ours(record: logging.LogRecord) -> bool:
-    """False for the log line of a request that is no HTTP: bytes of a peer are no error of ours."""
-    return record.exc_info is None or not isinstance(record.exc_info[1], HttpProcessingError)
+    """False for the log line of a request or body that is no HTTP: not an error of ours."""
+    return record.exc_info is None or not isinstance(record.exc_info[1], _NO_HTTP)
 
 
 log.addFilter(_is_ours)
@@ -339,9 +341,10 @@ class HttpServer:
             try:
                 await asyncio.wait_for(request.read(), BODY_LIMIT)  # kept for the handler
             except asyncio.TimeoutError:
-                refusal = web.HTTPRequestTimeout()
-                refusal.force_close()
-                raise refusal from None
+                raise _ending(web.HTTPRequestTimeout()) from None
+            except (web.RequestPayloadError, ConnectionError) as error:
+                # A body that is not in its encoding, or a client that has left: no error of ours.
+                raise _ending(web.HTTPBadRequest(text="the body cannot be read\n")) from error
         return await handler(request)
 
     def _admit(self, request: web.Request, token: AccessToken) -> None:
@@ -360,8 +363,7 @@ class HttpServer:
             raise answer
         self.refused["token"] += 1
         refusal = web.HTTPUnauthorized(text=NO_TOKEN, headers={"WWW-Authenticate": 'Bearer realm="anafi-mav"'})
-        refusal.force_close()  # its place is for those who have the token
-        raise refusal
+        raise _ending(refusal)  # its place is for those who have the token
 
     def _is_link_to_page(self, request: web.Request) -> bool:
         """True for a page that is opened as such, and not as a part of another one."""
@@ -377,6 +379,12 @@ class HttpServer:
         except ValueError:
             return False
         return name is not None and (_is_address(name) or name.rstrip(".") in self._names)
+
+
+def _ending(refusal: web.HTTPException) -> web.HTTPException:
+    """Return an answer as one that ends its connection."""
+    refusal.force_close()
+    return refusal
 
 
 async def _add_headers(request: web.Request, response: web.StreamResponse) -> None:

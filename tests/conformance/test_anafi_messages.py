@@ -137,7 +137,7 @@ async def test_link() -> None:
         w.drone.inject(wifi.RssiChanged(-67))
         observed = await w.client.wait("ANAFI_LINK", lambda m: m.rssi == -67)
         assert observed.quality == 3
-        assert observed.flags == dialect.ANAFI_LINK_FLAGS_TOLD | dialect.ANAFI_LINK_FLAGS_PERTURBED
+        assert observed.flags == dialect.ANAFI_LINK_FLAGS_REPORTED | dialect.ANAFI_LINK_FLAGS_PERTURBED
         assert observed.goodput == 0xFFFFFFFF  # the live video alone reports it
 
 

@@ -239,7 +239,7 @@ async def test_conf_095_late_answer_is_announced_as_in_progress() -> None:
 
 async def test_conf_095_silent_drone_is_a_failure() -> None:
     async with world() as w:
-        w.drone.faults.untold = frozenset({"camera.style"})
+        w.drone.faults.unreported = frozenset({"camera.style"})
         ack = await write(w.client, "CAM_SATURATION", 2.0, 9)
         assert (ack.param_result, value_of(ack)) == (FAILED, 0.0)
         assert (await write(w.client, "CAM_EV", 1.0, 9)).param_result == ACCEPTED

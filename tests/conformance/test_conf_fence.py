@@ -323,7 +323,7 @@ async def test_conf_076_action_that_has_failed_is_tried_again() -> None:
         mark = w.client.mark()
         await put(w, ACTION["px4"], NUMBER["px4"]["land"])
         await put(w, "ANF_FENCE_AHEAD", 0, 6)
-        w.drone.faults.untold = frozenset({ardrone3.FlyingStateChanged.NAME})
+        w.drone.faults.unreported = frozenset({ardrone3.FlyingStateChanged.NAME})
         assert (await upload(w.client, square(PLACE, 20.0), FENCE)).type == TAKEN
         await said(w.client, "Fence landing failed: ", since=mark, timeout=30.0)
         before = len(w.commands("ardrone3.Piloting.Landing"))

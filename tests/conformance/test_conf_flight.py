@@ -109,7 +109,7 @@ async def test_climb_that_another_controller_ends_is_reported_as_aborted(flavour
 async def test_climb_without_a_reported_height_is_reported_as_aborted() -> None:
     async with world() as w:
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
-        w.drone.faults.untold = frozenset({ardrone3.AltitudeChanged.NAME})
+        w.drone.faults.unreported = frozenset({ardrone3.AltitudeChanged.NAME})
         mark = w.client.mark()
         assert (await w.client.command(TAKE_OFF, x=0.0, y=0.0, z=20.0)).result == ACCEPTED
         aborted = await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Climb to "), since=mark)

@@ -220,7 +220,7 @@ async def test_takeover_cancels_the_command_of_another_client() -> None:
     async with world() as w:
         other = await w.connect(245, 190)
         assert await angles(w, 0.0) == ACCEPTED
-        w.drone.faults.untold = frozenset({"gimbal.attitude"})  # so that it is not confirmed
+        w.drone.faults.unreported = frozenset({"gimbal.attitude"})  # so that it is not confirmed
         mark = w.client.mark()
         w.client.send_command(PITCHYAW, -40.0, NAN, NAN, NAN, x=LEVEL)
         await w.drone.wait_log(lambda e: e.name == "gimbal.set_target" and e.args["pitch"] == -40.0, 3.0)

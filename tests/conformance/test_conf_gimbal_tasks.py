@@ -251,6 +251,8 @@ async def test_mount_place_replaces_a_goto_as_a_region_does() -> None:
         # A command replaces it, in the order of flight commands.
         ack = await other.command(MOUNT, 0.0, 0.0, 0.0, 0.0, x=EAST[0], y=EAST[1], z=GPS_POINT)
         assert ack.result == ACCEPTED
+        # No change of the mode shows that the goto is over.
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Goto ended: region of interest instead", since=0)
         await heads(w, 90.0)
         names = [entry.name.rpartition(".")[2] for entry in w.drone.log if entry.kind == "command"]
         assert [name for name in names if name in ("moveTo", "CancelMoveTo", "StartPilotedPOIV2")] == [

@@ -11,6 +11,7 @@ from support.fault_scenarios import CANCELLED, IN_PROGRESS
 from support.flavours import both
 from support.missions import put, start, takeoff, way
 from support.params import write
+from support.setpoints import NO_YAW_RATE, VELOCITY_ONLY, engage, local, streaming
 from support.world import ARMED, HOME, World, world
 
 from anafi_mav import geo, units
@@ -236,6 +237,20 @@ async def test_conf_143_condition_yaw_turns_in_the_requested_direction() -> None
         (move,) = sent(w, "move.extended_move_by")
         assert move["d_psi"] == pytest.approx(-1.5 * math.pi, abs=0.05)
         assert move["max_yaw_rotation_speed"] == 60.0
+
+
+@both
+async def test_conf_143_condition_yaw_of_a_turning_drone_ends_at_the_heading(flavour: str) -> None:
+    """A stream has turned it to the left since its last report of the heading."""
+    async with world(flavour=flavour, telemetry_rate=1.0) as w:
+        await w.take_off(5.0)
+        turning = local(VELOCITY_ONLY & ~NO_YAW_RATE, yaw_rate=-0.6)
+        async with streaming(w.client, turning):
+            await engage(w.client, flavour)
+            reported = (await w.client.wait("ATTITUDE", lambda m: -2.0 < m.yaw < -0.6)).yaw
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["yaw"] < reported - 0.25)
+        assert (await w.client.command(YAW, 90, 0, 0, 0, timeout=20.0)).result == ACCEPTED
+        assert w.drone.pose.yaw * units.DEG_PER_RAD == pytest.approx(90.0, abs=2.0)
 
 
 @pytest.mark.parametrize("name", ["ANF_CRUISE_SPEED", "ANF_CLIMB_SPEED"])

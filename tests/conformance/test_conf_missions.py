@@ -541,7 +541,7 @@ async def test_conf_141_height_refused_by_drone_rejects_command_and_item(flavour
     async with world(flavour=flavour) as w:
         await w.take_off(5.0)
         mark = w.client.mark()
-        w.drone.faults.untold = frozenset({ardrone3.MaxAltitudeChanged.NAME})  # else the gateway refuses it itself
+        w.drone.faults.unreported = frozenset({ardrone3.MaxAltitudeChanged.NAME})  # else the gateway refuses it itself
         w.drone.firmware.receive(ardrone3.MaxAltitude(10.0), asyncio.get_running_loop().time())
         height = dialect.MAV_CMD_DO_CHANGE_ALTITUDE
         w.client.send_command(height, 12.0, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT)

@@ -52,7 +52,7 @@ async def asked_for(w: World, items: list[Item]) -> int:
     """In the air; the mission is started, the drone flies it and has not said so: it may take 20 s. A mark before."""
     await w.take_off(6.0)
     await put(w, items)
-    w.drone.faults.untold = frozenset({PLAYS})
+    w.drone.faults.unreported = frozenset({PLAYS})
     mark = w.client.mark()
     w.client.send_command(dialect.MAV_CMD_MISSION_START, 0, 0)
     await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 2.0, 20.0)
@@ -60,7 +60,7 @@ async def asked_for(w: World, items: list[Item]) -> int:
 
 
 def reports_its_plan(w: World) -> None:
-    w.drone.faults.untold = frozenset()
+    w.drone.faults.unreported = frozenset()
     w.drone.firmware.flight_plan.report_stopped()  # whatever it is
 
 
@@ -70,7 +70,7 @@ async def test_conf_011_049_slow_mission_start_sends_no_early_progress(flavour: 
     async with world(flavour=flavour, web=True) as w:
         await w.take_off(6.0)
         await put(w, CORNERS)
-        w.drone.faults.untold = frozenset({PLAYS})
+        w.drone.faults.unreported = frozenset({PLAYS})
         mark, began = w.client.mark(), time.monotonic()
         params = (1, MISSION_MODE[flavour]) if first(w) else (1, 4, 4)
         for _ in range(4):
@@ -94,7 +94,7 @@ async def test_conf_074_other_mission_uploaded_during_start_ends_the_start(flavo
     """The start is answered with a refusal, the drone is commanded to stop and hovers, and the mode is not Mission."""
     async with world(flavour=flavour, web=True) as w:
         mark = await asked_for(w, CORNERS)
-        w.drone.faults.untold = frozenset()
+        w.drone.faults.unreported = frozenset()
         changed = w.client.mark()
         if how == "cleared":
             assert (await clear(w.client, MISSION)).type == ACCEPTED
@@ -132,11 +132,11 @@ async def test_conf_074_another_mission_before_the_drone_has_begun_at_arming(how
     async with world(web=True) as w:
         await put(w, CORNERS)
         assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 4)).result == dialect.MAV_RESULT_ACCEPTED
-        w.drone.faults.untold = frozenset({PLAYS})
+        w.drone.faults.unreported = frozenset({PLAYS})
         mark = w.client.mark()
         assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == dialect.MAV_RESULT_ACCEPTED
         await w.drone.wait_log(lambda e: e.name == "item" and e.args["index"] == 1, 20.0)
-        w.drone.faults.untold = frozenset()
+        w.drone.faults.unreported = frozenset()
         if how == "cleared":
             assert (await clear(w.client, MISSION)).type == ACCEPTED
         else:
@@ -181,7 +181,7 @@ async def test_conf_074_same_mission_uploaded_during_a_failed_start_is_new(flavo
         await state(w, ACTIVE, seq=2, since=0)
         assert (await w.client.command(mav_enums.MAV_CMD_DO_REPOSITION, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, PAUSED, seq=2)
-        w.drone.faults.untold = frozenset({PLAYS})
+        w.drone.faults.unreported = frozenset({PLAYS})
         mark = w.client.mark()
         w.client.send_command(dialect.MAV_CMD_MISSION_START, 0, 0)
         await w.drone.wait_log(lambda e: e.name == "plan" and e.args["state"] == "playing", 10.0)
@@ -211,12 +211,12 @@ async def test_conf_074_mission_paused_before_a_file_resumes_after_flown_items()
         started = w.client.mark()
         assert (await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await w.drone.wait_log(lambda e: e.name.endswith("moveByEnd") and turned(w) == 1, 30.0)
-        w.drone.faults.untold = frozenset({PLAYS})  # the next file is on its way
+        w.drone.faults.unreported = frozenset({PLAYS})  # the next file is on its way
         await state(w, ACTIVE, seq=0, since=w.client.mark())
         mark = w.client.mark()
         assert (await w.client.command(mav_enums.MAV_CMD_DO_REPOSITION, -1, 1, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, PAUSED, seq=0, since=mark)
-        w.drone.faults.untold = frozenset()
+        w.drone.faults.unreported = frozenset()
         assert (await w.client.command(dialect.MAV_CMD_MISSION_START, 0, 0)).result == dialect.MAV_RESULT_ACCEPTED
         await state(w, COMPLETE, since=mark, timeout=60.0)
         assert turned(w) == 3

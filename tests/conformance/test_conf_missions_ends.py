@@ -56,7 +56,7 @@ def while_it_waits(w: World, do: Callable[[], Any]) -> asyncio.Future[Any]:
 def waited(w: World) -> None:
     """The drone says that it has executed the line before the last, and no more of its lines."""
     w.drone.inject(common.MissionItemExecuted(len(w.drone.firmware.flight_plan.items) - 2))
-    w.drone.faults.untold = frozenset({common.MissionItemExecuted.NAME})
+    w.drone.faults.unreported = frozenset({common.MissionItemExecuted.NAME})
 
 
 def observed_after(w: World, entry: Any) -> list[str]:
@@ -106,7 +106,7 @@ async def test_conf_073_last_line_reported_after_the_end_completes_the_mission()
             plan = w.drone.firmware.flight_plan
             last = len(plan.items) - 1
             plan.stop(hover=True)
-            w.drone.faults.untold = frozenset()
+            w.drone.faults.unreported = frozenset()
             w.drone.inject(common.MissionItemExecuted(last))
 
         mark, _ = await to_the_last_line(w, LAND, ends)
@@ -219,7 +219,7 @@ async def test_mission_stopped_by_alert_at_last_waypoint_is_paused() -> None:
 
 async def report_last_line(w: World) -> None:
     """The drone reports its plan's last line; return when the gateway has processed that report."""
-    w.drone.faults.untold = frozenset()
+    w.drone.faults.unreported = frozenset()
     mark = w.client.mark()
     w.drone.inject(common.MissionItemExecuted(len(w.drone.firmware.flight_plan.items) - 1))
     w.drone.inject(ardrone3.IcingLevelChanged(ardrone3.WarningLevel.CRITICAL))  # reports keep their order
@@ -282,7 +282,7 @@ async def stopped_without(w: World, report: str) -> int:
     await put(w, MOVED[report])
     await start(w)
     await w.drone.wait_log(lambda entry: entry.name == "item" and entry.args["index"] == 3, 40.0)
-    w.drone.faults.untold = frozenset({report})
+    w.drone.faults.unreported = frozenset({report})
     await w.drone.wait_log(lambda entry: entry.name == "plan" and entry.args["state"] == "stopped", 40.0)
     mark = since = w.client.mark()
     last = MOVED[report][-1]
@@ -299,7 +299,7 @@ async def test_mission_end_without_position_completes_when_position_is_known(rep
     async with world(web=True) as w:
         await stopped_without(w, report)
         assert reached(w) == [0, 1]
-        w.drone.faults.untold = frozenset()
+        w.drone.faults.unreported = frozenset()
         await state(w, COMPLETE)
         assert reached(w) == [0, 1, 2]
         assert [m.text for _, m in w.client.since(0, "STATUSTEXT") if "paused" in m.text] == []

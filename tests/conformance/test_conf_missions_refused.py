@@ -36,16 +36,16 @@ from anafi_mav.sim.world.faults import Faults
 
 COMPONENT = common.ComponentStateListChanged.NAME
 
-GPS_TOLD = frozenset({ardrone3.GPSFixStateChanged.NAME, ardrone3.GpsLocationChanged.NAME})
+GPS_REPORTS = frozenset({ardrone3.GPSFixStateChanged.NAME, ardrone3.GpsLocationChanged.NAME})
 """What the gateway takes its own word about the fix from."""
 
 
 def _no_fix(w: World) -> None:
-    w.drone.faults.untold, w.drone.faults.gps = GPS_TOLD, False
+    w.drone.faults.unreported, w.drone.faults.gps = GPS_REPORTS, False
 
 
 def _needs_calibration(w: World) -> None:
-    w.drone.faults.untold = frozenset({common.MagnetoCalibrationRequiredState.NAME})
+    w.drone.faults.unreported = frozenset({common.MagnetoCalibrationRequiredState.NAME})
     w.drone.faults.magneto_required = True
 
 
@@ -54,12 +54,12 @@ def _unreadable_file(w: World) -> None:
 
 
 def _no_take_off(w: World) -> None:
-    w.drone.faults.untold = frozenset({alarms.TakeoffChecklist.NAME})
+    w.drone.faults.unreported = frozenset({alarms.TakeoffChecklist.NAME})
     w.drone.faults.refuse_take_off = frozenset({TakeoffChecklistType.VCAM})
 
 
 def _low_ceiling(w: World) -> None:
-    w.drone.faults.untold = frozenset({ardrone3.MaxAltitudeChanged.NAME})
+    w.drone.faults.unreported = frozenset({ardrone3.MaxAltitudeChanged.NAME})
     w.drone.firmware.receive(ardrone3.MaxAltitude(10.0), asyncio.get_running_loop().time())
 
 
@@ -71,7 +71,7 @@ def mend(w: World) -> None:
     """All is well again."""
     w.drone.firmware.receive(ardrone3.MaxAltitude(150.0), asyncio.get_running_loop().time())
     well = Faults()
-    for name in ("gps", "magneto_required", "refuse_take_off", "refuse_plan", "untold"):
+    for name in ("gps", "magneto_required", "refuse_take_off", "refuse_plan", "unreported"):
         setattr(w.drone.faults, name, getattr(well, name))
 
 
@@ -139,10 +139,10 @@ async def test_drone_that_reports_no_playing_state_before_a_plan_flies_one(model
     """Parrot's common.xml has the state reported by start, pause and stop alone."""
 
     def silent(drone: SimulatedDrone) -> None:
-        drone.faults.untold = frozenset({common.MavlinkFilePlayingStateChanged.NAME})
+        drone.faults.unreported = frozenset({common.MavlinkFilePlayingStateChanged.NAME})
 
     async with world(model=model, web=True, before=silent) as w:
-        w.drone.faults.untold = frozenset()
+        w.drone.faults.unreported = frozenset()
         await put(w, [takeoff(6.0), way(12.0, 0.0, 6.0)])
         await start(w)
         await state(w, COMPLETE, since=0)

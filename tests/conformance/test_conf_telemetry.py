@@ -108,12 +108,12 @@ async def test_conf_037_battery(flavour: str) -> None:
         assert status.charge_state == dialect.MAV_BATTERY_CHARGE_STATE_OK
 
 
-@pytest.mark.parametrize("untold", [[], [battery.Alert.NAME], [ardrone3.AlertStateChanged.NAME]])
-async def test_conf_037_low_charge_is_reported_by_either_alert(untold: list[str]) -> None:
+@pytest.mark.parametrize("unreported", [[], [battery.Alert.NAME], [ardrone3.AlertStateChanged.NAME]])
+async def test_conf_037_low_charge_is_reported_by_either_alert(unreported: list[str]) -> None:
     """Parrot's files name battery.alert for the 4K and the Ai, AlertStateChanged for 4K and Thermal."""
 
     def reports(drone: SimulatedDrone) -> None:
-        drone.faults.untold = frozenset(untold)
+        drone.faults.unreported = frozenset(unreported)
 
     async with world(model="thermal", before=reports) as w:
         levels = (

@@ -205,7 +205,7 @@ async def test_silence_before_takeoff_waits_half_a_second() -> None:
             await engage(w.client, "px4")
             program = attitude(thrust=0.7)
             await w.drone.wait_log(lambda e: e.name.endswith(".TakeOff"), 5.0)
-            w.drone.faults.untold = frozenset({rth.CustomLocation.NAME, rth.PreferredHomeType.NAME})
+            w.drone.faults.unreported = frozenset({rth.CustomLocation.NAME, rth.PreferredHomeType.NAME})
             w.clients[1].send_command(dialect.MAV_CMD_DO_SET_HOME, 0, frame=0, x=48.88, y=2.37, z=0.0)
             await w.drone.wait_log(lambda e: e.kind == "command" and e.name.startswith("rth.set"), 5.0)
         loop = asyncio.get_running_loop()

@@ -24,6 +24,8 @@ OUT_OF_BOUNDS: dict[str, tuple[Item, int]] = {
     "delay": (Item(dialect.MAV_CMD_NAV_DELAY, 0.0, 0.0, p1=HUGE, frame=2), 1),
     "condition delay": (Item(dialect.MAV_CMD_CONDITION_DELAY, 0.0, 0.0, p1=HUGE, frame=2), 1),
     "loiter time": (Item(dialect.MAV_CMD_NAV_LOITER_TIME, *HOME[:2], z=10.0, p1=HUGE, frame=3), 1),
+    "speed": (Item(dialect.MAV_CMD_DO_CHANGE_SPEED, 0.0, 0.0, p1=1.0, p2=HUGE, frame=2), 2),
+    "speed at which no move would end": (Item(dialect.MAV_CMD_DO_CHANGE_SPEED, 0.0, 0.0, p1=1.0, p2=0.01, frame=2), 2),
     "turn": (Item(dialect.MAV_CMD_CONDITION_YAW, 0.0, 0.0, p1=HUGE, frame=2), 1),
 }
 """An item, and the number of the parameter that MISSION_ACK names."""

@@ -115,7 +115,7 @@ async def test_withdrawn_start_reported_late_under_another_name_is_suspended(fla
         mark, seen = w.client.mark(), len(commanded(w, "Mavlink.Start"))
         w.client.send_command(SET_CURRENT, 1.0 + first(w), 0.0)
         await w.drone.wait_log(lambda e: len(commanded(w, "Mavlink.Stop")) > 0, 20.0)
-        w.drone.faults.untold = frozenset({common.MavlinkFilePlayingStateChanged.NAME})
+        w.drone.faults.unreported = frozenset({common.MavlinkFilePlayingStateChanged.NAME})
         await w.drone.wait_log(lambda e: len(commanded(w, "Mavlink.Start")) > seen, 20.0)
         w.client.send(newer.MAVLink_command_cancel_message(1, 1, SET_CURRENT))
         await w.client.wait(
@@ -123,7 +123,7 @@ async def test_withdrawn_start_reported_late_under_another_name_is_suspended(fla
             lambda m: m.command == SET_CURRENT and m.result == mav_enums.MAV_RESULT_CANCELLED,
             since=mark,
         )
-        w.drone.faults.untold = frozenset()
+        w.drone.faults.unreported = frozenset()
         stops = len(commanded(w, "Mavlink.Stop"))
         w.drone.inject(common.MavlinkFilePlayingStateChanged(PlayingState.PLAYING, "renamed", MavlinkType.FLIGHT_PLAN))
         await w.drone.wait_log(lambda e: len(commanded(w, "Mavlink.Stop")) > stops, 5.0)
@@ -163,7 +163,7 @@ async def started_twice(w: World) -> SilentPlan:
     mark, stops, starts = w.client.mark(), len(commanded(w, "Mavlink.Stop")), len(commanded(w, "Mavlink.Start"))
     w.client.send_command(SET_CURRENT, float(first(w)), 0.0)
     await w.drone.wait_log(lambda e: len(commanded(w, "Mavlink.Stop")) > stops, 20.0)
-    w.drone.faults.untold = frozenset({common.MavlinkFilePlayingStateChanged.NAME})
+    w.drone.faults.unreported = frozenset({common.MavlinkFilePlayingStateChanged.NAME})
     await w.drone.wait_log(lambda e: len(commanded(w, "Mavlink.Start")) > starts, 20.0)
     w.client.send(newer.MAVLink_command_cancel_message(1, 1, SET_CURRENT))
     await w.client.wait(
@@ -175,7 +175,7 @@ async def started_twice(w: World) -> SilentPlan:
     mark = w.client.mark()
     w.client.send_command(mav_enums.MAV_CMD_MISSION_START, 0.0, 0.0)
     await w.drone.wait_log(lambda e: len(commanded(w, "Mavlink.Start")) > starts + 1, 20.0)
-    w.drone.faults.untold = frozenset()
+    w.drone.faults.unreported = frozenset()
     files = [e.args["filepath"] for e in w.drone.log if e.kind == "command" and e.name.endswith("Mavlink.Start")]
     assert files[-1] != files[-2], "reports of the two starts differ by the name alone"
     return SilentPlan(w, mark, files[-2], files[-1])
@@ -263,13 +263,13 @@ async def test_mission_whose_resumption_was_withdrawn_is_continued_from_another_
     async with world(speed=1.0, web=True) as w:
         await on_the_way(w, 2)
         assert (await w.client.command(mav_enums.MAV_CMD_DO_SET_MODE, 1, 4, 3)).result == mav_enums.MAV_RESULT_ACCEPTED
-        w.drone.faults.untold = frozenset({common.MavlinkFilePlayingStateChanged.NAME})
+        w.drone.faults.unreported = frozenset({common.MavlinkFilePlayingStateChanged.NAME})
         mark, starts = w.client.mark(), len(commanded(w, "Mavlink.Start"))
         w.client.send_command(mav_enums.MAV_CMD_MISSION_START)
         await w.drone.wait_log(lambda e: len(commanded(w, "Mavlink.Start")) > starts, 10.0)
         w.client.send(newer.MAVLink_command_cancel_message(1, 1, mav_enums.MAV_CMD_MISSION_START))
         assert (mav_enums.MAV_CMD_MISSION_START, mav_enums.MAV_RESULT_CANCELLED) in await until(w.client, mark, 1)
-        w.drone.faults.untold = frozenset()
+        w.drone.faults.unreported = frozenset()
         assert (await w.client.command(mav_enums.MAV_CMD_MISSION_START)).result == mav_enums.MAV_RESULT_ACCEPTED
         files = [e.args["filepath"] for e in w.drone.log if e.kind == "command" and e.name.endswith("Mavlink.Start")]
         assert len({*files}) == 2

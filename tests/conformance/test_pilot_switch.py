@@ -230,7 +230,7 @@ async def test_pilot_gets_sticks_of_a_drone_that_does_not_confirm_its_stop() -> 
     async with world(speed=1.0, skycontroller=3) as w:
         await w.take_off(8.0)
         assert await goto(w, 80.0, 8.0) == ACCEPTED
-        w.drone.faults.untold = frozenset({ardrone3.MoveToChanged.NAME})
+        w.drone.faults.unreported = frozenset({ardrone3.MoveToChanged.NAME})
         mark = w.client.mark()
         send_set(w.client, SWITCH, PILOT, INT32)
         await w.client.wait(
@@ -289,7 +289,7 @@ async def test_goto_during_hand_over_to_pilot_is_refused() -> None:
         await w.take_off(8.0)
         assert await goto(w, 80.0, 8.0) == ACCEPTED
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 2.0, 20.0)
-        w.drone.faults.untold = frozenset({ardrone3.MoveToChanged.NAME})
+        w.drone.faults.unreported = frozenset({ardrone3.MoveToChanged.NAME})
         began, mark = now(), w.client.mark()
         send_set(w.client, SWITCH, PILOT, INT32)
         await asyncio.sleep(0.5)

@@ -34,7 +34,7 @@ METRE = 1.0 / 111_195.0
 
 @asynccontextmanager
 async def flying(
-    tmp_path: Path, height: float, *quirks: Quirk, air: Impairment = CLEAR, untold: Sequence[type[Message]] = ()
+    tmp_path: Path, height: float, *quirks: Quirk, air: Impairment = CLEAR, unreported: Sequence[type[Message]] = ()
 ) -> AsyncIterator[World]:
     """A world whose first gateway has taken the drone off and has ended; the second one has just found it."""
     drone, address = loopback(), loopback()
@@ -54,13 +54,15 @@ async def flying(
             await w.take_off(height)
             await w.client.close()
         simulator.drones[0].faults.up = simulator.drones[0].faults.down = air
-        simulator.drones[0].faults.untold = frozenset(event.NAME for event in untold)
+        simulator.drones[0].faults.unreported = frozenset(event.NAME for event in unreported)
         async with Gateway(config) as second:
             w = World(simulator, second, address)
             await w.connect()
             armed = dialect.MAV_MODE_FLAG_SAFETY_ARMED
             await w.client.heartbeat(lambda beat: beat.base_mode & armed, since=0, timeout=30.0)
-            await w.client.wait("GPS_RAW_INT" if ardrone3.AltitudeChanged in untold else "GLOBAL_POSITION_INT", since=0)
+            await w.client.wait(
+                "GPS_RAW_INT" if ardrone3.AltitudeChanged in unreported else "GLOBAL_POSITION_INT", since=0
+            )
             yield w
             for client in w.clients:
                 await client.close()
@@ -110,7 +112,7 @@ async def test_restart_without_flight_id_estimates_the_height_safely(tmp_path: P
 
 
 async def test_goto_that_keeps_the_height_needs_a_reported_one(tmp_path: Path) -> None:
-    async with flying(tmp_path, 10.0, untold=[ardrone3.AltitudeChanged]) as w:
+    async with flying(tmp_path, 10.0, unreported=[ardrone3.AltitudeChanged]) as w:
         mark = w.client.mark()
         assert await goto(w, 10.0, math.nan, RELATIVE) == REJECTED
         await w.client.wait("STATUSTEXT", lambda m: m.text == "Goto refused: height unknown", since=mark)
@@ -182,20 +184,20 @@ async def test_goto_after_restart_over_a_bad_link_is_flown(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(
-    ("quirks", "untold"),
+    ("quirks", "unreported"),
     [((), (rth.TakeoffLocation,)), ((Quirk.NO_FLIGHT_ID,), (rth.TakeoffLocation,))],
     ids=["kept with the flight id", "home of type take-off"],
 )
 async def test_restart_in_flight_without_takeoff_location_keeps_local_frame(
-    tmp_path: Path, quirks: tuple[Quirk, ...], untold: tuple[type[Message], ...]
+    tmp_path: Path, quirks: tuple[Quirk, ...], unreported: tuple[type[Message], ...]
 ) -> None:
-    async with flying(tmp_path, 6.0, *quirks, untold=untold) as w:
+    async with flying(tmp_path, 6.0, *quirks, unreported=unreported) as w:
         assert await goto(w, 12.0, 6.0, RELATIVE) == ACCEPTED
         await w.client.wait("LOCAL_POSITION_NED", lambda m: abs(m.x - 12.0) < 0.7 and abs(m.y) < 0.7, timeout=30.0)
 
 
 async def test_restart_in_flight_without_takeoff_place_refuses_local_frame(tmp_path: Path) -> None:
-    async with flying(tmp_path, 6.0, Quirk.NO_FLIGHT_ID, untold=(rth.TakeoffLocation, rth.HomeType)) as w:
+    async with flying(tmp_path, 6.0, Quirk.NO_FLIGHT_ID, unreported=(rth.TakeoffLocation, rth.HomeType)) as w:
         async with streaming(w.client, local(POSITION_ONLY, at=(8.0, 0.0, -7.0))):
             await w.client.wait("STATUSTEXT", lambda m: m.text == "Setpoint refused: take-off point unknown", since=0)
         assert w.client.since(0, "LOCAL_POSITION_NED") == []

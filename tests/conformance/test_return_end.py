@@ -303,9 +303,9 @@ async def test_return_ending_far_from_home_hovers() -> None:
     async with world(speed=FAST) as w:
         await away(w, 20.0)
         mark = await go_home(w)
-        w.drone.faults.untold = frozenset({rth.State.NAME, ardrone3.NavigateHomeStateChanged.NAME})
+        w.drone.faults.unreported = frozenset({rth.State.NAME, ardrone3.NavigateHomeStateChanged.NAME})
         w.drone.firmware.homing.abort()
-        w.drone.faults.untold = frozenset()
+        w.drone.faults.unreported = frozenset()
         w.drone.inject(rth.State(rth.RthState.AVAILABLE, rth.StateReason.FINISHED))
         await said(w.client, "m from home", mark)
         await asyncio.sleep(5.5)

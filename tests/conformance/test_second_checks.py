@@ -69,7 +69,7 @@ async def test_motor_cut_is_followed_by_nothing_of_what_it_replaces() -> None:
     """A goto that the drone has not confirmed: its cancellation would arrive behind the cut."""
     async with world(speed=1.0, allow_kill=True) as w:
         await w.take_off(UP)
-        w.drone.faults.untold = frozenset({ardrone3.MoveToChanged.NAME})
+        w.drone.faults.unreported = frozenset({ardrone3.MoveToChanged.NAME})
         w.client.send_command(GOTO, -1, 1, 0, NAN, frame=6, x=HOME[0] + 0.0005, y=HOME[1], z=UP)
         await w.drone.wait_log(lambda e: e.kind == "command" and e.name.endswith(".moveTo"), 5.0)
         assert (await w.client.command(ARM, 0, FORCE)).result == ACCEPTED
@@ -97,9 +97,9 @@ async def test_goto_that_the_drone_has_not_confirmed_is_over_when_the_pilot_is_g
     """It was answered with FAILED: no text may report its end once more."""
     async with world(speed=1.0, skycontroller=3) as w:
         await w.take_off(UP)
-        w.drone.faults.untold = frozenset({ardrone3.MoveToChanged.NAME})
+        w.drone.faults.unreported = frozenset({ardrone3.MoveToChanged.NAME})
         assert await goto(w, 30.0, UP) == FAILED
-        w.drone.faults.untold = frozenset()
+        w.drone.faults.unreported = frozenset()
         mark = w.client.mark()
         await write(w.client, "ANF_SC_OFFBOARD", 0, dialect.MAV_PARAM_TYPE_INT32)
         await watched(2.0)

@@ -291,7 +291,7 @@ async def test_setpoints_do_not_take_off_a_vehicle_that_is_disarmed_meanwhile() 
         async with streaming(w.client, program):
             await ready(w.client, "px4")
             await asyncio.sleep(7.0)  # 3 s before the armed state expires
-            w.drone.faults.untold = frozenset({rth.CustomLocation.NAME, rth.PreferredHomeType.NAME})
+            w.drone.faults.unreported = frozenset({rth.CustomLocation.NAME, rth.PreferredHomeType.NAME})
             w.client.send_command(dialect.MAV_CMD_DO_SET_HOME, 0, frame=0, x=48.88, y=2.37, z=0.0)
             await w.drone.wait_log(lambda e: e.kind == "command" and e.name.startswith("rth.set"), 5.0)
             program.setpoint = attitude(thrust=0.7)

@@ -93,7 +93,7 @@ async def test_pilots_takeoff_after_an_ignored_takeoff_of_a_client_is_the_pilots
     mode, message = STREAMS["ardupilot"]
     async with world(speed=1.0, flavour="ardupilot", skycontroller=3) as w:
         assert w.drone.skycontroller is not None
-        w.drone.faults.untold = frozenset({alarms.TakeoffChecklist.NAME})
+        w.drone.faults.unreported = frozenset({alarms.TakeoffChecklist.NAME})
         w.drone.faults.refuse_take_off = frozenset({alarms.TakeoffChecklistType.VCAM})
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
         w.client.send_command(TAKEOFF, x=0.0, y=0.0, z=5.0)

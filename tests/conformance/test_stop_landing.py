@@ -36,7 +36,7 @@ from anafi_mav.errors import AnafiMavError
 from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.sim.world.quirks import Quirk
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.right import Extent, Right
+from anafi_mav.vehicle.base.right import Extent
 
 BAD_AIR = Impairment(loss=0.25, delay=0.2)
 PX4_POSITION = (1, 3, 0)
@@ -286,7 +286,7 @@ async def test_joystick_override_ends_a_clients_landing() -> None:
     async with world(speed=1.0) as w:
         await landing(w)
         vehicle = system_of(w).vehicle
-        await vehicle.hold(FlightMode.POSITION, Right("joystick", Extent.COMMANDED))
+        await vehicle.hold(FlightMode.POSITION, vehicle.right("joystick", Extent.COMMANDED))
         await w.client.heartbeat(lambda beat: beat.custom_mode == POSITION)
     async with world(speed=1.0) as w:
         await w.take_off(8.0)
@@ -294,7 +294,7 @@ async def test_joystick_override_ends_a_clients_landing() -> None:
         await w.client.heartbeat(lambda beat: beat.custom_mode == LAND)
         vehicle = system_of(w).vehicle
         with pytest.raises(AnafiMavError, match="drone is landing"):
-            await vehicle.hold(FlightMode.POSITION, Right("joystick", Extent.COMMANDED))
+            await vehicle.hold(FlightMode.POSITION, vehicle.right("joystick", Extent.COMMANDED))
 
 
 async def test_return_begins_once_the_landing_has_ended() -> None:

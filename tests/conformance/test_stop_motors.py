@@ -185,7 +185,7 @@ async def test_pause_holds_against_setpoints_of_every_client(pause: str, positio
 
 async def test_refusal_without_a_flying_state_does_not_place_the_drone_in_the_air() -> None:
     def silent(drone: SimulatedDrone) -> None:
-        drone.faults.untold = frozenset({ardrone3.FlyingStateChanged.NAME})
+        drone.faults.unreported = frozenset({ardrone3.FlyingStateChanged.NAME})
 
     async with world(before=silent) as w:
         for what, command, params in (("Takeoff", TAKEOFF_CMD, ()), ("Disarm", *DISARM[:1], DISARM[1:])):

@@ -38,7 +38,7 @@ async def test_arming_in_the_air_is_accepted_and_leaves_the_flight_alone() -> No
 
 async def test_arming_without_a_flying_state_is_refused() -> None:
     def silent(drone: SimulatedDrone) -> None:
-        drone.faults.untold = frozenset({ardrone3.FlyingStateChanged.NAME})
+        drone.faults.unreported = frozenset({ardrone3.FlyingStateChanged.NAME})
 
     async with world(before=silent) as w:
         mark = w.client.mark()
@@ -52,7 +52,7 @@ async def test_armed_state_expires_after_a_takeoff_that_the_drone_has_not_begun(
     """The drone refuses by silence, for a reason that it has not reported."""
 
     def refusing(drone: SimulatedDrone) -> None:
-        drone.faults.untold = frozenset({TakeoffChecklist.NAME})
+        drone.faults.unreported = frozenset({TakeoffChecklist.NAME})
         drone.faults.refuse_take_off = frozenset({TakeoffChecklistType.MAGNETO_CALIBRATION})
 
     async with world(before=refusing) as w:

@@ -24,7 +24,7 @@ async def report(w: World, event: Message) -> None:
 @pytest.mark.parametrize("accuracy", [5, 12])
 async def test_takeoff_with_inaccurate_gps_altitude_is_reported(accuracy: int) -> None:
     async with world() as w:
-        w.drone.faults.untold = frozenset({ardrone3.GpsLocationChanged.NAME})
+        w.drone.faults.unreported = frozenset({ardrone3.GpsLocationChanged.NAME})
         reporting = asyncio.ensure_future(report(w, ardrone3.GpsLocationChanged(*HOME, 1, 1, accuracy)))
         await w.client.wait("GPS_RAW_INT", lambda m: m.v_acc == accuracy * 1000)
         mark = w.client.mark()

@@ -30,7 +30,7 @@ from support.mav import NAN
 from support.missions import put, takeoff, way
 from support.params import write
 from support.plans import FENCE, square, upload
-from support.setpoints import heard, motion
+from support.setpoints import allow_speed, heard, local, motion, streaming
 from support.world import HOME, World, world
 
 from anafi_mav.arsdk.messages import ardrone3, rth
@@ -194,6 +194,32 @@ async def test_hold_leaves_a_return_that_the_pilot_begins_in_its_wait() -> None:
         assert w.drone.firmware.homing.active
 
 
+async def test_change_of_altitude_is_refused_when_the_pilot_moves_a_stick_before_it_asks_for_control() -> None:
+    """It waits first for the move that means the same; the stick is newer than its message all the same."""
+    async with world(speed=1.0, skycontroller=3) as w:
+        await w.take_off(UP)
+        assert await goto(w, 90.0, UP) == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 2.0, 20.0)
+        pilot = w.drone.skycontroller
+        assert pilot is not None
+        w.drone.faults.unreported = frozenset({ardrone3.MoveToChanged.NAME})
+        client, mark = await w.connect(sysid=250), w.client.mark()
+        w.client.send_command(GOTO, -1, 1, 0, NAN, frame=6, x=HOME[0] - 0.0005, y=HOME[1], z=UP)
+        await w.drone.wait_log(lambda e: e.kind == "command" and e.args.get("latitude", 90.0) < HOME[0], 5.0)
+        await home_being_undone(w)
+        client.send_command(dialect.MAV_CMD_DO_CHANGE_ALTITUDE, UP, 3.0)
+        await watched(0.2)
+        began = now()
+        pilot.stick(PITCH_STICK, 40)
+        await watched(0.3)
+        pilot.stick(PITCH_STICK, 0)
+        ack = await client.wait("COMMAND_ACK", lambda m: m.result != IN_PROGRESS, since=0, timeout=15.0)
+        assert ack.result == REJECTED
+        assert await answer(w, mark, GOTO) != ACCEPTED
+        await watched(2.0)
+        assert heard(w, "moveTo", "extended_move_to", since=began) == []
+
+
 # A return that another controller begins.
 
 
@@ -224,6 +250,27 @@ async def test_task_leaves_a_return_that_another_controller_begins_in_its_wait(n
         await watched(2.0)
         assert heard(w, "abort", since=began) == []
         assert w.drone.firmware.homing.active
+
+
+# A place that the request does not name.
+
+
+@pytest.mark.parametrize("waits", [True, False], ids=["after a wait", "at once"])
+async def test_turn_by_goto_at_speed_does_not_fly_back(waits: bool) -> None:
+    """DO_REPOSITION with a heading alone ends a stream: the drone turns where it comes to rest."""
+    async with world(speed=1.0, flavour="ardupilot") as w:
+        allow_speed(w)
+        await w.take_off(UP)
+        assert (await w.client.command(SET_MODE, 1, 4)).result == ACCEPTED
+        async with streaming(w.client, local(0b110111000111, v=(5.0, 0.0, 0.0))):
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 4.5, 20.0)
+            if waits:
+                await home_being_undone(w)
+        mark = w.client.mark()
+        w.client.send_command(GOTO, -1, 1, 0, 1.5, frame=6, x=NAN, y=NAN, z=NAN)
+        assert await answer(w, mark, GOTO) == ACCEPTED
+        await watched(10.0)
+        assert w.drone.pose.north > max(e.args["north"] for e in w.drone.log if e.kind == "pose") - 2.0
 
 
 # What flew before goes on.

@@ -14,7 +14,7 @@ from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.codec.value_events import unpacked
 from anafi_mav.arsdk.codec.wire import Bits, Blob, Buffer, Message, MessageId, Scalar, Text, UnknownMessage
 from anafi_mav.arsdk.link.frame import FrameType, encode_frame
-from anafi_mav.arsdk.link.known_payloads import KnownPayloads
+from anafi_mav.arsdk.link.known_frames import KnownFrames
 from anafi_mav.arsdk.link.transport import (
     MAX_QUEUED,
     Delivered,
@@ -91,7 +91,7 @@ def _memory(victim: Transport) -> tuple[int, int]:
     waiting: list[object] = [victim]
     while waiting:
         thing = waiting.pop()
-        if id(thing) not in found and not isinstance(thing, type | ModuleType | FunctionType | KnownPayloads):
+        if id(thing) not in found and not isinstance(thing, type | ModuleType | FunctionType | KnownFrames):
             found[id(thing)] = thing
             waiting += gc.get_referents(thing)
     return sum(map(sys.getsizeof, found.values())), blocks

@@ -92,6 +92,11 @@ def encode_frame(version: int, type: int, id: int, seq: int, payload: bytes) -> 
         raise LocalProtocolError(f"frame type {type} id {id} seq {seq}: {error}") from error
 
 
+def sequence_number(version: int) -> slice:
+    """Return where a frame has its sequence number."""
+    return slice(2, 3) if version == 1 else slice(3, 5)
+
+
 def decode_frames(version: int, data: bytes) -> tuple[list[Frame], str | None]:
     """The frames of a datagram, and why the rest of it is unreadable (None: all of it was read)."""
     return _decode_v1(data) if version == 1 else _decode_v2(version, data)

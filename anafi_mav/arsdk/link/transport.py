@@ -32,6 +32,7 @@ from anafi_mav.arsdk.codec.wire import Buffer, Message, MessageId, UnknownMessag
 from anafi_mav.arsdk.link.frame import (
     PACK_LIMIT,
     VERSIONS,
+    Frame,
     FrameType,
     Piece,
     Unpacker,
@@ -42,7 +43,7 @@ from anafi_mav.arsdk.link.frame import (
     pack,
     with_length,
 )
-from anafi_mav.arsdk.link.known_payloads import KNOWN_PAYLOADS
+from anafi_mav.arsdk.link.known_frames import KnownFrames
 from anafi_mav.errors import LocalProtocolError
 
 PING, PONG = 0, 1
@@ -149,6 +150,9 @@ _ACK_ID = {Role.CONTROLLER: 11, Role.DEVICE: 126}
 _LOW_PRIO_ID = {Role.CONTROLLER: 11, Role.DEVICE: 125}
 _RECEIVED_IDS = {Role.CONTROLLER: frozenset({125, 126, 127}), Role.DEVICE: frozenset({10, 11, 12})}
 
+_known_frames = {(role, version): KnownFrames(version) for role in Role for version in VERSIONS}
+"""All drones send the same."""
+
 _U16 = struct.Struct("<H")
 _U64 = struct.Struct("<Q")
 _NEVER = float("inf")
@@ -216,7 +220,7 @@ class Transport:
         # The first frame has number 0 and must count as new, hence a wrap from the highest number.
         self._last_seq = dict.fromkeys(self._received_ids, self._seq_mask)
         self._unpacker = Unpacker(version)
-        self._known = KNOWN_PAYLOADS[version]
+        self._known = _known_frames[role, version]
         self._longest = (longest_command(version, False), longest_command(version, True))
         """Bytes of a command in the unacknowledged queue, and in an acknowledged one."""
         self._noack: deque[tuple[int, bytes]] = deque()
@@ -250,33 +254,24 @@ class Transport:
         if self._down:
             return []
         events = self._take_pending()
+        known = self._known.read(data)
+        if known is not None:
+            self._hear(now, events)
+            id, seq, values = known
+            if self._is_new(_NOACK, id, seq):
+                self.counters["received"] += len(values.layout.kinds)
+                events.append(ReceivedMessages((values,)))
+            return events
         frames, garbage = decode_frames(self.version, data)
         if frames:
-            # Any frame proves that the peer lives, not the pong alone.
-            self._last_received = now
-            self._ping_due = now + self._ping_after
-            self._unanswered = 0
-            if self._silent:
-                self._silent = False
-                events.append(Speaks())
-        for type, id, seq, payload in frames:
+            self._hear(now, events)
+        for frame in frames:
+            type, id, seq, payload = frame
             if id in self._received_ids and type != _ACK:
                 if type == _WITHACK:
                     self._acknowledge(id, seq)
-                if self._is_copy(type, seq, self._last_seq[id]):
-                    self.counters["duplicate"] += 1
-                    continue
-                self._last_seq[id] = seq
-                if type != _WITHACK and (values := self._known.read(payload)) is not None:
-                    self.counters["received"] += len(values.layout.kinds)
-                    events.append(ReceivedMessages((values,)))
-                    continue
-                commands, readable = self._unpacker.unpack(id, type == _WITHACK, payload)
-                messages = self._commands(commands, events)
-                if not readable:
-                    self._garbage("payload", events)
-                elif type != _WITHACK:
-                    self._known.learn(payload, commands, messages)
+                if self._is_new(type, id, seq):
+                    self._unpack(frame, events, data if len(frames) == 1 and garbage is None else None)
             elif type == _ACK and id - ACK_OFFSET in self._queues:
                 self._acknowledged(self._queues[id - ACK_OFFSET], payload, events)
             elif id == PING and type != _ACK:
@@ -287,10 +282,36 @@ class Transport:
             self._garbage(garbage, events)
         return events
 
-    def _is_copy(self, type: int, seq: int, last: int) -> bool:
-        if type == _WITHACK:
-            return (last - seq) & self._seq_mask <= self._seq_mask >> 1
-        return -10 <= seq - last <= 0
+    def _hear(self, now: float, events: list[Event]) -> None:
+        """Any frame proves that the peer lives, not the pong alone."""
+        self._last_received = now
+        self._ping_due = now + self._ping_after
+        self._unanswered = 0
+        if self._silent:
+            self._silent = False
+            events.append(Speaks())
+
+    def _is_new(self, type: int, id: int, seq: int) -> bool:
+        """Return False for the copy of a frame, which is counted."""
+        last = self._last_seq[id]
+        if (last - seq) & self._seq_mask <= self._seq_mask >> 1 if type == _WITHACK else -10 <= seq - last <= 0:
+            self.counters["duplicate"] += 1
+            return False
+        self._last_seq[id] = seq
+        return True
+
+    def _unpack(self, frame: Frame, events: list[Event], datagram: bytes | None) -> None:
+        """Read the commands of a frame.
+
+        `datagram`: the one that has this frame alone; None: it has others.
+        """
+        is_acknowledged = frame.type == _WITHACK
+        commands, readable = self._unpacker.unpack(frame.id, is_acknowledged, frame.payload)
+        messages = self._commands(commands, events)
+        if not readable:
+            self._garbage("payload", events)
+        elif datagram is not None and not is_acknowledged:
+            self._known.learn(datagram, frame, commands, messages)
 
     def _commands(self, commands: list[bytes], events: list[Event]) -> Sequence[Received]:
         messages = receive(commands)

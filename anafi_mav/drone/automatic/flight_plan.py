@@ -198,9 +198,9 @@ class FlightPlan(Commanding[FlightPlanState]):
     async def list(self) -> tuple[PlanOnDrone, ...]:
         """Return the plans on the drone."""
         self._available()
-        told = await self._rest.json("GET", f"{API}/flightplans")
+        answer = await self._rest.json("GET", f"{API}/flightplans")
         try:
-            return msgspec.convert(told, tuple[PlanOnDrone, ...], strict=False)
+            return msgspec.convert(answer, tuple[PlanOnDrone, ...], strict=False)
         except (msgspec.ValidationError, RecursionError) as error:
             raise RemoteProtocolError(f"the drone's list of flight plans: {error}") from error
 
@@ -210,10 +210,10 @@ class FlightPlan(Commanding[FlightPlanState]):
         Raises `CommandRejected` when the drone has none with this id.
         """
         self._available()
-        told = await self._rest.json("GET", f"{API}/flightplan/{_checked(uid)}")
-        if not isinstance(told, dict):
+        answer = await self._rest.json("GET", f"{API}/flightplan/{_checked(uid)}")
+        if not isinstance(answer, dict):
             raise RemoteProtocolError(f"the drone reports nothing of flight plan {uid}")
-        return told
+        return answer
 
     async def delete(self, uid: str) -> bool:
         """Delete a plan; False when the drone does not: Parrot documents no way to do it."""

@@ -168,12 +168,13 @@ def main_frames(values: Values) -> bytes | None:
 
     None when the values are of another gimbal. Frames are compared thirty times a second, and hardly ever change.
     """
-    data = values.command(gimbal.Attitude)
-    return data[_FRAMES] if data[_FRAMES.start - 1] == MAIN else None
+    data = values.data
+    number = values.layout.places[gimbal.Attitude].start + HEADER.size
+    return data[number + 1 : number + 1 + _FRAMES] if data[number] == MAIN else None
 
 
-_FRAMES = slice(HEADER.size + 1, HEADER.size + 1 + 3 * 4)
-"""Behind the header and the number of the gimbal: three enums."""
+_FRAMES = 3 * 4
+"""Bytes of three enums, behind the number of the gimbal."""
 
 Gimbals = Mapping[int, GimbalState]
 

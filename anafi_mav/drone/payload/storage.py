@@ -296,7 +296,7 @@ class Storage(Commanding[Storages]):
         """Have the free space reported every `period_s` seconds; return the free bytes now."""
         if not 1 <= period_s <= LONGEST_PERIOD:
             raise LocalProtocolError(f"expected a period of 1 to {LONGEST_PERIOD} s, got {period_s}")
-        speech, storage = self._told(id)
+        speech, storage = self._addressed(id)
         return await self._change(
             speech.start(storage, period_s),
             speech.monitors[0],
@@ -306,7 +306,7 @@ class Storage(Commanding[Storages]):
 
     async def stop_monitoring(self, id: int | None = None) -> None:
         """End the reports of the free space."""
-        speech, storage = self._told(id)
+        speech, storage = self._addressed(id)
         await self._change(
             speech.stop(storage),
             speech.states[0],
@@ -326,7 +326,7 @@ class Storage(Commanding[Storages]):
 
         Raises `CommandRejected` when the drone refuses (it flies or records) or fails.
         """
-        speech, storage = self._told(id)
+        speech, storage = self._addressed(id)
         known = self[storage]
         if known.formats is not None and kind not in known.formats:
             raise NotSupported(f"{kind.name.lower()} format")
@@ -356,7 +356,7 @@ class Storage(Commanding[Storages]):
         self._commander.dispatch(answer, command, min(timeout, 2 * ANSWER_TIMEOUT))
         await answer.wait()
 
-    def _told(self, id: int | None) -> tuple[_Speech, int]:
+    def _addressed(self, id: int | None) -> tuple[_Speech, int]:
         """How to ask, and the id of a storage that there is."""
         self._require(self.state, "storage")
         storage = self.main if id is None else id

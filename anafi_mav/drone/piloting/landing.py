@@ -7,7 +7,7 @@ firmware that executes it all the same is made to land again (`Motors.on_flying_
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
@@ -34,6 +34,13 @@ STILL_LANDING = "drone still landing"
 MOTORS_CUT, FORCED = "motors cut", "forced landing"
 """The reasons of a refusal: what the landing has become."""
 
+_UNENDABLE: Mapping[FlyingState | None, str] = {
+    FlyingState.LANDED: ALREADY_LANDED,
+    FlyingState.EMERGENCY: MOTORS_CUT,
+    FlyingState.EMERGENCY_LANDING: FORCED,
+}
+"""States in which no landing is ended, with the reason."""
+
 SMART_WAIT = 1.5
 """s for SmartTakeOffLand alone to end a landing, before gaz is tried."""
 
@@ -58,8 +65,7 @@ class LandingEnd:
 
     async def end(self, timeout: float, *, take_off: bool) -> None:
         self._commander.require_link()
-        if self._flight.state.flying == FlyingState.LANDED:
-            raise CommandRejected(ALREADY_LANDED)
+        self._require_endable()
         if self._flight.state.flying != FlyingState.LANDING:
             return
         answer = self._commander.expect((ardrone3.FlyingStateChanged,), _judge)
@@ -77,6 +83,7 @@ class LandingEnd:
                 self._commander.cancel(answer.token)
             await self._hold_gaz(answer.future)
             await answer.wait()
+            self._require_endable()  # the drone may have begun another landing before this was resumed
             sent.apply(Event.EXECUTED)
         except BaseException as error:
             sent.apply(Event.WITHDRAWN, loop_time())
@@ -87,6 +94,11 @@ class LandingEnd:
             self._commander.cancel(answer.token)  # whatever ended this: it must not arrive on the ground
             answer.close()
             self._sticks.centre_in_landing()
+
+    def _require_endable(self) -> None:
+        """Raise `CommandRejected` in a state in which no landing is ended."""
+        if (reason := _UNENDABLE.get(self._flight.state.flying)) is not None:
+            raise CommandRejected(reason)
 
     async def _hold_gaz(self, ended: asyncio.Future[bool]) -> None:
         """Send full gaz every 50 ms until the drone reports another state than a landing.
@@ -100,13 +112,7 @@ class LandingEnd:
 
 
 def _judge(message: ardrone3.FlyingStateChanged) -> bool | AnafiMavError | None:
-    match message.state:
-        case FlyingState.LANDING:
-            return None
-        case FlyingState.LANDED:
-            return CommandRejected(ALREADY_LANDED)
-        case FlyingState.EMERGENCY:
-            return CommandRejected(MOTORS_CUT)
-        case FlyingState.EMERGENCY_LANDING:
-            return CommandRejected(FORCED)
-    return True
+    if message.state == FlyingState.LANDING:
+        return None
+    reason = _UNENDABLE.get(message.state)
+    return True if reason is None else CommandRejected(reason)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from anafi_mav import mav_enums
-from anafi_mav.plans.plan import DO_JUMP, WAYPOINT, Item, Point
+from anafi_mav.plans.plan import DO_JUMP, FASTEST, SLOWEST, WAYPOINT, Item, Point
 from anafi_mav.plans.rules.flight_plan_writer import LARGEST_HEADING, FlightPlanWriter
 from anafi_mav.plans.rules.rule import Fidelity, Rule
 
@@ -148,7 +148,7 @@ def _speed(writer: FlightPlanWriter, item: Item) -> None:
         writer.say(f"throttle of {throttle:g} % is ignored")
     if speed == _SAME:
         return
-    if speed is None or speed <= 0.0:
+    if speed is None or not SLOWEST <= speed <= FASTEST:
         writer.refuse("no speed" if speed is None else f"invalid speed of {speed:g} m/s", 2)
     writer.set_speed(_GROUNDSPEED if kind is None else kind, speed)
 

@@ -3,18 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Any, TypeAlias
+from collections import deque
+from collections.abc import Callable, Iterator
+from typing import TypeAlias, TypeVar
 
 from anafi_mav.drone import Drone, events
 from anafi_mav.drone.element import position
 from anafi_mav.drone.payload.gimbal import MAIN
-from anafi_mav.drone.values import SIZES, Values, unpack
+from anafi_mav.drone.values import ValueLayout, Values
 from anafi_mav.drone.video.video import VideoFrame
-from anafi_mav.services.camera.pose_track import SPACING, CameraPose, EventTrack, PoseSource, PoseTrack
+from anafi_mav.services.camera.pose_track import DEGREES, CameraPose, PoseSource, PoseTrack, ValueTrack
 from anafi_mav.units import RAD_PER_DEG
 
 Sample: TypeAlias = tuple[float, ...]
+
+MessageT = TypeVar("MessageT", bound=events.Message)
+
+KEPT, MOST = 3.0, 256
+"""s for which samples of events are kept, a photo's pose is taken within half a second, and how many at most."""
+
+SPACING = 0.05
+"""s between two samples of events that are kept. An ANAFI reports five times a second; between samples at this distance
+the way of a drone or gimbal is straight."""
+
+MAX_LAYOUTS = 64
+"""Layouts of values whose last sample is remembered; a drone in operation sends a dozen."""
 
 
 def camera_angles(drone: Drone) -> tuple[float, float, float] | None:
@@ -58,12 +71,36 @@ def _height(message: events.AltitudeChanged) -> Sample:
     return (message.altitude,)
 
 
-def _track(kind: type[events.Message], sample: Callable[[Any], Sample | None], *, turn: float = math.inf) -> EventTrack:
-    return EventTrack(SIZES[kind], lambda data: sample(unpack(data)), turn=turn, spacing=SPACING)
+def _place(message: events.GpsLocationChanged) -> Sample | None:
+    place = position(message.latitude, message.longitude, message.altitude)
+    return None if place is None else (place.latitude, place.longitude)
+
+
+class _EventTrack(ValueTrack):
+    """Samples that are read from events when a moment is looked up: photos are rare."""
+
+    def __init__(
+        self,
+        kept: deque[tuple[float, Values]],
+        kind: type[MessageT],
+        read: Callable[[MessageT], Sample | None],
+        turn: float = math.inf,
+    ) -> None:
+        """`read` returns the values of an event of this kind; None: they are unknown."""
+        super().__init__(turn)
+        self._kept = kept
+        self._kind, self._read = kind, read
+
+    def latest_first(self) -> Iterator[tuple[float, Sample]]:
+        for at, values in reversed(self._kept):
+            if self._kind in values:
+                sample = self._read(values.message(self._kind))
+                if sample is not None and math.isfinite(sum(sample)):
+                    yield at, sample
 
 
 class EventSamples(PoseSource):
-    """Samples of the drone's events."""
+    """Samples of the drone's events: what arrived together is kept as it is."""
 
     KINDS = (
         events.AttitudeChanged,
@@ -75,41 +112,31 @@ class EventSamples(PoseSource):
     """The values of which samples are kept."""
 
     def __init__(self) -> None:
-        super().__init__(SPACING)
-        self.headings = heading = _track(events.AttitudeChanged, _heading, turn=math.tau)
-        self.gimbals = gimbal = _track(events.GimbalAttitudeChanged, _gimbal, turn=math.tau)
-        self.velocities = velocity = _track(events.SpeedChanged, _velocity)
-        self.heights = height = _track(events.AltitudeChanged, _height)
-        self._tracks: Mapping[type[events.Message], EventTrack] = {
-            events.AttitudeChanged: heading,
-            events.GimbalAttitudeChanged: gimbal,
-            events.SpeedChanged: velocity,
-            events.AltitudeChanged: height,
-        }
-
-        self._next = -math.inf
-        """When the next sample of some kind may be added, but for places (s)."""
+        self._kept: deque[tuple[float, Values]] = deque(maxlen=MOST)
+        """With the times of their arrival (s)."""
+        self._next: dict[ValueLayout, float] = {}
+        """When the next values of a layout are kept (s)."""
+        self.headings = _EventTrack(self._kept, events.AttitudeChanged, _heading, math.tau)
+        self.gimbals = _EventTrack(self._kept, events.GimbalAttitudeChanged, _gimbal, math.tau)
+        self.velocities = _EventTrack(self._kept, events.SpeedChanged, _velocity)
+        self.heights = _EventTrack(self._kept, events.AltitudeChanged, _height)
+        self.places = _EventTrack(self._kept, events.GpsLocationChanged, _place, DEGREES)
 
     def clear(self) -> None:
-        """Forget all samples."""
-        super().clear()
-        self._next = -math.inf
+        self._kept.clear()
+        self._next.clear()
 
     def add(self, values: Values, now: float) -> None:
-        """Add what the drone's events report."""
-        if now < self._next and events.GpsLocationChanged not in values:
+        """Keep what the drone's events report, unless the like of them has just been kept."""
+        if now <= self._next.get(values.layout, -math.inf):
             return
-        for kind, track in self._tracks.items():
-            if kind in values:
-                track.add_event(now, values.command(kind))
-        if events.GpsLocationChanged in values:
-            self._add_place(values.message(events.GpsLocationChanged), now)
-        self._next = min(track.newest for track in self._tracks.values()) + SPACING
-
-    def _add_place(self, message: events.GpsLocationChanged, now: float) -> None:
-        place = position(message.latitude, message.longitude, message.altitude)
-        if place is not None:  # else no place is the newest one
-            self.places.add(now, place.latitude, place.longitude)
+        if len(self._next) >= MAX_LAYOUTS:
+            self._next.clear()
+        self._next[values.layout] = now + SPACING
+        kept = self._kept
+        while kept and now - kept[0][0] > KEPT:
+            kept.popleft()
+        kept.append((now, values))
 
 
 def add_frame(track: PoseTrack, frame: VideoFrame) -> None:

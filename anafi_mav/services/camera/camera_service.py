@@ -107,8 +107,9 @@ class CameraService(Service):
 
     def _on_zoom_value(self, values: Values, now: float) -> None:
         for kind in Camera.ZOOM_EVENTS:
-            if kind in values:
-                self._note_zoom(values.command(kind))
+            place = values.layout.places.get(kind)
+            if place is not None and values.data[place] != self._level:
+                self._note_zoom(values.data[place])
 
     def _note_zoom(self, level: float | bytes) -> None:
         if level != self._level:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable, Iterator
-from typing import Any
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
 
 import msgspec
 
@@ -21,10 +21,6 @@ SAMPLES = 96
 
 FURTHEST = 1.5
 """s from the nearest sample at which a value is still taken for the moment; a position arrives once a second."""
-
-SPACING = 0.05
-"""s between two samples of events that are kept. An ANAFI reports five times a second; between samples at this distance
-the way of a drone or gimbal is straight."""
 
 DEGREES = 360.0
 """Degrees of a full turn."""
@@ -49,69 +45,37 @@ class CameraPose(msgspec.Struct, frozen=True):
         return None if self.camera is None else quaternion_from_euler(*self.camera)
 
 
-class SampleTrack:
-    """Values of one kind over time.
+class ValueTrack(ABC):
+    """Values of one kind over time."""
 
-    The samples are packed numbers in a ring: as objects, 256 of each kind, those of a drone took 0.2 MB.
-    """
+    def __init__(self, turn: float = math.inf) -> None:
+        """`turn`: a full turn in the unit of the values, if they are angles.
 
-    def __init__(self, width: int, *, turn: float = math.inf, spacing: float = 0.0) -> None:
-        """Create it empty.
-
-        `width`: values of a sample, `spacing`: s between two samples that are kept. `turn`: a full turn in the unit of
-        the values, if they are angles: between two of them the shorter way is interpolated.
+        Between two of them the shorter way is interpolated.
         """
         self._turn = turn
-        self._spacing = spacing
-        self._row = struct.Struct(f"{1 + width}d")
-        """Time and values of a sample."""
-        self._ring = bytearray()
-        """Empty before the first sample: most drones are flown without a video."""
-        self._count = 0
-        """Samples so far."""
-        self.newest = -math.inf
-        """Time of the newest sample."""
 
-    def add(self, at: float, *values: float) -> None:
-        """Add a sample.
-
-        One that is not newer than the last by the spacing, or not finite, is left out.
-        """
-        if at - self.newest > self._spacing and math.isfinite(sum(values)):
-            self._put(at, *values)
-
-    def _put(self, at: float, *row: Any) -> None:
-        if not self._ring:
-            self._ring = bytearray(SAMPLES * self._row.size)
-        self._row.pack_into(self._ring, self._count % SAMPLES * self._row.size, at, *row)
-        self._count += 1
-        self.newest = at
-
-    def clear(self) -> None:
-        """Forget all samples."""
-        self._count, self.newest = 0, -math.inf
-
-    def _latest_first(self) -> Iterator[tuple[float, tuple[float, ...]]]:
+    @abstractmethod
+    def latest_first(self) -> Iterator[tuple[float, Sequence[float]]]:
         """Yield time and values of each sample."""
-        return self._rows()
 
-    def _rows(self) -> Iterator[tuple[float, tuple[Any, ...]]]:
-        for number in range(self._count - 1, max(self._count - SAMPLES, 0) - 1, -1):
-            at, *values = self._row.unpack_from(self._ring, number % SAMPLES * self._row.size)
-            yield at, tuple(values)
+    @property
+    def newest(self) -> float:
+        """Time of the newest sample; -inf without one."""
+        return next((at for at, _ in self.latest_first()), -math.inf)
 
     def distance(self, at: float) -> float:
         """Return how far the nearest sample is from a moment, s."""
-        return min((abs(time - at) for time, _ in self._latest_first()), default=math.inf)
+        return min((abs(time - at) for time, _ in self.latest_first()), default=math.inf)
 
-    def value(self, at: float) -> tuple[float, ...] | None:
+    def value(self, at: float) -> Sequence[float] | None:
         """Return the values at a moment.
 
         Before the first and after the last sample they are those of that sample. None without a sample within
         `FURTHEST`.
         """
         before = after = None
-        for sample in self._latest_first():
+        for sample in self.latest_first():
             if sample[0] <= at:
                 before = sample
                 break
@@ -124,52 +88,57 @@ class SampleTrack:
         return nearest[1] if nearest is not None and abs(nearest[0] - at) <= FURTHEST else None
 
 
-class EventTrack(SampleTrack):
-    """Samples that are the bytes of events, read when a moment is looked up: photos are rare."""
+class SampleTrack(ValueTrack):
+    """Samples that are packed numbers in a ring.
 
-    def __init__(
-        self, size: int, read: Callable[[bytes], tuple[float, ...] | None], *, turn: float = math.inf, spacing: float
-    ) -> None:
-        """Create it empty.
+    As objects, 256 of each kind, those of a drone took 0.2 MB.
+    """
 
-        `size`: bytes that are kept of an event, `read`: returns its values; None: they are unknown.
-        """
-        super().__init__(0, turn=turn, spacing=spacing)
-        self._row = struct.Struct(f"d{size}s")
-        self._read = read
+    def __init__(self, width: int, *, turn: float = math.inf) -> None:
+        """Create it empty. `width`: values of a sample, `turn`: see `ValueTrack`."""
+        super().__init__(turn)
+        self._row = struct.Struct(f"{1 + width}d")
+        """Time and values of a sample."""
+        self._ring = bytearray()
+        """Empty before the first sample: most drones are flown without a video."""
+        self._count = 0
+        """Samples so far."""
 
-    def add_event(self, at: float, data: bytes) -> None:
-        """Add a sample, unless it is not newer than the last by the spacing."""
-        if at - self.newest > self._spacing:
-            self._put(at, data)
-
-    def _latest_first(self) -> Iterator[tuple[float, tuple[float, ...]]]:
-        for at, (data,) in self._rows():
-            values = self._read(data)
-            if values is not None and math.isfinite(sum(values)):
-                yield at, values
-
-
-class PoseSource:
-    """Samples of one source: the drone's events, or the pictures of its video."""
-
-    def __init__(self, spacing: float = 0.0) -> None:
-        """`spacing`: s between two samples of a kind that are kept."""
-        self.places = SampleTrack(2, turn=DEGREES, spacing=spacing)
-        """Latitude, longitude, deg."""
-        self.velocities = SampleTrack(2, spacing=spacing)
-        """North, east, m/s."""
-        self.heights = SampleTrack(1, spacing=spacing)
-        """m above take-off."""
-        self.gimbals = SampleTrack(3, turn=math.tau, spacing=spacing)
-        """Roll and pitch of the camera to the horizon, its yaw to `headings`, rad."""
-        self.headings = SampleTrack(1, turn=math.tau, spacing=spacing)
-        """Yaw of the drone, rad; 0 in a source whose camera's yaw is that to true north."""
+    def add(self, at: float, *values: float) -> None:
+        """Add a sample; one that is not newer than the last, or not finite, is left out."""
+        if at > self.newest and math.isfinite(sum(values)):
+            if not self._ring:
+                self._ring = bytearray(SAMPLES * self._row.size)
+            self._row.pack_into(self._ring, self._count % SAMPLES * self._row.size, at, *values)
+            self._count += 1
 
     def clear(self) -> None:
         """Forget all samples."""
-        for track in (self.places, self.velocities, self.heights, self.gimbals, self.headings):
-            track.clear()
+        self._count = 0
+
+    def latest_first(self) -> Iterator[tuple[float, Sequence[float]]]:
+        for number in range(self._count - 1, max(self._count - SAMPLES, 0) - 1, -1):
+            at, *values = self._row.unpack_from(self._ring, number % SAMPLES * self._row.size)
+            yield at, tuple(values)
+
+
+class PoseSource(ABC):
+    """Samples of one source: the drone's events, or the pictures of its video."""
+
+    places: ValueTrack
+    """Latitude, longitude, deg."""
+    velocities: ValueTrack
+    """North, east, m/s."""
+    heights: ValueTrack
+    """m above take-off."""
+    gimbals: ValueTrack
+    """Roll and pitch of the camera to the horizon, its yaw to `headings`, rad."""
+    headings: ValueTrack
+    """Yaw of the drone, rad; 0 in a source whose camera's yaw is that to true north."""
+
+    @abstractmethod
+    def clear(self) -> None:
+        """Forget all samples."""
 
     def place(self, at: float) -> tuple[float, float] | None:
         """Return latitude and longitude at a moment."""
@@ -191,12 +160,27 @@ class PoseSource:
         return gimbal[0], gimbal[1], wrap_pi(heading[0] + gimbal[2])
 
 
+class SampledPoses(PoseSource):
+    """Samples that are added one by one."""
+
+    def __init__(self) -> None:
+        self.places: SampleTrack = SampleTrack(2, turn=DEGREES)
+        self.velocities: SampleTrack = SampleTrack(2)
+        self.heights: SampleTrack = SampleTrack(1)
+        self.gimbals: SampleTrack = SampleTrack(3, turn=math.tau)
+        self.headings: SampleTrack = SampleTrack(1, turn=math.tau)
+
+    def clear(self) -> None:
+        for track in (self.places, self.velocities, self.heights, self.gimbals, self.headings):
+            track.clear()
+
+
 class PoseTrack:
     """The pose of the last seconds, from events and from pictures."""
 
-    def __init__(self, events: PoseSource | None = None) -> None:
-        self.events = events or PoseSource(SPACING)
-        self.pictures = PoseSource()
+    def __init__(self, events: PoseSource) -> None:
+        self.events = events
+        self.pictures = SampledPoses()
 
     def clear(self) -> None:
         """Forget all samples: the link was lost."""

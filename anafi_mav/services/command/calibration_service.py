@@ -102,10 +102,8 @@ class CalibrationService(Service):
         async with self.host.vehicle.control.acquire(task, by=command.right):
             pass
 
-    async def _told(
-        self, name: str, work: Callable[[], Awaitable[None]], undo: Callable[[], Awaitable[object]]
-    ) -> None:
-        """Run a calibration and send its texts; undo it when it fails or is cancelled."""
+    async def _run(self, name: str, work: Callable[[], Awaitable[None]], undo: Callable[[], Awaitable[object]]) -> None:
+        """Run one calibration and send its texts; undo it when it fails or is cancelled."""
         self._say(texts.CAL_STARTED.fill(version=VERSION, name=name))
         try:
             await work()
@@ -135,7 +133,7 @@ class CalibrationService(Service):
             finally:
                 watching.cancel()
 
-        await self._told("mag", turn, element.abort_magnetometer)
+        await self._run("mag", turn, element.abort_magnetometer)
 
     async def _watch_axes(self) -> None:
         """Send the direction to turn, the finished axes and the progress, whenever one changes.
@@ -173,7 +171,7 @@ class CalibrationService(Service):
 
     async def _gimbal(self) -> None:
         gimbal = self.host.drone.gimbal
-        await self._told("level", gimbal.calibrate, gimbal.cancel_calibration)
+        await self._run("level", gimbal.calibrate, gimbal.cancel_calibration)
 
     async def _reboot(self, command: Command) -> None:
         """MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: param1 1.

@@ -46,6 +46,7 @@ from anafi_mav.services.service import Host, MessageHandler, Query, Service, cha
 from anafi_mav.vehicle.base.bounds import UnsupportedFrame
 from anafi_mav.vehicle.base.flight_task import FlightAction, FlightActions
 from anafi_mav.vehicle.base.refusal import NotInControl, Refused, Unsupported, text_of
+from anafi_mav.vehicle.base.right import Extent
 from anafi_mav.vehicle.base.severity import Severity
 
 logger = logging.getLogger(__name__)
@@ -277,14 +278,14 @@ class CommandService(Service):
         self._act(inbound, command)
 
     def _act(self, inbound: Inbound, command: Command) -> None:
-        now, effect = self.host.clock.monotonic(), command.effect
+        now, effect, vehicle = self.host.clock.monotonic(), command.effect, self.host.vehicle
         # Before it is known whether it is a retransmission: a program that repeats its Hold is to be noticed.
-        counted = effect is not Effect.HOLD or self.host.vehicle.holds.arrive(command.client, now)
-        command = replace(command, at=now, counted=counted, component=self.host.compid)
+        counted = effect is not Effect.HOLD or vehicle.holds.arrive(command.client, now)
+        right = vehicle.right(command.client, Extent.ALL, counted=counted)
+        command = replace(command, right=right, component=self.host.compid)
         group = command.group
         flies = group is ActionGroup.FLIGHT
         if flies:
-            vehicle = self.host.vehicle
             mode = vehicle.mode if effect is Effect.LAPSING else None
             ended_at = vehicle.flight_facts.landing_ended_at
             repeated = self._history.retransmission(command.client, command, now, mode, ended_at)

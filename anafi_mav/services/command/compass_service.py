@@ -119,18 +119,18 @@ class CompassService(Service):
 
     async def _report_progress(self) -> None:
         """Send MAG_CAL_PROGRESS, and how to turn the drone, whenever that changes."""
-        told: tuple[CalibrationAxis | None, int] | None = None
+        reported: tuple[CalibrationAxis | None, int] | None = None
         updated = asyncio.Event()
         unsubscribe = self.host.drone.subscribe(lambda message, now: updated.set())
         try:
             while True:
                 state = self.host.drone.calibration.state
                 now = (state.axis, len(state.done or ()))
-                if now != told:
+                if now != reported:
                     self._send_progress(now[1])
-                    if now[0] in AXES and (told is None or now[0] != told[0]):
+                    if now[0] in AXES and (reported is None or now[0] != reported[0]):
                         self.host.text(Severity.NOTICE, texts.COMPASS_TURN.fill(axis=AXES[now[0]]))
-                told = now
+                reported = now
                 updated.clear()
                 await updated.wait()
         finally:

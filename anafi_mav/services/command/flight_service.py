@@ -163,7 +163,7 @@ class FlightService(Service):
         client, vehicle, now = inbound.client, self.host.vehicle, self.host.clock.monotonic()
         is_hold = mode is not None and EFFECT_OF_MODE[mode] is Effect.HOLD
         counted = not is_hold or vehicle.holds.arrive(client, now)
-        self.host.run_action(client, change_mode(vehicle, mode, Right(client, Extent.ALL, now, counted)))
+        self.host.run_action(client, change_mode(vehicle, mode, vehicle.right(client, Extent.ALL, counted=counted)))
 
 
 async def change_mode(vehicle: Vehicle, mode: FlightMode | None, by: Right) -> None:

@@ -56,11 +56,10 @@ _ITEM_GOTO, _ITEM_ALTITUDE = 2, 3
 """`current` of a mission item that is a command (ArduPilot, MAVLink mission.md)."""
 
 
-async def _fly_item(host: Host, inbound: Inbound) -> None:
+async def _fly_item(host: Host, inbound: Inbound, by: Right) -> None:
     item, flavour = inbound.message, flavour_of(inbound.channel)
     scale = 1e7 if item.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT else 1.0
-    vehicle, by = host.vehicle, Right(inbound.client, Extent.COMMANDED)
-    result = dialect.MAV_MISSION_ERROR
+    vehicle, result = host.vehicle, dialect.MAV_MISSION_ERROR
     try:
         ato = height_in_frame(vehicle, item.z, item.frame)
         if flavour.guided_setpoints and flavour.custom_mode(vehicle.mode) != flavour.custom_mode(FlightMode.GUIDED):
@@ -100,7 +99,7 @@ async def change_altitude(vehicle: Vehicle, ato: float, flavour: Flavour, by: Ri
         # MAVProxy says it as a command and as an item at once, and means one move. If nothing comes of that, the newer
         # order stands for itself.
         if goto.at_height(ato) != goto or move is None or not await move.under_way():
-            await vehicle.guided.go(goto.at_height(ato), by=by, condition=lambda: vehicle.guided.check(goto.place, ato))
+            await vehicle.guided.go(goto.at_height(ato), by=by, ato=ato)
 
 
 def _effect_of_pause(command: Command) -> Effect:
@@ -151,7 +150,8 @@ class GuidedService(Service):
         ArduPilot's older way to send a goto or a height: dronekit's simple_goto, MAVProxy's and Mission Planner's
         change of altitude (conformance D1-D3, item 141).
         """
-        self.host.run_action(inbound.client, _fly_item(self.host, inbound))
+        by = self.host.vehicle.right(inbound.client, Extent.COMMANDED)
+        self.host.run_action(inbound.client, _fly_item(self.host, inbound, by))
 
     async def _change_speed(self, command: Command) -> None:
         """MAV_CMD_DO_CHANGE_SPEED: param1 SPEED_TYPE, param2 m/s.
@@ -214,13 +214,17 @@ class GuidedService(Service):
         attitude = vehicle.drone.piloting.state.attitude
         if not vehicle.in_air or attitude is None:
             raise Refused(texts.TURN, texts.HEADING_UNKNOWN if vehicle.in_air else vehicle.activity)
-        now = attitude.yaw * units.DEG_PER_RAD
-        turn = heading_of(angle, 0.0 if math.isnan(way) else way, relative == 1.0, now)
+
+        def angle_from(yaw: float) -> float:
+            turn = heading_of(angle, 0.0 if math.isnan(way) else way, relative == 1.0, yaw * units.DEG_PER_RAD)
+            return turn * units.RAD_PER_DEG
+
         if (goto := vehicle.guided.goto) is not None:
-            await vehicle.guided.go(goto.with_heading((now + turn) * units.RAD_PER_DEG), by=command.right)
+            heading = attitude.yaw + angle_from(attitude.yaw)
+            await vehicle.guided.go(goto.with_heading(heading), by=command.right)
         else:
             await vehicle.guided.turn(
-                turn * units.RAD_PER_DEG, rate if rate > 0.0 else None, command.flavour.guided_mode, command.right
+                angle_from, rate if rate > 0.0 else None, command.flavour.guided_mode, command.right
             )
 
     async def _pause_or_continue(self, command: Command) -> None:

@@ -116,9 +116,9 @@ def _checks(vehicle: Vehicle) -> Iterator[tuple[Event, HealthComponent, int, tup
             part = part_of(blocker.value)
             if blocker.value == TakeoffChecklistType.MAGNETO_CALIBRATION:
                 event = table.MAGNETOMETER  # says what to do
-        told = len(event.arguments) > len(table.CHECK_ARGUMENTS) and blocker.value is not None
+        has_value = len(event.arguments) > len(table.CHECK_ARGUMENTS) and blocker.value is not None
         # A value that is newer than our tables may not fit into a byte; 255 reads as unknown, too.
-        yield event, part, ALL_MODES, (min(max(int(blocker.value or 0), 0), 255),) if told else ()
+        yield event, part, ALL_MODES, (min(max(int(blocker.value or 0), 0), 255),) if has_value else ()
     if vehicle.fence_problem is not None:
         yield table.FENCE, HealthComponent.SYSTEM, ALL_MODES, ()
     if vehicle.place is None:

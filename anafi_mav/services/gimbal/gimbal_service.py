@@ -34,7 +34,7 @@ from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported, reason_of
-from anafi_mav.vehicle.base.right import Extent, Right
+from anafi_mav.vehicle.base.right import Extent
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import ValueInterest, ValueSubscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
@@ -510,7 +510,7 @@ class GimbalService(Service):
                 if not self._control.allows(client):
                     raise Refused(texts.ROI, self._objection(client))
                 if not self._roi.is_locked_on(where, ato):
-                    region = self._roi.prepare(Right(inbound.client, Extent.COMMANDED))
+                    region = self._roi.prepare(self.host.vehicle.right(inbound.client, Extent.COMMANDED))
                     vehicle = self.host.vehicle
                     if not self._roi.is_active and (vehicle.mode not in HOVERING or vehicle.overridable):
                         raise Refused(texts.ROI, texts.DRONE_FLIES)

@@ -143,11 +143,14 @@ class RegionOfInterest(PlainTask):
         """Acquire the drone for a region, and stop it."""
         vehicle = self._host.vehicle
         rules = replace(self.rules, start=Preparation.STOP) if vehicle.drone.piloting.moving else self.rules
+        goto = vehicle.guided.goto
         async with vehicle.control.acquire(
             self, by=by, rules=rules, condition=lambda: self._require_prepared(region)
         ) as grant:
             self._region, self._prepared = region, None  # no await from the checks to the start
             grant.begin()
+            if goto is not None:  # the mode shown stays the same
+                self._host.text(Severity.NOTICE, texts.TASK_ENDED.fill(what=texts.GOTO, reason=texts.REGION_INSTEAD))
             await self._start(region, where, ato)
 
     def _require_prepared(self, region: Region) -> None:

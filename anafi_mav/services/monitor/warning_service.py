@@ -114,10 +114,10 @@ class WarningService(Service):
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._told: frozenset[Hashable] = frozenset()
+        self._announced: frozenset[Hashable] = frozenset()
 
     def link_up(self) -> None:
-        self._told = frozenset()
+        self._announced = frozenset()
         self._tell()
 
     def subscriptions(self) -> Subscriptions:
@@ -126,6 +126,6 @@ class WarningService(Service):
     def _tell(self) -> None:
         holding = list(standing(self.host.drone))
         for key, severity, text in holding:
-            if key not in self._told:
+            if key not in self._announced:
                 self.host.text(severity, text)
-        self._told = frozenset(key for key, _, _ in holding)
+        self._announced = frozenset(key for key, _, _ in holding)

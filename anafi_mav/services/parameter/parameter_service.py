@@ -127,7 +127,7 @@ class ParameterList:
         self._flavour = flavour
         self.table = _table_of([one for one in parameters_of(flavour) if one.present(host.drone)])
         self.parameters, self.index = self.table.parameters, self.table.places
-        self._told = bytearray(b"".join(map(self._raw, self.parameters)))
+        self._announced = bytearray(b"".join(map(self._raw, self.parameters)))
         """The values that were last reported to all clients."""
         self.changes: Counter[int] = Counter()
         """How often each was reported to all clients, by its place."""
@@ -168,8 +168,8 @@ class ParameterList:
         found = []
         for index in candidates:
             raw, place = self._raw(self.parameters[index]), slice(index * _RAW.size, (index + 1) * _RAW.size)
-            if raw != self._told[place]:
-                self._told[place] = raw
+            if raw != self._announced[place]:
+                self._announced[place] = raw
                 self.changes[index] += 1
                 self.version += 1
                 found.append(index)
@@ -180,8 +180,8 @@ class ParameterList:
         self.version = before.version + 1
         for place, parameter in enumerate(self.parameters):
             known = before.index.get(parameter.name)
-            raw = _UNREPORTED if known is None else before._told[known * _RAW.size : (known + 1) * _RAW.size]
-            self._told[place * _RAW.size : (place + 1) * _RAW.size] = raw
+            raw = _UNREPORTED if known is None else before._announced[known * _RAW.size : (known + 1) * _RAW.size]
+            self._announced[place * _RAW.size : (place + 1) * _RAW.size] = raw
 
     def _raw(self, parameter: Parameter) -> bytes:
         """Bytes, so that NaN is equal to NaN."""

@@ -65,7 +65,7 @@ class FenceService(Service):
         """When the drone last reported its position."""
         self._looked = self._mirrored = -math.inf
         self._breach_ms = 0
-        self._told: tuple[Any, ...] | None = None
+        self._announced: tuple[Any, ...] | None = None
         """Content of the newest FENCE_STATUS."""
 
     @property
@@ -159,8 +159,8 @@ class FenceService(Service):
     def _look(self, now: float) -> None:
         self._looked = now
         vehicle, watch = self.host.vehicle, self._watch
-        is_told = self._told == (False, watch.breaches)
-        if is_told and watch.rests and (vehicle.on_ground or vehicle.flying_state is None):
+        is_announced = self._announced == (False, watch.breaches)
+        if is_announced and watch.rests and (vehicle.on_ground or vehicle.flying_state is None):
             return
         before = watch.state
         blind, breaches = watch.blind, watch.breaches
@@ -239,8 +239,8 @@ class FenceService(Service):
         """Send FENCE_STATUS to all clients when a breach begins or ends."""
         watch = self._watch
         now = (watch.state is State.OUTSIDE, watch.breaches)
-        if now != self._told:
-            first, self._told = self._told is None, now
+        if now != self._announced:
+            first, self._announced = self._announced is None, now
             message = self._status(self.host.vehicle, self.host.times())
             if message is not None and not first:
                 self.host.send(message)

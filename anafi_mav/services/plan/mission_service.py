@@ -24,7 +24,7 @@ from anafi_mav.services.service import Host, MessageHandler, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
-from anafi_mav.vehicle.base.right import Extent, Right
+from anafi_mav.vehicle.base.right import Extent
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
 from anafi_mav.vehicle.mission.machine import MAVLINK_STATES, State
@@ -157,7 +157,9 @@ class MissionService(Service):
         choice = self._choice
         if choice is not None and (choice.client, choice.item) == (client, item) and not choice.task.done():
             return
-        task = self.host.run_action(client, self._flight.choose(Right(client, Extent.COMMANDED), item))
+        task = self.host.run_action(
+            client, self._flight.choose(self.host.vehicle.right(client, Extent.COMMANDED), item)
+        )
         self._choice = _Choice(client, item, task)
 
     # MISSION_CURRENT and texts.

@@ -50,7 +50,7 @@ def _mask(members: Iterable[int]) -> int:
 def flight_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """ANAFI_FLIGHT_STATUS."""
     piloting, alerts = vehicle.drone.piloting.state, vehicle.drone.alerts.state
-    hover = dialect.ANAFI_HOVER_WARNING_NOT_TOLD
+    hover = dialect.ANAFI_HOVER_WARNING_NOT_REPORTED
     if alerts.too_dark_to_hover is not None:
         hover = (dialect.ANAFI_HOVER_WARNING_TOO_DARK if alerts.too_dark_to_hover else 0) | (
             dialect.ANAFI_HOVER_WARNING_TOO_HIGH if alerts.too_high_to_hover else 0

@@ -74,7 +74,7 @@ def _link_flags(state: LinkState) -> int:
     if state.perturbed is None:
         return 0
     return int(
-        dialect.ANAFI_LINK_FLAGS_TOLD
+        dialect.ANAFI_LINK_FLAGS_REPORTED
         | (dialect.ANAFI_LINK_FLAGS_4G_INTERFERENCE if state.interference_4g else 0)
         | (dialect.ANAFI_LINK_FLAGS_PERTURBED if state.perturbed else 0)
     )
@@ -134,6 +134,7 @@ class VideoTelemetryService(Service):
         """Above the take-off point."""
         self._heights = HeightTrack()
         """Above the ground below."""
+        self._interest = ValueInterest((events.AltitudeChanged, events.AltitudeAboveGroundChanged), is_on=False)
         self._undo: Callable[[], None] | None = None
         self._watch: asyncio.Task[None] | None = None
         self._retry_at = 0.0
@@ -148,13 +149,11 @@ class VideoTelemetryService(Service):
         }
 
     def value_subscriptions(self) -> ValueSubscriptions:
-        return {self._on_heights: ValueInterest((events.AltitudeChanged, events.AltitudeAboveGroundChanged))}
+        return {self._on_heights: self._interest}
 
     def _on_heights(self, values: Values, now: float) -> None:
         """Keep the heights for pictures: they are older than the newest events."""
         drone = self.host.drone
-        if self._watch is None and drone.video.state.frame is None:
-            return
         if events.AltitudeChanged in values:
             self._note(self._altitudes, drone.piloting.state.altitude, now)
         if events.AltitudeAboveGroundChanged in values:
@@ -180,7 +179,9 @@ class VideoTelemetryService(Service):
         self._heights.clear()
 
     def tick(self, now: float) -> float:
-        wanted = self.host.needs_video or self.host.needs_pictures
+        needs_pictures = self.host.needs_pictures
+        wanted = self.host.needs_video or needs_pictures
+        self._interest.switch(needs_pictures)
         if self._watch is not None and (self._watch.done() or not wanted):
             self._watch.cancel()
             self._watch = None

@@ -91,7 +91,7 @@ class Camera:
         self._zoom_limits = zoom_speed
         self._zoom_speed = zoom_speed.default
         self._degradation = 0
-        self._told_zoom: Message | None = None
+        self._reported_zoom: Message | None = None
         self._exposure_mode = ExposureMode.AUTOMATIC
         self._shutter = ShutterSpeed.SHUTTER_1_OVER_60
         self._iso = IsoSensitivity.ISO_100
@@ -325,9 +325,9 @@ class Camera:
     def zoom_change(self) -> list[Message]:
         """Report the bounds of the zoom if they differ from those last reported."""
         now = self._zoom_info()
-        if now == self._told_zoom or self.lens.zoom_max == 1.0:
+        if now == self._reported_zoom or self.lens.zoom_max == 1.0:
             return []
-        self._told_zoom = now
+        self._reported_zoom = now
         return [now]
 
     def hdr_change(self) -> Message:
@@ -430,14 +430,14 @@ class Camera:
     def settings_report(self) -> list[Message]:
         """Every setting: at the connection, and again when the camera becomes the active one."""
         zoomable = self.lens.zoom_max > 1.0
-        self._told_zoom = self._zoom_info()
+        self._reported_zoom = self._zoom_info()
         return [
             self._exposure_report(),
             self._exposure_now(),
             self._white_balance_report(),
             camera.EvCompensation(self.id, self._ev),
             self._style_report(),
-            *([self.zoom_report(), self._told_zoom, self._zoom_speed_report()] if zoomable else []),
+            *([self.zoom_report(), self._reported_zoom, self._zoom_speed_report()] if zoomable else []),
             *([camera.ZoomVelocityQualityDegradation(self.id, self._degradation)] if zoomable else []),
             camera.HdrSetting(self.id, self._hdr),
             self._hdr_report(),

@@ -303,21 +303,23 @@ class Camera2:
     # -- the older words in the newer ones
 
     def _translate(self, messages: Iterable[Message]) -> list[Message]:
-        told: list[Message] = []
+        translated: list[Message] = []
         for message in messages:
             match message:
                 case camera.PhotoProgress():
-                    told += self._photo(message)
+                    translated += self._photo(message)
                 case camera.PhotoState():
-                    told.append(camera2.State(camera_id=CAMERA, photo=self._photo_state()))
+                    translated.append(camera2.State(camera_id=CAMERA, photo=self._photo_state()))
                 case camera.RecordingProgress():
-                    told.append(self._recording(message))
+                    translated.append(self._recording(message))
                 case camera.RecordingState():
-                    told.append(camera2.State(camera_id=CAMERA, recording=self._recording_state()))
+                    translated.append(camera2.State(camera_id=CAMERA, recording=self._recording_state()))
                 case camera.NextPhotoDelay():
                     mode = camera2.PhotoMode(int(message.mode))
-                    told.append(camera2.NextPhotoInterval(camera_id=CAMERA, mode=mode, interval=message.remaining))
-        return told
+                    translated.append(
+                        camera2.NextPhotoInterval(camera_id=CAMERA, mode=mode, interval=message.remaining)
+                    )
+        return translated
 
     def _photo(self, m: camera.PhotoProgress) -> Iterable[Message]:
         event = camera2.PhotoEvent
@@ -384,23 +386,23 @@ class Camera2:
         return []
 
     def _photo_state(self) -> camera2.StatePhoto:
-        told = self._capture.photo_state()
-        assert isinstance(told, camera.PhotoState)
+        reported = self._capture.photo_state()
+        assert isinstance(reported, camera.PhotoState)
         state = camera2.PhotoState.UNAVAILABLE
-        if told.available is camera.Availability.AVAILABLE:
-            active = told.state is camera.State.ACTIVE
+        if reported.available is camera.Availability.AVAILABLE:
+            active = reported.state is camera.State.ACTIVE
             state = camera2.PhotoState.ACTIVE if active else camera2.PhotoState.INACTIVE
         storage = camera2.StorageType.REMOVABLE
         return camera2.StatePhoto(state=state, photo_count=self._photos, storage=storage)
 
     def _recording_state(self) -> camera2.StateRecording:
-        told = self._capture.recording_state()
-        assert isinstance(told, camera.RecordingState)
+        reported = self._capture.recording_state()
+        assert isinstance(reported, camera.RecordingState)
         bitrate = self._config["video_recording_bitrate"]
         storage = camera2.StorageType.REMOVABLE
-        if told.available is not camera.Availability.AVAILABLE:
+        if reported.available is not camera.Availability.AVAILABLE:
             return camera2.StateRecording(video_bitrate=bitrate, storage=storage)
-        if told.state is camera.State.ACTIVE:
+        if reported.state is camera.State.ACTIVE:
             duration = round(self._capture.recorded(self._now) * 1000.0)
             state = camera2.RecordingState.ACTIVE
             return camera2.StateRecording(state=state, video_bitrate=bitrate, storage=storage, duration=duration)

@@ -136,7 +136,7 @@ class _Shoot:
     last: tuple[float, float] | None = None
     """Position of the last shot of a GPS lapse: m north, east."""
     next_report: float = 0.0
-    told_at: float = -math.inf
+    reported_at: float = -math.inf
     result: Message | None = None
     """Last progress message sent."""
     open: bool = False
@@ -291,8 +291,8 @@ class Capture:
         if shoot.mode is CameraPhotoMode.TIME_LAPSE and not shoot.shots:
             shoot.shots.append(time + shoot.interval)
         last = not shoot.shots or shoot.lapse
-        told = shoot.mode is CameraPhotoMode.BURST and time >= shoot.told_at + BURST_REPORT - 1e-9
-        if last or told:
+        is_due = shoot.mode is CameraPhotoMode.BURST and time >= shoot.reported_at + BURST_REPORT - 1e-9
+        if last or is_due:
             yield self._tell(shoot, PhotoResult.PHOTO_TAKEN, time)
 
     def _save(self, shoot: _Shoot, time: float) -> Iterable[Message]:
@@ -345,7 +345,7 @@ class Capture:
 
     def _tell(self, shoot: _Shoot, result: PhotoResult, time: float) -> Message:
         # camera.xml has a count with photo_taken; Olympe 7's photo example reads it off photo_saved.
-        shoot.told_at = time
+        shoot.reported_at = time
         shoot.result = self._photo(
             result,
             shoot.count & 0xFF if result in (PhotoResult.PHOTO_TAKEN, PhotoResult.PHOTO_SAVED) else 0,

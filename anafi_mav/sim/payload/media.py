@@ -106,7 +106,7 @@ class Resource:
         width, height = jpeg_scene.WIDTH, jpeg_scene.HEIGHT
         if self.kind is MediaKind.DNG:
             width, height = jpeg_scene.RAW_WIDTH, jpeg_scene.RAW_HEIGHT
-        told: dict[str, Any] = {
+        description: dict[str, Any] = {
             "media_id": self.media_id,
             "resource_id": self.id,
             "type": "VIDEO" if video else "PHOTO",
@@ -122,8 +122,8 @@ class Resource:
             "storage": str(self.storage),
         }
         if video:
-            told |= {"duration": round(self.seconds * 1000.0), "replay_url": f"replay/{self.id}"}
-        return told
+            description |= {"duration": round(self.seconds * 1000.0), "replay_url": f"replay/{self.id}"}
+        return description
 
 
 @dataclass
@@ -150,7 +150,7 @@ class Media:
     def describe(self) -> dict[str, Any]:
         """As in the answers of the web server."""
         first = self.resources[0]
-        told: dict[str, Any] = {
+        description: dict[str, Any] = {
             "media_id": self.id,
             "type": "VIDEO" if self.video else "PHOTO",
             "datetime": self.date,
@@ -163,14 +163,18 @@ class Media:
         }
         if self.video:
             seconds = sum(resource.seconds for resource in self.resources)
-            told |= {"video_mode": self.mode, "duration": round(seconds * 1000.0), "replay_url": f"replay/{first.id}"}
+            description |= {
+                "video_mode": self.mode,
+                "duration": round(seconds * 1000.0),
+                "replay_url": f"replay/{first.id}",
+            }
         else:
-            told["photo_mode"] = self.mode
+            description["photo_mode"] = self.mode
         if self.panorama:
-            told["panorama_type"] = self.panorama
+            description["panorama_type"] = self.panorama
         if self.expected:
-            told["expected_count"] = self.expected
-        return told
+            description["expected_count"] = self.expected
+        return description
 
 
 class MediaStore:

@@ -166,7 +166,7 @@ class Track:
             return [self._encoder.sps, self._encoder.pps, self._encoder.key(blocks, self._keys % 2)]
         return [self._encoder.between(blocks, before, place)]
 
-    def told(self) -> dict[str, Any]:
+    def summary(self) -> dict[str, Any]:
         """For the log: what was sent, and what the client said of it."""
         return {
             "stream": self.stream.title,

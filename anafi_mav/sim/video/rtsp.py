@@ -261,14 +261,14 @@ class VideoServer:
             raise _Refused(Status.INVALID_RANGE)
         now = asyncio.get_running_loop().time()
         seconds = session.resource.seconds
-        told = rtsp.format_range(None)
+        range_text = rtsp.format_range(None)
         if seconds is not None:
             start, stop = wanted
             if start is not None and start > seconds:
                 raise _Refused(Status.INVALID_RANGE)
             session.position = session.position if start is None else start
             session.until = min(seconds, seconds if stop is None else stop)
-            told = rtsp.format_range(session.position, session.until)
+            range_text = rtsp.format_range(session.position, session.until)
         if not self.playing:
             self._due = -math.inf
         session.playing = seconds is None or session.position < session.until
@@ -276,16 +276,16 @@ class VideoServer:
         for track, url in session.tracks.values():
             track.begin(now)
             infos.append(RtpInfo(url, track.sequence, track.timestamp(now)))
-        self._note("play", {"session": session.id, "streams": self._titles(session), "range": told})
-        headers = [("RTP-Info", rtsp.format_rtp_info(infos)), ("Range", told), ("Scale", "1.00")]
+        self._note("play", {"session": session.id, "streams": self._titles(session), "range": range_text})
+        headers = [("RTP-Info", rtsp.format_rtp_info(infos)), ("Range", range_text), ("Scale", "1.00")]
         return [*headers, self._header(session)], b""
 
     async def _pause(self, request: RtspRequest, peer: str) -> tuple[list[tuple[str, str]], bytes]:
         session = self._session(request)
         self._stop(session, "pause")
         live = session.resource.seconds is None
-        told = rtsp.format_range(None) if live else rtsp.format_range(session.position)
-        return [("Range", told), self._header(session)], b""
+        range_text = rtsp.format_range(None) if live else rtsp.format_range(session.position)
+        return [("Range", range_text), self._header(session)], b""
 
     async def _teardown(self, request: RtspRequest, peer: str) -> tuple[list[tuple[str, str]], bytes]:
         session = self._session(request)
@@ -295,7 +295,7 @@ class VideoServer:
             self._forget(session, "teardown")
         elif control in session.tracks:
             track, _ = session.tracks.pop(control)
-            self._note("end", {"session": session.id, "reason": "teardown", **track.told()})
+            self._note("end", {"session": session.id, "reason": "teardown", **track.summary()})
             track.close()
         else:
             raise _Refused(Status.NOT_FOUND)
@@ -350,7 +350,7 @@ class VideoServer:
             session.timer.cancel()
         session.playing = False
         for track, _ in session.tracks.values():
-            self._note("end", {"session": session.id, "reason": reason, **track.told()})
+            self._note("end", {"session": session.id, "reason": reason, **track.summary()})
             track.close()
         session.tracks.clear()
 

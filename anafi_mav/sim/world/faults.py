@@ -72,7 +72,7 @@ class Faults:
     """No room for a photo more."""
     quirks: frozenset[Quirk | Scramble] = frozenset()
     """Ways in which this firmware differs from the simulated one."""
-    untold: frozenset[str] = frozenset()
+    unreported: frozenset[str] = frozenset()
     """Names of events that this firmware does not send, at once, telemetry included: what is not written down another
     one may not tell."""
 

@@ -30,6 +30,7 @@ from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.move_heading import MoveHeading
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import By
+from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.roll_sign import RollCheck, RollSign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.fence_watch import FenceWatch, OutsideFence
@@ -196,6 +197,11 @@ class Aircraft(ABC):
         return GeoPoint(gps.location.latitude, gps.location.longitude)
 
     @property
+    @abstractmethod
+    def stopping_place(self) -> GeoPoint | None:
+        """Place at which the drone comes to rest when it brakes now; None without a position."""
+
+    @property
     def home(self) -> GeoPoint | None:
         """Place at which a return ends, as the drone reports it.
 
@@ -273,6 +279,10 @@ class Aircraft(ABC):
         return None
 
     # What all flight tasks need.
+
+    def right(self, client: Hashable, extent: Extent, *, counted: bool = True) -> Right:
+        """Return the right that a message of this client gives, which arrives now."""
+        return Right(client, extent, self.drone.controller.takeovers, self._clock.monotonic(), counted)
 
     def centre_sticks(self) -> None:
         """Centre the sticks; without a link none are held."""

@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 
 from anafi_mav import geo, mav_enums, texts
+from anafi_mav.plans.plan import FASTEST as FASTEST
+from anafi_mav.plans.plan import SLOWEST as SLOWEST
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.geo_point import GeoPoint
@@ -16,12 +18,6 @@ from anafi_mav.vehicle.base.height import ESTIMATE_FLOOR
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.fence_watch import OutsideFence
-
-SLOWEST, FASTEST = 0.1, 100.0
-"""m/s. A speed beyond these is a number in the wrong field, or in another unit.
-
-Within them the drone limits itself.
-"""
 
 NOWHERE = 1e-5
 """deg. A place so near to 0/0 is refused.

@@ -6,8 +6,8 @@
 2. What flies is ended at once, and all older actions are cancelled. From now on they can send only what stops them.
 3. Their end is awaited: without that an aborted move could cancel the one that follows it.
 4. The drone is stopped where the task needs it, and a return that is not reported yet is cancelled.
-5. After each wait all conditions are checked again, and that the pilot has not moved a stick meanwhile. From the last
-   check to the first command of the task there is no wait.
+5. After each wait all conditions are checked again, and that the pilot has moved no stick since the client's message
+   arrived. From the last check to the first command of the task there is no wait.
 
 A newer request replaces a pending one. No module but this one stores who flies, and the mode is derived from it.
 """
@@ -49,6 +49,7 @@ from anafi_mav.vehicle.base.flight_task import (
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, text_of
 from anafi_mav.vehicle.base.requester import By, Source, client_of
+from anafi_mav.vehicle.base.right import Right
 from anafi_mav.vehicle.base.severity import Severity
 
 
@@ -94,12 +95,18 @@ class Grant:
 
     def __init__(self, control: Control, attempt: Attempt[FlightTask]) -> None:
         self._control = control
-        self._attempt = attempt
+        self.attempt = attempt
 
-    def begin(self, *, pauses: bool | None = None) -> None:
-        """Make the task active: its mode is shown from now on. Later calls do nothing."""
-        attempt = self._attempt if pauses is None else replace(self._attempt, pauses=pauses)
-        self._control.handle(Event.GRANT, Input(attempt))
+    def begin(self, task: FlightTask | None = None, *, pauses: bool | None = None) -> None:
+        """Make the task active: its mode is shown from now on. Later calls do nothing.
+
+        `task`: instead of the requested one, whose values the drone's motion has changed meanwhile.
+        """
+        if task is not None:
+            self.attempt = replace(self.attempt, task=task)
+        if pauses is not None:
+            self.attempt = replace(self.attempt, pauses=pauses)
+        self._control.handle(Event.GRANT, Input(self.attempt))
 
 
 class Control:
@@ -237,20 +244,18 @@ class Control:
         when the drone rejects what is sent to it.
         """
         own_rules, rules = rules, rules or task.rules
-        piloting, controller = self._aircraft.drone.piloting, self._aircraft.drone.controller
-        takeovers = controller.takeovers
+        piloting = self._aircraft.drone.piloting
 
         def check() -> None:
             self.check(task, by, own_rules)  # those of some tasks depend on the drone's state
             condition()
-            if rules.is_flight and controller.takeovers != takeovers:
-                raise Refused(rules.what, texts.PILOT)
 
         check()
         before, number = self.active, self.epoch + 1
         own = task if rules.lasts and not rules.is_hover else None
         hover = task if rules.is_hover else below
         attempt = Attempt(own, number, hover, rules.keeps_below, pauses, rules.is_urgent)
+        grant = Grant(self, attempt)
         try:
             has_waited = await self._release(attempt, rules.wait)
             self.handle(Event.RELEASED, Input(attempt))
@@ -263,12 +268,11 @@ class Control:
                 check()
             if rules.start is Preparation.HOVER:
                 piloting.hover()
-            grant = Grant(self, attempt)
             yield grant
             grant.begin()
         except BaseException as error:
             self.handle(Event.FAIL, Input(attempt))
-            self.handle(Event.FINISH, Input(task=own, number=number))
+            self.handle(Event.FINISH, Input(task=grant.attempt.task, number=number))
             if before is not None and self.is_free and before.is_flown(piloting):
                 self.adopt(before, keeps_below=True)
             if isinstance(error, CommandRejected):
@@ -288,11 +292,16 @@ class Control:
             raise Refused(texts.FLIGHT_COMMAND, texts.MOTORS_STOPPING)
 
     def require_allowed(self, task: FlightTask, by: By, rules: TaskRules | None = None) -> None:
-        """Raise `Refused` for the policy, or for the pilot whom a part of the gateway leaves alone."""
+        """Raise `Refused` for the policy, and for the pilot.
+
+        A part of the gateway leaves the pilot alone, and a stick that has moved since a client's message is newer.
+        """
         rules = rules or task.rules
         if (refusal := self.refusal(Request(task, by, rules))) is not None:
             raise refusal
-        if self.leaves_to_pilot(by):
+        takeovers = self._aircraft.drone.controller.takeovers
+        is_older = rules.is_flight and isinstance(by, Right) and by.takeovers != takeovers
+        if is_older or self.leaves_to_pilot(by):
             raise Refused(rules.what, texts.PILOT)
 
     def refusal(self, request: Request) -> Refused | None:

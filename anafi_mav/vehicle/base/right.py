@@ -33,11 +33,16 @@ class Extent(enum.Enum):
 
 
 class Right(Struct, frozen=True):
-    """One client's right, given by one message of it."""
+    """One client's right, given by one message of it.
+
+    `Aircraft.right` makes it when the message arrives.
+    """
 
     client: Hashable
     """(channel, system id, component id)."""
     extent: Extent
+    takeovers: int
+    """Takeovers of the Skycontroller's pilot when its message arrived: a later one is newer than the message."""
     at: float = 0.0
     """When its message arrived, on the monotonic clock."""
     counted: bool = True

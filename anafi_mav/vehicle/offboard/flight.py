@@ -244,7 +244,7 @@ class OffboardFlight(PlainTask):
             return texts.NOT_CHOSEN
         if not self._takeoff.is_armed_by(sender):
             return texts.NOT_ARMED_BY_CLIENT
-        by = Right(sender, Extent.COMMANDED)
+        by = vehicle.right(sender, Extent.COMMANDED)
         try:
             control.require_allowed(self, by)
             vehicle.require_ready()
@@ -393,16 +393,16 @@ class OffboardFlight(PlainTask):
         if vehicle.mode is not FlightMode.GUIDED:
             return texts.IN_MODE.fill(mode=vehicle.mode.value)
         if attempt is None or not self._is_acquiring or attempt.client != sender:
-            self._attempt = _Attempt(sender, vehicle.control.run(sender, self._engage_guided(sender), is_order=False))
+            work = self._engage_guided(vehicle.right(sender, Extent.COMMANDED))
+            self._attempt = _Attempt(sender, vehicle.control.run(sender, work, is_order=False))
         return None
 
-    async def _engage_guided(self, client: Hashable) -> None:
+    async def _engage_guided(self, by: Right) -> None:
         """The newest setpoint in mode Guided acquires the drone from whatever it does in that mode."""
-        vehicle, control = self._vehicle, self._vehicle.control
+        vehicle, control, client = self._vehicle, self._vehicle.control, by.client
         try:
             if vehicle.mode is not FlightMode.GUIDED:  # ended by what arrived together with the setpoint
                 raise Refused(texts.SETPOINT, texts.IN_MODE.fill(mode=vehicle.mode.value))
-            by = Right(client, Extent.COMMANDED)
             async with control.acquire(
                 self, by=by, below=_GUIDED, rules=_IN_GUIDED, condition=lambda: self._require_recent(client)
             ) as grant:
@@ -477,8 +477,9 @@ class OffboardFlight(PlainTask):
         return {self._on_motion: ValueInterest(MOTION)}
 
     def _on_motion(self, values: Values, now: float) -> None:
+        places = values.layout.places
         for kind in MOTION:
-            if kind in values:
+            if kind in places:
                 self._unread[kind] = now
         if self._vehicle.flying_state in MOTORS_OFF and self._stream.engagement is None:
             return  # the motion of a drone that stands is read when it is needed
@@ -593,7 +594,7 @@ class OffboardFlight(PlainTask):
             vehicle.control.release(self)
             self._forget_choice()
             vehicle.text(Severity.WARNING, texts.GROUND_SETPOINTS_STOPPED)
-            abort = self._takeoff.abort(Right(ended.pilot, Extent.COMMANDED))
+            abort = self._takeoff.abort(vehicle.right(ended.pilot, Extent.COMMANDED))
             vehicle.control.run(ended.pilot, abort, is_order=False)
             return
         self._moves.forget()

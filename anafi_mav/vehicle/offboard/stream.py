@@ -39,7 +39,7 @@ from anafi_mav.vehicle.offboard.takeoff import CLIMB_FOR
 SHORTEST_TIMEOUT, LONGEST_TIMEOUT = 0.5, 3.0
 """s that `FlightSettings.guided_timeout` can be set to."""
 
-TOLD_EARLY = 0.5 - SILENCE
+ANNOUNCED_EARLY = 0.5 - SILENCE
 """s before the end of a timeout at which the drone is commanded to hover."""
 
 TOGETHER = 0.5
@@ -201,7 +201,7 @@ def lasts(setpoint: Setpoint, guided_timeout: float | None) -> float:
         return SILENCE
     steers = setpoint.velocity != NOTHING or setpoint.yaw_rate is not None
     alone = setpoint.position == NOTHING and setpoint.acceleration == NOTHING
-    return guided_timeout - TOLD_EARLY if steers and alone else SILENCE
+    return guided_timeout - ANNOUNCED_EARLY if steers and alone else SILENCE
 
 
 class Received(Struct, frozen=True):

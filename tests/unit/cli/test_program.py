@@ -5,8 +5,12 @@ Its end: without finalization where zenoh is loaded, whose threads would abort t
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+from pathlib import Path
+
+import pytest
 
 PROBE = """
 import gc, sys, types
@@ -60,3 +64,24 @@ def test_run_and_sim_import_neither_numpy_nor_rich() -> None:
     code = "import sys; import anafi_mav.cli.run, anafi_mav.cli.sim; print({'numpy', 'rich'} & {*sys.modules})"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a shell closes the streams")
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+def test_program_with_closed_standard_streams_does_its_work(closed: str, tmp_path: Path) -> None:
+    words = f'exec "$0" -m anafi_mav keygen field --hex --state "$1" {closed}'
+    done = subprocess.run(["sh", "-c", words, sys.executable, tmp_path], input=b"11" * 32, capture_output=True)
+    is_blind = "<" in closed
+    assert done.returncode == (2 if is_blind else 0)  # without stdin there is no key
+    assert done.stderr in (b"", b"anafi-mav: --hex: expected 64 hexadecimal digits that are not all 0\n")
+    assert (tmp_path / "keys" / "field.key").exists() is not is_blind
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no such device")
+def test_output_on_a_full_disk_is_reported_and_an_error(tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "anafi_mav", "keygen", "field", "--state", str(tmp_path)]
+    assert subprocess.run(words, stdout=subprocess.DEVNULL).returncode == 0
+    with Path("/dev/full").open("wb") as full:
+        done = subprocess.run([*words, "--show"], stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[0] == "anafi-mav: stdout cannot be written: No space left on device"

@@ -160,7 +160,7 @@ def test_c_headers_pack_the_same_bytes(tmp_path: Path) -> None:
         int main(void) {
             mavlink_message_t message;
             uint8_t bytes[MAVLINK_MAX_PACKET_LEN];
-            mavlink_msg_anafi_link_pack(7, 1, &message, 123456, 19330000, -15, 5, ANAFI_LINK_FLAGS_TOLD);
+            mavlink_msg_anafi_link_pack(7, 1, &message, 123456, 19330000, -15, 5, ANAFI_LINK_FLAGS_REPORTED);
             unsigned length = mavlink_msg_to_send_buffer(bytes, &message);
             for (unsigned i = 0; i < length; i++) printf("%02x", bytes[i]);
             return 0;
@@ -175,7 +175,7 @@ def test_c_headers_pack_the_same_bytes(tmp_path: Path) -> None:
     )
     assert built.returncode == 0, built.stderr
     printed = subprocess.run([tmp_path / "program"], capture_output=True, text=True, timeout=10).stdout
-    ours = dialect.MAVLink_anafi_link_message(123456, 19_330_000, -15, 5, dialect.ANAFI_LINK_FLAGS_TOLD)
+    ours = dialect.MAVLink_anafi_link_message(123456, 19_330_000, -15, 5, dialect.ANAFI_LINK_FLAGS_REPORTED)
     assert printed == frame(pack(ours), 0, 7, 1).hex()
     # By hand: the payload is little-endian and ordered by size, the header says 12 bytes, system 7, component 1, 61403.
     payload = struct.pack("<IIhBB", 123456, 19_330_000, -15, 5, 1)

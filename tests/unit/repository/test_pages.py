@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from support.words import forbidden_in
 
+from anafi_mav.sim.world.quirks import Quirk
+
 ROOT = Path(__file__).resolve().parents[3]
 ALL = [
     ROOT / "README.md",
@@ -80,6 +82,25 @@ def test_forbidden_words_are_found_and_quotations_are_exempt() -> None:
     found = list(forbidden_in(text))
     assert len(found) == 2
     assert all("told by nobody" in one for one in found)
+
+
+def test_tables_of_the_extending_page_exist() -> None:
+    """A name in capitals that begins a line of the package is a table to which a newcomer adds."""
+    text = re.sub(r"^\|.*$", "", prose(ROOT / "docs" / "extending.md"), flags=re.MULTILINE)
+    tables = set(re.findall(r"`([A-Z][A-Z_]{4,})`", text)) - set(re.findall(r"`(MAV\w+)`", text))
+    code = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "anafi_mav").rglob("*.py"))
+    assert len(tables) > 5
+    assert sorted(name for name in tables if not re.search(rf"^ *(?:class )?{name}\b", code, re.MULTILINE)) == []
+
+
+def test_command_of_one_quirk_finds_a_test_of_each_quirk() -> None:
+    """CONTRIBUTING.md's command; without a file it would start the whole suite."""
+    page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    assert "grep -rli 'roll[-_]inverted' tests --include='test_*.py'" in page
+    code = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py"))
+    names = [quirk.value for quirk in Quirk]
+    missing = [name for name in names if not re.search(name.replace("-", "[-_]"), code, re.IGNORECASE)]
+    assert missing == []
 
 
 def test_pictures_are_small() -> None:

@@ -48,7 +48,7 @@ CORES = [
     *("endpoint_options.py", "geo.py", "mav_enums.py", "units.py", "config/schema.py", "plans"),
     "cli/paced_calls.py",
     *("arsdk/codec", "arsdk/messages", "arsdk/video", "arsdk/mux/mux.py"),
-    *("arsdk/link/frame.py", "arsdk/link/handshake.py", "arsdk/link/known_payloads.py", "arsdk/link/transport.py"),
+    *("arsdk/link/frame.py", "arsdk/link/handshake.py", "arsdk/link/known_frames.py", "arsdk/link/transport.py"),
     *(
         "mavlink/access.py",
         "mavlink/address_proof.py",
@@ -442,6 +442,21 @@ def test_files_of_the_newcomers_index_exist() -> None:
     files = re.findall(r"`([\w/*]+(?:\.py|/))`", part)
     assert len(files) > 20
     assert [file for file in files if not [*PACKAGE.glob(file)]] == []
+
+
+def test_names_of_the_newcomers_index_stand_in_their_files() -> None:
+    text = (REPOSITORY / "docs" / "architecture.md").read_text(encoding="utf-8")
+    part = text.partition("## Where does")[2].partition("\n## ")[0]
+    pairs = re.findall(r"`(\w+)(?:\(\))?`(?: in|:) `([\w/]+\.py)`", part)
+    assert len(pairs) > 8
+    missing = [
+        (name, file)
+        for name, file in pairs
+        if not re.search(
+            rf"\b(?:def|class) {name}\b|^\s*{name}\b.* =", (PACKAGE / file).read_text("utf-8"), re.MULTILINE
+        )
+    ]
+    assert missing == []
 
 
 def test_linter_holds_every_room_of_services_apart() -> None:

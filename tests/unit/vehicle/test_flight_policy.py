@@ -22,7 +22,7 @@ from anafi_mav.vehicle.mission.flight import MissionFlight
 from anafi_mav.vehicle.return_end import ReturnEnd
 from anafi_mav.vehicle.takeoff import Takeoff
 
-CLIENT = Right(("channel", 255, 190), Extent.ALL)
+CLIENT = Right(("channel", 255, 190), Extent.ALL, 0)
 
 
 def request(task: FlightTask, by: By = CLIENT) -> Request:

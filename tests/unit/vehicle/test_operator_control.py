@@ -144,7 +144,7 @@ def test_shown_secondaries_are_heard_ones_in_order() -> None:
 
 
 def client(system: int) -> Right:
-    return Right(("channel", system, 190), Extent.ALL)
+    return Right(("channel", system, 190), Extent.ALL, 0)
 
 
 def refusal(task: FlightTask, by: By) -> str | None:
@@ -156,7 +156,7 @@ def refusal(task: FlightTask, by: By) -> str | None:
 def test_flight_task_of_another_station_is_refused() -> None:
     assert refusal(HAND_LAUNCH, client(STUDENT)) == "Arming refused: operator is system 255"
     assert refusal(HAND_LAUNCH, client(TEACHER)) is None
-    assert refusal(HAND_LAUNCH, Right(None, Extent.ALL)) is not None
+    assert refusal(HAND_LAUNCH, Right(None, Extent.ALL, 0)) is not None
 
 
 @pytest.mark.parametrize("task", [LAND, DISARM, MOTOR_CUT, Hover()])

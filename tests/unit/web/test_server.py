@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
+import zlib
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
@@ -146,6 +147,35 @@ async def test_garbage_is_answered_and_closed(caplog: pytest.LogCaptureFixture) 
         assert (await raw(server, b"\0\1\2\r\n\r\n")).startswith(b"HTTP/1.0 400 ")
         assert b" 400 " in await raw(server, b"GET /" + b"a" * 100_000 + b" HTTP/1.1\r\n\r\n")
         assert (await get(server))[0] == 200
+    assert [record for record in caplog.records if record.levelname in ("WARNING", "ERROR")] == []
+
+
+POST = b"POST /length HTTP/1.1\r\nHost: localhost\r\n"
+
+
+async def test_body_in_a_wrong_encoding_is_a_bad_request(caplog: pytest.LogCaptureFixture) -> None:
+    async with serving() as server:
+        body = b"Content-Encoding: gzip\r\nContent-Length: 3\r\n\r\nv=0"
+        assert (await raw(server, POST + body)).startswith(b"HTTP/1.1 400 ")
+    assert [record for record in caplog.records if record.levelname in ("WARNING", "ERROR")] == []
+
+
+async def test_compressed_body_over_the_limit_is_refused() -> None:
+    body = zlib.compress(bytes(1000 * MAX_BODY))
+    assert len(body) < MAX_BODY
+    async with serving() as server:
+        head = f"Content-Encoding: deflate\r\nContent-Length: {len(body)}\r\n\r\n".encode()
+        assert (await raw(server, POST + head + body)).startswith((b"HTTP/1.1 413 ", b"HTTP/1.1 400 "))
+
+
+async def test_client_that_leaves_within_its_body_is_no_error(caplog: pytest.LogCaptureFixture) -> None:
+    async with serving() as server:
+        reader, writer = await asyncio.open_connection(server.host, server.port)
+        writer.write(POST + b"Expect: 100-continue\r\nContent-Length: 1000\r\n\r\n")
+        await reader.readuntil(b"\r\n\r\n")
+        writer.close()
+        while server.connections:  # noqa: ASYNC110
+            await asyncio.sleep(0)
     assert [record for record in caplog.records if record.levelname in ("WARNING", "ERROR")] == []
 
 

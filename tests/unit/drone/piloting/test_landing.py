@@ -100,6 +100,17 @@ async def test_landing_becoming_forced_is_left_alone(drone: Drone, device: Scrip
     await device.quiet(ardrone3.PCMD)
 
 
+async def test_landing_ended_and_forced_together_is_refused(drone: Drone, device: ScriptedDevice) -> None:
+    """A link that was interrupted delivers both states in one event-loop iteration."""
+    await reported(drone, device, FlyingState.LANDING)
+    ending = await begun(drone.piloting.end_landing())
+    await device.until(ardrone3.PCMD, 2)
+    device.say(state(FlyingState.HOVERING))
+    device.say(state(FlyingState.EMERGENCY_LANDING))
+    with pytest.raises(CommandRejected, match="forced landing"):
+        await ending
+
+
 async def test_cancelled_end_of_a_landing_centres_the_sticks(drone: Drone, device: ScriptedDevice) -> None:
     await reported(drone, device, FlyingState.LANDING)
     ending = await begun(drone.piloting.end_landing())

@@ -9,8 +9,8 @@ from support.values import arrived
 
 from anafi_mav.drone import events
 from anafi_mav.drone.events import FrameOfReference, Message
-from anafi_mav.services.camera.camera_pose import EventSamples
-from anafi_mav.services.camera.pose_track import FURTHEST, SAMPLES, SPACING, PoseTrack, SampleTrack
+from anafi_mav.services.camera.camera_pose import KEPT, MOST, SPACING, EventSamples
+from anafi_mav.services.camera.pose_track import FURTHEST, SAMPLES, PoseTrack, SampledPoses, SampleTrack
 
 
 def test_value_is_interpolated_between_samples() -> None:
@@ -65,14 +65,14 @@ def test_angle_is_interpolated_across_south() -> None:
     [(179.9999, -179.9997, -179.9999), (-179.9999, 179.9997, 179.9999), (2.0, 2.0002, 2.0001)],
 )
 def test_place_is_interpolated_across_the_180th_meridian(first: float, second: float, between: float) -> None:
-    poses = PoseTrack()
+    poses = PoseTrack(SampledPoses())
     poses.events.places.add(1.0, -16.0, first)
     poses.events.places.add(2.0, -16.0002, second)
     assert poses.pose(1.5).place == pytest.approx((-16.0001, between), abs=1e-9)
 
 
 def test_position_continues_at_the_reported_velocity() -> None:
-    poses = PoseTrack()
+    poses = PoseTrack(SampledPoses())
     poses.events.places.add(1.0, 48.0, 2.0)
     poses.events.velocities.add(1.0, 10.0, 0.0)
     pose = poses.pose(1.5)
@@ -82,7 +82,7 @@ def test_position_continues_at_the_reported_velocity() -> None:
 
 
 def test_gimbal_and_heading_are_joined() -> None:
-    poses = PoseTrack()
+    poses = PoseTrack(SampledPoses())
     poses.events.gimbals.add(1.0, 0.0, math.radians(-30.0), math.radians(20.0))
     assert poses.pose(1.0).camera is None
     poses.events.headings.add(1.0, math.radians(170.0))
@@ -90,7 +90,7 @@ def test_gimbal_and_heading_are_joined() -> None:
 
 
 def test_picture_near_the_moment_is_the_source() -> None:
-    poses = PoseTrack()
+    poses = PoseTrack(SampledPoses())
     for source, pitch in ((poses.events, -0.1), (poses.pictures, -0.2)):
         source.gimbals.add(1.0, 0.0, pitch, 0.0)
         source.headings.add(1.0, 0.0)
@@ -104,7 +104,7 @@ def test_picture_near_the_moment_is_the_source() -> None:
 
 
 def test_pose_is_complete_once_newer_samples_have_arrived() -> None:
-    poses = PoseTrack()
+    poses = PoseTrack(SampledPoses())
     poses.events.gimbals.add(1.0, 0.0, 0.0, 0.0)
     poses.events.places.add(1.0, 48.0, 2.0)
     assert not poses.is_complete(1.1)
@@ -158,17 +158,30 @@ def test_events_closer_than_the_spacing_are_left_out() -> None:
     assert samples.heights.newest == 1.0 + 1.5 * SPACING
 
 
-def test_events_closer_than_the_spacing_leave_out_no_place_and_no_kind_that_is_due() -> None:
+def test_values_of_other_kinds_are_kept_within_the_spacing() -> None:
     samples = EventSamples()
     heading, speed = events.AttitudeChanged(0.0, 0.0, 0.5), events.SpeedChanged(10.0, 0.0, 0.0)
     kinds = heading, speed, events.AltitudeChanged(12.5), attitude_of_gimbal(0, 20.0)
+    place = events.GpsLocationChanged(48.0, 2.0, 100.0, 1, 1, 1)
     samples.add(arrived(*kinds), 1.0)
-    samples.add(arrived(heading, events.GpsLocationChanged(48.0, 2.0, 100.0, 1, 1, 1)), 1.0 + 0.5 * SPACING)
-    assert (samples.headings.newest, samples.places.newest) == (1.0, 1.0 + 0.5 * SPACING)
-    samples.add(arrived(speed), 1.0 + 1.5 * SPACING)
-    samples.add(arrived(*kinds), 1.0 + 2.0 * SPACING)  # only speed is too near to its last sample
-    newest = samples.headings.newest, samples.velocities.newest, samples.heights.newest, samples.gimbals.newest
-    assert newest == tuple(1.0 + share * SPACING for share in (2.0, 1.5, 2.0, 2.0))
+    samples.add(arrived(*kinds), 1.0 + 0.5 * SPACING)
+    assert samples.headings.newest == 1.0
+    samples.add(arrived(heading, place), 1.0 + 0.5 * SPACING)
+    assert (samples.headings.newest, samples.places.newest) == (1.0 + 0.5 * SPACING, 1.0 + 0.5 * SPACING)
+    samples.add(arrived(speed), 1.0 + 0.7 * SPACING)
+    assert (samples.velocities.newest, samples.heights.newest) == (1.0 + 0.7 * SPACING, 1.0)
     samples.clear()
-    samples.add(arrived(*kinds), 1.0 + 2.5 * SPACING)
-    assert samples.headings.newest == 1.0 + 2.5 * SPACING
+    samples.add(arrived(*kinds), 1.0 + 0.9 * SPACING)
+    assert samples.headings.newest == 1.0 + 0.9 * SPACING
+
+
+def test_events_are_kept_for_a_time_and_up_to_a_number() -> None:
+    samples = EventSamples()
+    samples.add(arrived(events.AltitudeChanged(1.0)), 1.0)
+    samples.add(arrived(events.AltitudeChanged(2.0)), 1.0 + KEPT)
+    assert samples.heights.distance(1.0) == 0.0
+    samples.add(arrived(events.AltitudeChanged(3.0)), 1.1 + KEPT)
+    assert samples.heights.distance(1.0) == KEPT
+    for number in range(MOST + 1):  # of as many layouts
+        samples.add(arrived(events.AltitudeChanged(0.0), attitude_of_gimbal(number % 256, 0.0)), 4.2)
+    assert samples.heights.distance(1.0) == pytest.approx(3.2)
