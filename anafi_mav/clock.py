@@ -1,4 +1,4 @@
-"""Time as a value that is handed in, and the one timer.
+"""Time as a value that is handed in, the one timer, and turns of calls that may wait.
 
 Cores never read a clock: their shell passes `now`. `Clock.monotonic` is the one time base of the process (seconds,
 never steps back); the asyncio loop's own time is the same clock, so deadlines of cores can be given to `loop.call_at`
@@ -11,7 +11,7 @@ import asyncio
 import math
 import time
 from collections.abc import Callable, Iterable, Sequence
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 KeyT = TypeVar("KeyT")
 
@@ -77,6 +77,36 @@ class Alarm:
     def _fire(self) -> None:
         self._handle = self.at = None
         self._call()
+
+
+class YieldingCall:
+    """Calls a function once, when clients have been read.
+
+    Of many that are requested together, the event loop of the gateway calls some and reads sockets in between
+    (`cli.event_loop`). Others call at once. For what may be later by some ms: never for an end of sticks, of setpoints
+    or of a silence.
+    """
+
+    __slots__ = ("_call", "_loop")
+
+    def __init__(self, call: Callable[[], None]) -> None:
+        self._call = call
+        self._loop: Any = None
+        """The event loop that was requested to call."""
+
+    def request(self) -> None:
+        """Call in turn, perhaps now. A second request before the call has no effect."""
+        loop: Any = asyncio.get_running_loop()
+        if hasattr(loop, "call_after_clients"):
+            self._loop = loop
+            loop.call_after_clients(self._call)
+        else:
+            self._call()
+
+    def cancel(self) -> None:
+        """Do not call. Cancelling twice does no harm."""
+        if self._loop is not None:
+            self._loop.cancel_after_clients(self._call)
 
 
 class Schedule(Generic[KeyT]):

@@ -8,6 +8,8 @@ to do than the process can.
 Each wake-up costs system calls, a change of the process and a processor whose caches hold other things. With 250
 drones a datagram arrives every tenth of a millisecond. While drones send that many, their sockets are looked at every
 `PAUSE`, and what is sent for them shares datagrams. Clients do not wait, and with few drones nothing waits.
+
+What drones have due at a time is done between looks at the sockets, a little at a time (`paced_calls`).
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from collections import deque
 from collections.abc import Callable, Coroutine, Mapping
 from typing import Any, TypeAlias, TypeVar
 
+from anafi_mav.cli.paced_calls import PacedCall, PacedCalls
 from anafi_mav.receive_buffer import OpenSocket
 
 AT_ONCE = 4
@@ -79,6 +82,11 @@ class PacedSelector(selectors.BaseSelector):
         self._is_busy = False
         self._next = 0.0
         """When to look at drones again (s, monotonic) in a busy time."""
+
+    @property
+    def looked(self) -> float:
+        """When sockets were looked at last (s, monotonic)."""
+        return self._since
 
     # The registered sockets.
 
@@ -175,15 +183,27 @@ class PacedSelector(selectors.BaseSelector):
 
 
 class GatewayLoop(asyncio.SelectorEventLoop):
-    """An event loop with that selector."""
+    """An event loop with that selector, and with calls that give way to sockets."""
 
     def __init__(self) -> None:
         self._paced = PacedSelector()
         super().__init__(self._paced)
+        self._calls = PacedCalls(lambda: self._paced.looked, self._request_calls, self.time)
 
     def read_after_clients(self, sock: OpenSocket) -> None:
         """See `receive_buffer.read_after_clients`."""
         self._paced.read_after_clients(sock)
+
+    def call_after_clients(self, call: PacedCall) -> None:
+        """See `clock.YieldingCall`."""
+        self._calls.request(call)
+
+    def cancel_after_clients(self, call: PacedCall) -> None:
+        """See `clock.YieldingCall`."""
+        self._calls.cancel(call)
+
+    def _request_calls(self) -> None:
+        self.call_at(self.time(), self._calls.run)  # an iteration calls timers after sockets, the most overdue first
 
 
 class _Policy(asyncio.DefaultEventLoopPolicy):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Coroutine, Hashable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from anafi_mav.clock import NEVER, Clock
 from anafi_mav.drone import Drone
@@ -206,6 +206,9 @@ class Service:
     Tables are read when the system is made, `subscriptions` at link up.
     """
 
+    is_watch: ClassVar[bool] = False
+    """True when `tick` ends a flight or an input, or warns: it then waits for no other drone's messages."""
+
     def __init__(self, host: Host) -> None:
         self.host = host
 
@@ -308,7 +311,8 @@ class Service:
 
         Called at that time, once a second, and within `LOOK_EVERY` after whatever it may depend on: a message of a
         client, an event of the drone that is not one of `SAMPLES`, a change of the vehicle, the end of a task that the
-        host has spawned, and `Host.look_soon`.
+        host has spawned, and `Host.look_soon`. The ticks of a watch (`is_watch`) are first; others may be some ms
+        later when many drones have something due.
         """
         return NEVER
 

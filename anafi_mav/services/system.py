@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from anafi_mav import texts
-from anafi_mav.clock import NEVER, Alarm, Clock, Schedule
+from anafi_mav.clock import NEVER, Alarm, Clock, Schedule, YieldingCall
 from anafi_mav.drone import Drone, events
 from anafi_mav.drone.events import Message
 from anafi_mav.drone.payload.camera import Camera
@@ -243,6 +243,8 @@ class System:
         self._undo: Sequence[Callable[[], None]] = ()
         """Functions that end the subscriptions to the drone's events."""
         self._ticker = Alarm(self._tick)
+        self._turn = YieldingCall(self._tick_others)
+        self._waits_for_turn = False
         self._stalled = 0.0
         """How long the host had stalled at the last tick, s."""
         self._tasks: set[asyncio.Task[None]] = set()
@@ -282,7 +284,9 @@ class System:
         for service in self._autopilot.services:
             if isinstance(service, PlanService):
                 service.take_tables(joined(service.item_commands() for service in self._autopilot.services))
-        self._schedule = Schedule(service for service in self.services if type(service).tick is not Service.tick)
+        ticking = [service for service in self.services if type(service).tick is not Service.tick]
+        self._watches = Schedule(service for service in ticking if service.is_watch)
+        self._others = Schedule(service for service in ticking if not service.is_watch)
         self._on_change = [
             service for service in self.services if type(service).state_changed is not Service.state_changed
         ]
@@ -330,7 +334,7 @@ class System:
         self._changed()
         now, self._stalled = self.clock.monotonic(), self._node.stalled
         self._next_heartbeat = NEVER  # a second after the first tick: with the messages that are repeated every second
-        self._schedule.bring_forward(now)
+        self._bring_forward(now)
         self._ticker.set(now)
 
     async def settle(self) -> None:
@@ -345,6 +349,8 @@ class System:
             undo()
         self._undo = ()
         self._ticker.cancel()
+        self._turn.cancel()
+        self._waits_for_turn = False
         self._mission_over.cancel()
         for service in self.services:
             service.link_down()
@@ -496,7 +502,8 @@ class System:
     def look_soon(self) -> None:
         """Have the services tick within `LOOK_EVERY`: something has happened."""
         at = self.clock.monotonic() + LOOK_EVERY
-        if self.active and at < self._schedule.all_at and self._schedule.bring_forward(at):
+        is_sooner = at < self._watches.all_at or at < self._others.all_at
+        if self.active and is_sooner and self._bring_forward(at):
             self._set_ticker()
 
     def times(self, at: float | None = None, pose: VehiclePose = UNKNOWN_POSE) -> Times:
@@ -546,6 +553,7 @@ class System:
         self.send_heartbeat()
 
     def _tick(self) -> None:
+        """Send due heartbeats and run due watches. The other services wait for their turn."""
         if not self.active:
             return
         now = self.clock.monotonic() + EARLY
@@ -555,12 +563,41 @@ class System:
             elif now >= self._next_heartbeat:
                 self._next_heartbeat = max(self._next_heartbeat + HEARTBEAT_EVERY, now + HEARTBEAT_EVERY / 2)
                 self._send_heartbeats()
-                self._schedule.bring_forward(now)
+                self._bring_forward(now)
             self._note_stall()
-            self._schedule.run(now, lambda service: self._tick_service(service, now))
+            self._run(self._watches, now)
+            if self.active and now >= self._others.next and not self._waits_for_turn:
+                self._waits_for_turn = True
+                self._turn.request()
         finally:
             if self.active:
                 self._set_ticker()
+
+    def _tick_others(self) -> None:
+        """Run the services that wait for their turn among the drones.
+
+        Nearly all of them send messages.
+        """
+        self._waits_for_turn = False
+        if not self.active:
+            return
+        try:
+            self._run(self._others, self.clock.monotonic() + EARLY)
+        finally:
+            if self.active:
+                self._set_ticker()
+
+    def _run(self, schedule: Schedule[Service], now: float) -> None:
+        if now >= schedule.next:
+            schedule.run(now, lambda service: self._tick_service(service, now))
+
+    def _bring_forward(self, at: float) -> bool:
+        """Make every service due at this time (s) at the latest.
+
+        Return True if the time of the next tick may change.
+        """
+        watches, others = self._watches.bring_forward(at), self._others.bring_forward(at)
+        return watches or others
 
     def _tick_service(self, service: Service, now: float) -> float:
         if not self.active:  # an earlier one has ended the link
@@ -572,7 +609,7 @@ class System:
             return now + LOOK_EVERY
 
     def _set_ticker(self) -> None:
-        at = min(self._next_heartbeat, self._schedule.next)
+        at = min(self._next_heartbeat, self._watches.next, NEVER if self._waits_for_turn else self._others.next)
         if at != self._ticker.at:
             self._ticker.set(at)
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 
-from anafi_mav.clock import NEVER, Alarm, Schedule
+import pytest
+
+from anafi_mav.clock import NEVER, Alarm, Schedule, YieldingCall
 
 
 async def test_alarm_calls_once_at_its_time() -> None:
@@ -64,6 +67,43 @@ async def test_alarm_may_be_set_again_by_its_callback() -> None:
     await asyncio.sleep(20.0)
     assert len(times) == 3
     assert alarm.at is None
+
+
+class HeldLoop:
+    """An event loop that lets calls wait for ever, or until `held` is called."""
+
+    def __init__(self) -> None:
+        self.held: dict[Callable[[], None], None] = {}
+
+    def call_after_clients(self, call: Callable[[], None]) -> None:
+        self.held[call] = None
+
+    def cancel_after_clients(self, call: Callable[[], None]) -> None:
+        self.held.pop(call, None)
+
+
+async def test_turn_is_at_once_where_the_event_loop_has_no_turns() -> None:
+    called: list[int] = []
+    turn = YieldingCall(lambda: called.append(1))
+    turn.cancel()
+    turn.request()
+    assert called == [1]
+    turn.cancel()
+
+
+async def test_turn_is_left_to_an_event_loop_that_has_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+    loop, held, called = asyncio.get_running_loop(), HeldLoop(), []
+    monkeypatch.setattr(loop, "call_after_clients", held.call_after_clients, raising=False)
+    monkeypatch.setattr(loop, "cancel_after_clients", held.cancel_after_clients, raising=False)
+    turn = YieldingCall(lambda: called.append(1))
+    turn.request()
+    turn.request()
+    assert called == []
+    (call,) = held.held
+    call()
+    assert called == [1]
+    turn.cancel()
+    assert held.held == {}
 
 
 def called(schedule: Schedule[str], now: float, again: dict[str, float]) -> list[str]:

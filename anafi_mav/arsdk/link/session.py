@@ -337,14 +337,17 @@ class Session(asyncio.DatagramProtocol):
                 self._give(datagram)
             else:
                 self.air(datagram, False, self._give)
+        self._set_timer()
+        if guard is not None:
+            guard.sent()
+
+    def _set_timer(self) -> None:
         deadline = self._transport.deadline()
         if deadline is not None and deadline < self._timer_at:
             if self._timer is not None:
                 self._timer.cancel()
             self._timer_at = deadline
             self._timer = self._loop.call_at(deadline, self._expire)
-        if guard is not None:
-            guard.sent()
 
     def _give(self, datagram: bytes) -> None:
         if not self.mute and self._endpoint is not None and not self.lost.done():
@@ -353,6 +356,10 @@ class Session(asyncio.DatagramProtocol):
     def _expire(self) -> None:
         self._timer = None
         self._timer_at = float("inf")
+        deadline = self._transport.deadline()
+        if deadline is not None and deadline > self._loop.time():  # nearly always: telemetry puts the next ping off
+            self._set_timer()
+            return
         self._read_waiting()  # a busy event loop runs timers before it has read each socket: that is no silence
         if self.lost.done():
             return

@@ -53,6 +53,8 @@ def client_id(client: object) -> ClientId:
 class GimbalService(Service):
     """Gimbal of one vehicle, as a MAVLink gimbal manager."""
 
+    is_watch = True
+
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._heartbeats = Heartbeats()

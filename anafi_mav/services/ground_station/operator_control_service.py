@@ -52,6 +52,8 @@ RESULTS = {
 class OperatorControlService(Service):
     """Manages the operator of one system."""
 
+    is_watch = True
+
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._control = host.vehicle.operators

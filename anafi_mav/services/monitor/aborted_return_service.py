@@ -9,6 +9,8 @@ from anafi_mav.services.service import LOOK_EVERY, Service
 class AbortedReturnService(Service):
     """Reminds every client of a return that one of them has ended."""
 
+    is_watch = True
+
     def tick(self, now: float) -> float:
         vehicle = self.host.vehicle
         vehicle.remind_of_aborted_return(now)

@@ -34,6 +34,8 @@ class LaterAction(NamedTuple):
 class LinkLossService(Service):
     """Watches the heartbeats of ground stations on all channels."""
 
+    is_watch = True
+
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._watch = GcsWatch()

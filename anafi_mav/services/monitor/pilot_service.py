@@ -22,6 +22,8 @@ SWITCHED = {
 class PilotService(Service):
     """One text to every client each time the pilot or a program takes the drone."""
 
+    is_watch = True
+
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._takeovers = host.drone.controller.takeovers

@@ -56,6 +56,8 @@ DISABLE, ENABLE, DISABLE_FLOOR = 0.0, 1.0, 2.0
 class FenceService(Service):
     """Service for the region in which the drone may be."""
 
+    is_watch = True
+
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._mirror = FenceMirror(host)

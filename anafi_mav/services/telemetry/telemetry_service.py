@@ -42,6 +42,8 @@ CHANGES: frozenset[type[Message]] = frozenset(
 class TelemetryService(Service):
     """The streams that are made of the drone's states alone."""
 
+    is_watch = True
+
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._position_is_old = False

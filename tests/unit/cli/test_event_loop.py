@@ -7,6 +7,7 @@ import selectors
 import socket
 from collections.abc import Iterator
 from contextlib import ExitStack
+from functools import partial
 
 import pytest
 
@@ -15,6 +16,7 @@ from anafi_mav.arsdk.link.session import Session
 from anafi_mav.arsdk.link.transport import Role, Transport
 from anafi_mav.arsdk.messages.common import AllStates
 from anafi_mav.cli.event_loop import AT_ONCE, BUSY, MOST_OWED, PATIENCE, PAUSE, WINDOW, GatewayLoop, PacedSelector
+from anafi_mav.cli.paced_calls import LONGEST, SLICE
 from anafi_mav.mavlink import dialect, frames
 from anafi_mav.mavlink.node import Inbound, Node
 
@@ -323,6 +325,46 @@ def test_clients_frame_is_received_between_the_datagrams_of_many_drones() -> Non
     finally:
         loop.close()
     assert order.index("client") <= AT_ONCE
+
+
+def test_client_is_read_between_paced_calls_and_after_overdue_timers() -> None:
+    """Calls that each take as long as those of an iteration; after a stall there are `LONGEST` of them."""
+    most = round(LONGEST / SLICE) + 2
+    order: list[str] = []
+    loop = GatewayLoop()
+    near, far = socket.socketpair()
+
+    def call(name: str) -> None:
+        if not order:
+            far.send(b"data")
+            loop.call_later(0, order.append, "timer")
+        order.append(name)
+        end = loop.time() + SLICE
+        while loop.time() < end:
+            pass
+
+    def read() -> None:
+        near.recv(100)
+        order.append("client")
+
+    def request() -> None:
+        for number in range(2 * most):
+            loop.call_after_clients(partial(call, f"call {number}"))
+        loop.call_after_clients(loop.stop)
+
+    try:
+        near.setblocking(False)
+        loop.add_reader(near, read)
+        loop.call_soon(request)
+        loop.run_forever()
+    finally:
+        loop.close()
+        near.close()
+        far.close()
+    at = order.index("client")
+    assert at <= most
+    assert order[at + 1] == "timer"
+    assert [*order[:at], *order[at + 2 :]] == [f"call {number}" for number in range(2 * most)]
 
 
 def _datagram() -> bytes:

@@ -46,6 +46,7 @@ GUARDED = {"lxml", "pymavlink"}
 
 CORES = [
     *("endpoint_options.py", "geo.py", "mav_enums.py", "units.py", "config/schema.py", "plans"),
+    "cli/paced_calls.py",
     *("arsdk/codec", "arsdk/messages", "arsdk/video", "arsdk/mux/mux.py"),
     *("arsdk/link/frame.py", "arsdk/link/handshake.py", "arsdk/link/known_frames.py", "arsdk/link/transport.py"),
     *(

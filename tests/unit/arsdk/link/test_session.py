@@ -295,6 +295,22 @@ def never_read(session: ControllerSession) -> None:
                 loop.waits.unregister(fd)
 
 
+async def test_timer_that_is_too_early_reads_no_socket() -> None:
+    """What was heard has put the deadline off. The event loop reads the socket when it is its turn."""
+    heard = Heard()
+    async with flying() as (drone, server):
+        session = await join(server, heard, ping_after=0.5)
+        await asyncio.sleep(0.3)
+        drone.sessions[0].send(ardrone3.AltitudeChanged(1.0))
+        assert await heard.next() == ardrone3.AltitudeChanged(1.0)
+        never_read(session)
+        drone.sessions[0].send(ardrone3.AltitudeChanged(2.0))
+        await asyncio.sleep(0.3)  # beyond the timer, and not beyond the next ping
+        assert heard.queue.empty()
+        assert await heard.next() == ardrone3.AltitudeChanged(2.0)  # read before the ping
+        await session.close()
+
+
 async def test_datagrams_that_wait_are_not_read_one_in_each_iteration() -> None:
     """A busy computer has long iterations: an acknowledgement must not wait for one of each datagram before it."""
     async with flying() as (drone, server):
