@@ -28,11 +28,18 @@ def clip(value: float, low: float, high: float) -> float:
     return low if value < low else high if value > high else value
 
 
+SIGNED = {bits: (-(1 << (bits - 1)), (1 << (bits - 1)) - 1) for bits in (8, 16, 32)}
+"""The least and the largest integer of a signed field, by its bits."""
+
+UNSIGNED = {bits: (0, (1 << bits) - 1) for bits in (8, 16, 32)}
+"""The same of an unsigned field."""
+
+
 def saturate(value: float, bits: int, *, signed: bool = True) -> int:
     """`value` rounded to the nearest integer that a field of `bits` bits can hold."""
-    low = -(1 << (bits - 1)) if signed else 0
-    high = (1 << (bits - 1)) - 1 if signed else (1 << bits) - 1
-    return int(clip(round(value), low, high))
+    low, high = (SIGNED if signed else UNSIGNED)[bits]
+    number = round(value)
+    return low if number < low else high if number > high else number
 
 
 def deg_e7(degrees: float) -> int:
@@ -60,10 +67,11 @@ def quaternion_from_euler(roll: float, pitch: float, yaw: float) -> tuple[float,
     cr, sr = math.cos(roll / 2.0), math.sin(roll / 2.0)
     cp, sp = math.cos(pitch / 2.0), math.sin(pitch / 2.0)
     cy, sy = math.cos(yaw / 2.0), math.sin(yaw / 2.0)
-    w = cr * cp * cy + sr * sp * sy
-    x = sr * cp * cy - cr * sp * sy
-    y = cr * sp * cy + sr * cp * sy
-    z = cr * cp * sy - sr * sp * cy
+    cc, cs, sc, ss = cr * cp, cr * sp, sr * cp, sr * sp
+    w = cc * cy + ss * sy
+    x = sc * cy - cs * sy
+    y = cs * cy + sc * sy
+    z = cc * sy - ss * cy
     return (w, x, y, z) if w >= 0.0 else (-w, -x, -y, -z)
 
 

@@ -396,7 +396,7 @@ class FabricEndpoint(Endpoint):
     def _stop_kind(self, channel: Channel, sysid: int, received: ReceivedFrame, now: float) -> StopKind | None:
         if not isinstance(received.message, REFUSED):
             return None
-        inbound = Inbound(received.message, channel, received.sysid, received.compid, now)
+        inbound = Inbound(received.message, received.id, channel, received.sysid, received.compid, now)
         return self._systems.stop_kind(sysid, inbound)
 
     def _refuse(self, station: _Station, sysid: int, received: ReceivedFrame, now: float) -> None:

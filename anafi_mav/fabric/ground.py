@@ -167,11 +167,11 @@ class FabricGround:
 
     def received(self, channel: Channel, frames: list[ReceivedFrame], reached: Collection[int] | None = None) -> None:
         """Publish the frames of a peer, each for its system."""
-        station = self._stations.get(channel)
+        now, station = self._clock.monotonic(), self._stations.get(channel)
+        if frames:
+            channel.hear(frames, now)
         if station is None or not frames:
             return
-        now = self._clock.monotonic()
-        channel.heard_at = now
         waited = self._stalls.waited
         if waited:
             self.counters["stale"] += len(frames)

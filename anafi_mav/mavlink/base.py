@@ -102,7 +102,7 @@ class Sink(Protocol):
         """Serve the peer of this channel, which has proved to be at its address, as every other."""
 
     def received(self, channel: Channel, frames: list[ReceivedFrame], reached: Collection[int] | None = None) -> None:
-        """Deliver frames.
+        """Deliver frames, after `Channel.hear`.
 
         `reached`: the only systems of ours that they may reach; None: those of the channel.
         """
@@ -329,13 +329,8 @@ class StreamPeer(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         frames = self.channel.receive(data)
-        if self.channel.is_proved_by(frames):
-            self.heard()
         with self._outbox:
             self._sink.received(self.channel, frames)
-
-    def heard(self) -> None:
-        """Frames have arrived: on a signed endpoint, verified ones."""
 
     def pause_writing(self) -> None:
         self.channel.pause()

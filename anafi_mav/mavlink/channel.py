@@ -97,6 +97,10 @@ class Channel:
         self.dropped_bytes = 0
         self.heard_at: float | None = None
         """When its last frame arrived, s, monotonic; None: none has."""
+        self.proved_at: float | None = None
+        """When the last frame arrived that shows that its peer may be served: on a signed endpoint, a verified one."""
+        self.is_unrestricted = self.access is Access.ALL and self.system_ids is None
+        """True when every frame of its peer may reach all systems."""
         self.is_open = True
         self.is_local = False
         """True when only programs of this computer can be its peer."""
@@ -185,6 +189,12 @@ class Channel:
     def can_stream(self, id: int) -> bool:
         """Return True for a message that may be streamed to the peer."""
         return self.message_filter is None or self.message_filter.passes(id)
+
+    def hear(self, frames: Iterable[ReceivedFrame], now: float) -> None:
+        """Note that frames have arrived."""
+        self.heard_at = now
+        if self.signing is None or not self.signing.is_on or self.is_proved_by(frames):
+            self.proved_at = now
 
     def receive(self, data: bytes) -> list[ReceivedFrame]:
         """Return the frames in received bytes; the parser counts other bytes."""

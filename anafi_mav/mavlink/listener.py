@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 from anafi_mav.clock import Clock
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, Sink
+from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.peer_table import PeerTable
 
 logger = logging.getLogger(__name__)
@@ -35,7 +36,11 @@ class Listener(Endpoint):
     def __init__(self, url: EndpointUrl, sink: Sink, clock: Clock) -> None:
         super().__init__(url, sink, clock)
         limit = url.options.idle_limit
-        self._table: PeerTable[Any] = PeerTable(url.options.max_clients, self.IDLE_LIMIT if limit is None else limit)
+        self._table: PeerTable[Any] = PeerTable(
+            url.options.max_clients,
+            self.IDLE_LIMIT if limit is None else limit,
+            lambda peer: self._channel_of(peer).proved_at,
+        )
         self._refused: set[str] = set()
         self._lines: dict[str, tuple[float, int]] = {}
         """Of each kind of line about places: when the next may be written, and how many were left out."""
@@ -44,6 +49,10 @@ class Listener(Endpoint):
     @abstractmethod
     def _drop(self, peer: Any) -> None:
         """End the channel of a client and free its place."""
+
+    @abstractmethod
+    def _channel_of(self, peer: Any) -> Channel:
+        """Return the channel of a client that has a place."""
 
     @abstractmethod
     def _shown(self, peer: Any) -> str:

@@ -40,6 +40,8 @@ class Inbound(msgspec.Struct, frozen=True):
 
     message: Any
     """A message of the dialect."""
+    id: int
+    """Its number."""
     channel: Channel
     """Channel it arrived on, and to which an answer goes."""
     sysid: int
@@ -303,15 +305,19 @@ class Node:
     def received(self, channel: Channel, frames: list[ReceivedFrame], reached: Collection[int] | None = None) -> None:
         reached = channel.system_ids if reached is None else reached
         now = self._clock.monotonic()
-        old = self._stalls is not None and not channel.has_ages and self._stalls.waited > 0.0
+        stalls = self._stalls
+        old = stalls is not None and now >= stalls.punctual_until and not channel.has_ages and stalls.waited > 0.0
         if frames:
-            channel.heard_at = now
+            channel.hear(frames, now)
         for received in frames:
             if self.tap is not None:
                 self._guarded(self.tap.received, received)
-            permitted = channel.access is Access.ALL or self._permits(channel, received)
-            is_false = channel.access is Access.OBSERVE and self._has_name_of_other(channel, received)
-            may_forward = permitted and self._may_forward(channel, received, is_false=is_false)
+            permitted = may_forward = True
+            is_false = False
+            if not channel.is_unrestricted:
+                permitted = channel.access is Access.ALL or self._permits(channel, received)
+                is_false = channel.access is Access.OBSERVE and self._has_name_of_other(channel, received)
+                may_forward = permitted and self._may_forward(channel, received, is_false=is_false)
             route = self._router.route(channel, received, now, reached, may_forward=may_forward, may_learn=not is_false)
             if route.is_refused:
                 channel.counters["refused_systems"] += 1
@@ -323,14 +329,14 @@ class Node:
                 self._stale += 1
                 if received.id not in STOPPING:
                     continue
-            if received.id == dialect.MAVLINK_MSG_ID_SETUP_SIGNING:
+            message, id = received.message, received.id
+            inbound = Inbound(message, id, channel, received.sysid, received.compid, now, permitted, old)
+            if id == dialect.MAVLINK_MSG_ID_SETUP_SIGNING:
                 # Before the log and the hosts: it holds a key.
                 if self._on_setup_signing is not None:
-                    inbound = Inbound(received.message, channel, received.sysid, received.compid, now, permitted)
                     self._guarded(self._on_setup_signing, inbound)
                 continue
-            message_logger.debug("%s: %s", channel.name, received.message)
-            inbound = Inbound(received.message, channel, received.sysid, received.compid, now, permitted, old)
+            message_logger.debug("%s: %s", channel.name, message)
             for host in route.hosts:
                 self._guarded(host, inbound)
 

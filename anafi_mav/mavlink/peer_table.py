@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from typing import Generic, TypeVar
 
 PeerT = TypeVar("PeerT", bound=Hashable)
@@ -19,57 +19,52 @@ class PeerTable(Generic[PeerT]):
     each, so that made-up addresses and connections take none from known clients.
     """
 
-    def __init__(self, places: int, idle_limit: float) -> None:
+    def __init__(self, places: int, idle_limit: float, heard_at: Callable[[PeerT], float | None]) -> None:
         """`places`: of known clients, and as many of others.
 
-        `idle_limit`: s of silence after which a client loses its place; 0: never.
+        `idle_limit`: s of silence after which a client loses its place; 0: never. `heard_at` returns when a client was
+        heard last; None: never.
         """
         self._places = places
         self._idle_limit = idle_limit
-        self._heard: dict[PeerT, float] = {}
-        """When each client was heard last, or got its place."""
+        self._heard_at = heard_at
+        self._since: dict[PeerT, float] = {}
+        """When each client got its place."""
         self._known: set[PeerT] = set()
 
     def __len__(self) -> int:
-        return len(self._heard)
+        return len(self._since)
 
     def __contains__(self, peer: object) -> bool:
-        return peer in self._heard
+        return peer in self._since
 
     def is_full(self, *, known: bool) -> bool:
         """Return True when all places of known clients, or of others, are taken."""
-        return len(self._known if known else self._heard.keys() - self._known) >= self._places
+        return len(self._known if known else self._since.keys() - self._known) >= self._places
 
     def add(self, peer: PeerT, now: float, *, known: bool) -> None:
         """Give a new client a place, or a known client one of those in place of its other."""
-        self._heard[peer] = now
+        self._since[peer] = now
         if known:
             self._known.add(peer)
 
-    def heard(self, peer: PeerT, now: float) -> bool:
-        """Note a frame of a client; return True when it has a place and is not known."""
-        if peer not in self._heard:
-            return False
-        self._heard[peer] = now
-        return peer not in self._known
-
     def remove(self, peer: PeerT) -> None:
         """Free the place of a client. Twice does no harm."""
-        self._heard.pop(peer, None)
+        self._since.pop(peer, None)
         self._known.discard(peer)
 
     def silence(self, peer: PeerT, now: float) -> float:
         """Return for how long a client has been silent, s."""
-        return now - self._heard[peer]
+        return now - self._newest(peer)
 
     def replaceable(self, now: float, *, known: bool) -> PeerT | None:
         """Return the client that gives way to one of its kind: the one silent for longest.
 
         None when no known client has been silent for long enough. The others give way at once.
         """
-        kind = [peer for peer in self._heard if (peer in self._known) is known]
-        longest = min(kind, key=self._heard.__getitem__, default=None)
-        if longest is None or (known and now - self._heard[longest] < REPLACEABLE):
+        kind = [peer for peer in self._since if (peer in self._known) is known]
+        longest = min(kind, key=self._newest, default=None)
+        if longest is None or (known and self.silence(longest, now) < REPLACEABLE):
             return None
         return longest
 
@@ -77,4 +72,9 @@ class PeerTable(Generic[PeerT]):
         """Return the clients that have been silent for longer than the limit."""
         if not self._idle_limit:
             return []
-        return [peer for peer, heard in self._heard.items() if now - heard > self._idle_limit]
+        return [peer for peer in self._since if self.silence(peer, now) > self._idle_limit]
+
+    def _newest(self, peer: PeerT) -> float:
+        """Return when a client was heard last, or got its place."""
+        since, heard_at = self._since[peer], self._heard_at(peer)
+        return since if heard_at is None else max(since, heard_at)

@@ -136,7 +136,7 @@ class Router(Generic[KeyT, HostT]):
             return Route((), ())
         # 0 is the address of all, the name of none.
         is_named = received.message is not None and received.sysid != 0 and received.verdict is not Verdict.ALLOWED
-        if is_named and may_learn:
+        if is_named and may_learn and source not in self._channels.get(channel, ()):
             self._learn(channel, source)
         target, component = targets(received.message)
         hosts = () if received.message is None else self.hosts(target, component, reached)
@@ -170,7 +170,7 @@ class Router(Generic[KeyT, HostT]):
 
     def _learn(self, channel: KeyT, source: tuple[int, int]) -> None:
         sources = self._channels.get(channel)
-        if sources is None or source in sources:
+        if sources is None:
             return
         if len(sources) < MAX_SOURCES:
             sources.add(source)

@@ -8,6 +8,7 @@ as if they were new. A command is still handed to its host: a stop is carried ou
 from __future__ import annotations
 
 import asyncio
+import math
 from collections import deque
 from collections.abc import Callable
 
@@ -33,6 +34,8 @@ class StallWatch:
         self._on_stall = on_stall
         self._beaten = self._loop.time()
         self._drained = self._beaten
+        self.punctual_until = math.inf
+        """Time (loop clock) before which nothing that is read can have waited for a stall to end."""
         self._stalled_since = self._beaten
         """Time of the last beat before the newest stall."""
         self._stalled = 0.0
@@ -44,6 +47,7 @@ class StallWatch:
     def start(self) -> None:
         """Begin to watch."""
         self._beaten = self._loop.time()
+        self.punctual_until = self._beaten + STALL
         self._timer = self._loop.call_later(BEAT, self._beat)
 
     def stop(self) -> None:
@@ -51,6 +55,7 @@ class StallWatch:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
+        self.punctual_until = math.inf
 
     @property
     def waited(self) -> float:
@@ -83,3 +88,4 @@ class StallWatch:
             self._stalled_since, self._drained = before, now + DRAIN
             self._stalled += late
             self._on_stall(late)
+        self.punctual_until = now + STALL if now >= self._drained else -math.inf

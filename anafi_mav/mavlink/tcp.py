@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from anafi_mav.clock import Clock
 from anafi_mav.mavlink.base import EndpointUrl, Reopening, Sink, StreamPeer, close_peers
+from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.listener import Listener
 
 logger = logging.getLogger(__name__)
@@ -30,19 +31,11 @@ _BROWSER_OR_NOT = re.compile(rb"[A-Z]{0,16}|\x16")
 class TcpPeer(StreamPeer):
     """A TCP connection. A dead one ends after half a minute."""
 
-    def __init__(self, url: EndpointUrl, name: str, sink: Sink, heard: Callable[[TcpPeer], None]) -> None:
-        """`heard` is called when frames have arrived: on a signed endpoint, verified ones."""
-        super().__init__(url, name, sink)
-        self._heard = heard
-
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         connection = transport.get_extra_info("socket")
         if hasattr(socket, "TCP_USER_TIMEOUT"):
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNANSWERED_MS)
         super().connection_made(transport)
-
-    def heard(self) -> None:
-        self._heard(self)
 
 
 class _ServedPeer(TcpPeer):
@@ -57,11 +50,17 @@ class _ServedPeer(TcpPeer):
         url: EndpointUrl,
         name: str,
         sink: Sink,
-        heard: Callable[[TcpPeer], None],
+        proved: Callable[[_ServedPeer], None],
         refuse: Callable[[TcpPeer], None],
     ) -> None:
-        """`refuse` drops the connection of a browser."""
-        super().__init__(url, name, sink, heard)
+        """`proved` is called for a verified frame while `is_known` is False.
+
+        `refuse` drops the connection of a browser.
+        """
+        super().__init__(url, name, sink)
+        self.is_known = False
+        """True when it has a place of a known client."""
+        self._proved = proved
         self._refuse = refuse
         self._beginning: bytes | None = b""
         """The first bytes, while it is not known whether a browser sent them; None afterwards."""
@@ -77,6 +76,8 @@ class _ServedPeer(TcpPeer):
                 return
             self._beginning = None
         super().data_received(data)
+        if not self.is_known and self.channel.proved_at is not None:
+            self._proved(self)
 
 
 class TcpIn(Listener):
@@ -124,9 +125,9 @@ class TcpIn(Listener):
         name, now = f"{address[0]}:{address[1]}", self._clock.monotonic()
         if not self._is_allowed(address[0]):
             return None
-        peer = _ServedPeer(self.parsed, f"{self.url} from {name}", self._sink, self._heard, self._refuse_browser)
+        peer = _ServedPeer(self.parsed, f"{self.url} from {name}", self._sink, self._proved, self._refuse_browser)
         self._protect(peer.channel)
-        known = not peer.channel.is_signed  # a connection proves the address
+        known = peer.is_known = not peer.channel.is_signed  # a connection proves the address
         if not self._make_room(name, now, known=known):
             return None
         self._peers.add(peer)
@@ -134,10 +135,12 @@ class TcpIn(Listener):
         peer.lost.add_done_callback(lambda _: self._forget(peer))
         return peer
 
-    def _heard(self, peer: TcpPeer) -> None:
+    def _proved(self, peer: _ServedPeer) -> None:
+        """Give a client that holds the key a place of a known one, once there is one."""
         now = self._clock.monotonic()
-        if self._table.heard(peer, now) and self._make_room(self._shown(peer), now, known=True):
+        if peer in self._table and self._make_room(self._shown(peer), now, known=True):
             self._table.add(peer, now, known=True)
+            peer.is_known = True
 
     def _refuse_browser(self, peer: TcpPeer) -> None:
         self.counters["refused_browsers"] += 1
@@ -149,6 +152,9 @@ class TcpIn(Listener):
     def _forget(self, peer: TcpPeer) -> None:
         self._peers.discard(peer)
         self._table.remove(peer)
+
+    def _channel_of(self, peer: TcpPeer) -> Channel:
+        return peer.channel
 
     def _shown(self, peer: TcpPeer) -> str:
         return peer.channel.name.removeprefix(f"{self.url} from ")
@@ -179,7 +185,7 @@ class TcpOut(Reopening):
 
     async def _connect(self) -> StreamPeer:
         loop = asyncio.get_running_loop()
-        peer = TcpPeer(self.parsed, self.url, self._sink, lambda peer: None)
+        peer = TcpPeer(self.parsed, self.url, self._sink)
         self._protect(peer.channel)
         attempt = loop.create_connection(lambda: peer, self.parsed.place, self.parsed.number)
         try:

@@ -279,8 +279,6 @@ class UdpIn(Listener):
             frames = channel.receive(data)
         if frames and channel.proof is not None:
             self._weigh(channel, frames, address, now)
-        if channel.is_proved_by(frames):
-            self._table.heard(address, now)
         with peer.outbox:
             self._sink.received(channel, frames)
 
@@ -311,12 +309,15 @@ class UdpIn(Listener):
         else:
             channel.send_heartbeats()
 
+    def _channel_of(self, address: Any) -> Channel:
+        return self._peers[address].channel
+
     def _shown(self, address: Any) -> str:
         return f"{address[0]}:{address[1]}"
 
     def _drop(self, address: Any) -> None:
-        peer = self._peers.pop(address)
         self._table.remove(address)
+        peer = self._peers.pop(address)
         peer.channel.close()
         peer.outbox.flush()
         self._sink.closed(peer.channel)

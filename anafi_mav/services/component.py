@@ -30,7 +30,7 @@ from anafi_mav.services.command.operator_need import ACKNOWLEDGEMENTS, need_of, 
 from anafi_mav.services.commands import Action, Effect
 from anafi_mav.services.definition_link import DefinitionLink
 from anafi_mav.services.dropped_inputs import InputStream
-from anafi_mav.services.flavours import Flavour, flavour_of
+from anafi_mav.services.flavours import Flavour, by_flavour
 from anafi_mav.services.ftp.ftp_service import FtpService
 from anafi_mav.services.gateway_uris import GatewayUris
 from anafi_mav.services.memory import Memory
@@ -51,6 +51,14 @@ logger = logging.getLogger(__name__)
 DENIED_EVERY = 5.0
 """s before a channel gets the text about its access again: setpoints arrive many times a second."""
 
+GONE = 30.0
+"""s of silence after which a client counts as a new one, for example when restarted."""
+
+MAX_CLIENTS = 64
+"""Clients that are remembered; there are a handful."""
+
+NO_CLIENTS = (dialect.MAV_TYPE_CAMERA, dialect.MAV_TYPE_GIMBAL, dialect.MAV_TYPE_ADSB)
+"""Types of components that send heartbeats and are no clients: parts of other vehicles."""
 
 BY_MESSAGE = (
     dialect.MAV_CMD_REQUEST_MESSAGE,
@@ -173,6 +181,8 @@ class Component:
         self._denials: dict[int, MessageHandler] = {}
         self._denied_at: WeakKeyDictionary[Channel, float] = WeakKeyDictionary()
         """When a channel last got the text about its access."""
+        self._clients: dict[Hashable, tuple[float, Channel]] = {}
+        """Client -> when its last message arrived, and where."""
         self._own: frozenset[int] = frozenset()
         """The commands of this component's services."""
         self._receiving = [service for service in self.services if type(service).received is not Service.received]
@@ -231,11 +241,7 @@ class Component:
 
         If `build` returns None, nothing is sent.
         """
-        groups: dict[str, tuple[Flavour, list[Channel]]] = {}
-        for channel in self.channels if to is None else to:
-            flavour = flavour_of(channel)
-            groups.setdefault(flavour.name, (flavour, []))[1].append(channel)
-        for flavour, channels in groups.values():
+        for flavour, channels in by_flavour(self.channels if to is None else to):
             message = build(flavour)
             if message is not None:
                 self.send(message, channels)
@@ -257,10 +263,20 @@ class Component:
 
     # What clients send.
 
+    def heard_channels(self) -> list[Channel]:
+        """Return the channels on which a client has been heard that is not gone."""
+        now = self.clock.monotonic()
+        return [channel for heard, channel in self._clients.values() if now - heard <= GONE]
+
+    def channel_closed(self, channel: Channel) -> None:
+        """Forget the clients of a channel that is gone."""
+        self._clients = {client: known for client, known in self._clients.items() if known[1] is not channel}
+        for service in self.services:
+            service.channel_closed(channel)
+
     def receive(self, inbound: Inbound) -> None:
         """Handle a message to this component, to its system, or to all."""
-        message = inbound.message
-        id = message.get_msgId()
+        message, id, operators = inbound.message, inbound.id, self.vehicle.operators
         handler = self._handlers.get(id)
         if handler is None:
             return
@@ -268,15 +284,17 @@ class Component:
             self.look_soon()
         try:
             if getattr(message, "target_system", 0) == self.sysid:
-                for service in self._receiving:
-                    service.received(inbound)
+                self._note(inbound)
+                if operators.operator or inbound.channel.options.operator_control:
+                    for service in self._receiving:
+                        service.received(inbound)
             if id in COMMANDS or id in BY_AUTOPILOT:
                 to_all = message.target_component == EVERY_COMPONENT
                 if to_all and self._system.owner(message) is not self:
                     return
             if not inbound.is_permitted:
                 self._deny(inbound)
-            elif (reason := self._objection(inbound)) is not None:
+            elif operators.operator not in (0, inbound.sysid) and (reason := self._objection(inbound)) is not None:
                 self._refuse(inbound, reason)
             elif inbound.is_late and not self._may_be_late(inbound):
                 self._answer_refused(inbound, dialect.MAV_RESULT_TEMPORARILY_REJECTED, texts.COMMAND_LATE)
@@ -288,18 +306,28 @@ class Component:
         except Exception:
             logger.exception("%s: %s not handled", self.drone.name, message.get_type())
 
+    def _note(self, inbound: Inbound) -> None:
+        """Note a message of a client, and call the services that greet new ones."""
+        client, channel = inbound.client, inbound.channel
+        last = self._clients.pop(client, None)
+        self._clients[client] = inbound.now, channel
+        if len(self._clients) > MAX_CLIENTS:
+            del self._clients[next(iter(self._clients))]
+        if last is None or inbound.now - last[0] > GONE:
+            for service in self.services:
+                service.client_appeared(channel, inbound.now)
+
     def _heard(self, inbound: Inbound) -> None:
-        observes = inbound.channel.access is Access.OBSERVE
-        for service in self.services:
-            if not observes or service.hears_observers:
+        beat = inbound.message
+        if beat.autopilot == dialect.MAV_AUTOPILOT_INVALID and beat.type not in NO_CLIENTS:
+            self._note(inbound)
+        if inbound.channel.access is not Access.OBSERVE:
+            for service in self.services:
                 service.heartbeat(inbound)
 
     def _objection(self, inbound: Inbound) -> OperatorText | None:
         """Return the reason for which a message has no effect while another station is the operator."""
-        operators = self.vehicle.operators
-        if operators.operator in (0, inbound.sysid):
-            return None
-        return operators.objection(inbound.sysid, need_of(inbound, self.commands.action_of))
+        return self.vehicle.operators.objection(inbound.sysid, need_of(inbound, self.commands.action_of))
 
     def _may_be_late(self, inbound: Inbound) -> bool:
         """Return True for a query and a stop of the flight, but not for cut motors.
@@ -309,14 +337,17 @@ class Component:
         effect = stop_of(inbound, self.commands.action_of)
         if effect is not None:
             return effect is not Effect.KILL
-        return inbound.message.get_msgId() in COMMANDS and self.commands.action_of(inbound) is None
+        return inbound.id in COMMANDS and self.commands.action_of(inbound) is None
 
     def input_objection(self, inbound: Inbound) -> OperatorText | None:
         """Return the reason for which a stick, setpoint or target is refused, and count it.
 
         None: it may be flown.
         """
-        reason = self.vehicle.operators.objection(inbound.sysid, Need.FLY)
+        operators = self.vehicle.operators
+        if operators.operator in (0, inbound.sysid):
+            return None
+        reason = operators.objection(inbound.sysid, Need.FLY)
         if reason is not None:
             _count_refusal(inbound)
         return reason
@@ -340,7 +371,7 @@ class Component:
 
     def _answer_refused(self, inbound: Inbound, result: int, reason: str = "") -> None:
         """Answer a message without effect, as its sender expects it; `result`: of a command."""
-        id = inbound.message.get_msgId()
+        id = inbound.id
         if id in COMMANDS:
             self.commands.refuse(inbound, result, reason)
         elif (answer := self._denials.get(id)) is not None:
@@ -349,7 +380,7 @@ class Component:
     def _deny(self, inbound: Inbound) -> None:
         """Answer a message that the access of its endpoint does not cover; it has no effect."""
         self._answer_refused(inbound, dialect.MAV_RESULT_DENIED)
-        if inbound.message.get_msgId() in ACKNOWLEDGEMENTS:
+        if inbound.id in ACKNOWLEDGEMENTS:
             return  # stations send them by themselves
         channel = inbound.channel
         if inbound.now - self._denied_at.get(channel, -math.inf) >= DENIED_EVERY:

@@ -10,7 +10,7 @@ few clients know (conformance E1, E3, E4).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from anafi_mav.mavlink import dialect
@@ -337,3 +337,16 @@ def mode_of_standard(number: float) -> FlightMode | None:
 def flavour_of(channel: Channel) -> Flavour:
     """Return the flavour of a channel's endpoint; PX4 when its URL names none."""
     return FLAVOURS[channel.options.flavour or PX4.name]
+
+
+def by_flavour(channels: Sequence[Channel]) -> Sequence[tuple[Flavour, Sequence[Channel]]]:
+    """Return each flavour with its channels.
+
+    Channels of one flavour stay in the list that they are in.
+    """
+    groups: dict[str, list[Channel]] = {}
+    for channel in channels:
+        groups.setdefault(flavour_of(channel).name, []).append(channel)
+    if len(groups) == 1:
+        return [(flavour_of(channels[0]), channels)]
+    return [(FLAVOURS[name], group) for name, group in groups.items()]

@@ -233,8 +233,14 @@ class Memory:
         content = _File(VERSION, self._serial, plans, dict(self.settings))
         data = msgspec.json.encode(content)
         writing = asyncio.get_running_loop().run_in_executor(STATE_WRITER, replace_file, path, data)
-        writing.add_done_callback(partial(self._note, path))
-        await asyncio.wait([writing], timeout=DISK_LIMIT)
+        try:
+            if not writing.done():
+                await asyncio.wait([writing], timeout=DISK_LIMIT)
+        finally:
+            if writing.done():
+                self._note(path, writing)
+            else:
+                writing.add_done_callback(partial(self._note, path))
         if not writing.done():
             self.problem = texts.MEMORY_UNWRITABLE.fill(path=path, error=HANGS)
         return self.problem

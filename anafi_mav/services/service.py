@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Coroutine, Hashable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, Protocol
 
 from anafi_mav.clock import NEVER, Clock
 from anafi_mav.drone import Drone
@@ -185,6 +185,9 @@ class Host(Protocol):
         `at`: when it was true (s, monotonic).
         """
 
+    def heard_channels(self) -> list[Channel]:
+        """Return the channels on which a client has been heard that is not gone."""
+
     def set_muted(self, channel: Channel, *, muted: bool) -> None:
         """Send only answers on this channel; with False everything again."""
 
@@ -202,8 +205,6 @@ class Service:
 
     Tables are read when the system is made, `subscriptions` at link up.
     """
-
-    hears_observers: ClassVar[bool] = False
 
     is_watch: ClassVar[bool] = False
     """True when `tick` ends a flight or an input, or warns: it then waits for no other drone's messages."""
@@ -288,13 +289,18 @@ class Service:
         return {}
 
     def received(self, inbound: Inbound) -> None:
-        """A message that names this system as its target has arrived, before it is handled."""
+        """A message that names this system as its target has arrived, before it is handled.
+
+        Called while a station is the operator, and for channels with `operator_control`.
+        """
+
+    def client_appeared(self, channel: Channel, now: float) -> None:
+        """A client is heard for the first time, or after a long silence."""
 
     def heartbeat(self, inbound: Inbound) -> None:
         """Handle the HEARTBEAT of a ground station or any other component.
 
-        It is the one message that every service receives. Heartbeats of observers, who control nothing, reach those
-        with `hears_observers` alone.
+        It is the one message that every service receives. Those of observers, who control nothing, reach none.
         """
 
     def state_changed(self) -> None:

@@ -254,6 +254,7 @@ class System:
         """Runs while heartbeats still say Mission."""
         self._warned_at: dict[str, float] = {}
         self._dropped = DroppedInputs()
+        self.use_input = self._dropped.use
         self._muted: set[Channel] = set()
         self._addressed: tuple[Sequence[Channel], Sequence[Channel]] = ([], [])
         """The open channels when it was last looked, and those of them that this system sends to."""
@@ -356,7 +357,7 @@ class System:
         for task in tuple(self._tasks):
             task.cancel()
         self.vehicle.link_down()
-        self._dropped = DroppedInputs()
+        self._dropped.forget(lambda client: True)
         self.active = False
         self._node.remove_hosts(self.sysid)
 
@@ -407,7 +408,7 @@ class System:
 
     def stop_of(self, inbound: Inbound) -> Effect | None:
         """Return the effect of a message that stops the flight; None for any other."""
-        is_command = inbound.message.get_msgId() in COMMANDS
+        is_command = inbound.id in COMMANDS
         component = self.owner(inbound.message) if is_command else self._autopilot
         return stop_of(inbound, component.commands.action_of)
 
@@ -486,10 +487,6 @@ class System:
         logger.warning("%s: system %s: %s", self.drone.name, system_of(client), report.text)
         if (channel := channel_of(client)) is not None:
             self.text(report.severity, report.text, channel)
-
-    def use_input(self, client: Hashable, stream: InputStream) -> None:
-        """Note that an input of a stream is flown: what was reported of earlier ones is over."""
-        self._dropped.use(client, stream)
 
     def spawn(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """Run in the background; cancelled when the drone's link goes down."""
@@ -721,7 +718,7 @@ class System:
         for text in (texts.COMMAND_WITHOUT_DRONE, self.absence):
             for part in self._texts.messages(Severity.WARNING, text) if text is not None else ():
                 self._node.send(part, sysid=self.sysid, compid=AUTOPILOT, to=inbound.channel)
-        if message.get_msgId() in COMMANDS:
+        if inbound.id in COMMANDS:
             compid = message.target_component or self.owner(message).compid
             answer = _answer(inbound, dialect.MAV_RESULT_FAILED)
             self._node.send(answer, sysid=self.sysid, compid=compid, to=inbound.channel)
@@ -736,7 +733,7 @@ class System:
     def _refuse(self, inbound: Inbound) -> None:
         """Answer a command to one of the components in `ABSENT` alone: it is unsupported."""
         message = inbound.message
-        if message.get_msgId() in COMMANDS and message.target_system == self.sysid and message.target_component:
+        if inbound.id in COMMANDS and message.target_system == self.sysid and message.target_component:
             answer = _answer(inbound, dialect.MAV_RESULT_UNSUPPORTED)
             self._node.send(answer, sysid=self.sysid, compid=message.target_component, to=inbound.channel)
 
@@ -761,8 +758,8 @@ class System:
         self._dropped.forget(is_gone)
         self.payload_history.forget_clients(is_gone)
         self.vehicle.holds.forget_clients(is_gone)
-        for service in self.services:
-            service.channel_closed(channel)
+        for component in self.components:
+            component.channel_closed(channel)
 
 
 def _answer(inbound: Inbound, result: int) -> dialect.MAVLink_command_ack_message:

@@ -193,7 +193,7 @@ class GuidedFlight:
         goto = target()
         try:
             async with control.acquire(goto, by=by, below=Hover(goto.mode), condition=target) as grant:
-                goto = target()
+                goto = grant.found
                 grant.begin(goto)
                 await self.move(goto)
         except BaseException:

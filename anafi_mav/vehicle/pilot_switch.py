@@ -44,8 +44,8 @@ class PilotSwitch:
         return self._state
 
     def refusal(self, request: Request) -> Refused | None:
-        """Return the refusal of a flight task, as a policy of `Control`; None: permitted."""
-        return refusal_of(self._in_force, request) if self._controller.present else None
+        """Return the refusal of a flight task behind a Skycontroller; None: permitted."""
+        return refusal_of(self._in_force, request)
 
     @property
     def objection(self) -> OperatorText | None:

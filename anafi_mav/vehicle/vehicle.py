@@ -54,7 +54,7 @@ from anafi_mav.vehicle.base.velocity_loop import TILT_LAG
 from anafi_mav.vehicle.controller_inputs import ControllerInputs
 from anafi_mav.vehicle.fence.rally import RallyPoints
 from anafi_mav.vehicle.follow_flight import FollowFlight
-from anafi_mav.vehicle.guided_flight import GuidedFlight
+from anafi_mav.vehicle.guided_flight import GOTO, GuidedFlight
 from anafi_mav.vehicle.hold_rule import APART, HoldRule
 from anafi_mav.vehicle.initiator import Initiator, Initiators
 from anafi_mav.vehicle.joystick_override import Override
@@ -194,8 +194,8 @@ class Vehicle(Aircraft):
         self.operators = OperatorControl()
         """The operator among the stations, if one has requested control."""
         self.control.policies = (
-            self.pilot_switch.refusal,
-            lambda request: operator_refusal_of(self.operators, request),
+            lambda request: self.pilot_switch.refusal(request) if drone.controller.present else None,
+            lambda request: operator_refusal_of(self.operators, request) if self.operators.operator else None,
         )
         self.controller_inputs = ControllerInputs(drone.controller)
         self.follow = FollowFlight(self, lambda: self.offboard.motion, clock)
@@ -464,6 +464,22 @@ class Vehicle(Aircraft):
         is_pending = control.state in (State.RELEASING, State.ACQUIRING)
         below = control.next_below if is_pending else control.below
         return below.resumes if isinstance(below, Hover) and (is_pending or control.active is below) else None
+
+    async def reposition(
+        self,
+        place: GeoPoint | None,
+        ato: float | None,
+        yaw: float | None,
+        speed: float | None = None,
+        *,
+        mode: FlightMode,
+        by: By,
+    ) -> None:
+        """See `GuidedFlight.reposition`; a take-off under way is flown to its end before."""
+        if self.takeoff.rises:
+            self.guided.check(place, ato)  # one that is refused replaces none that waits
+            await self.takeoff.over(GOTO)
+        await self.guided.reposition(place, ato, yaw, speed, mode, by=by)
 
     async def take_off(self, ato: float | None, by: Right) -> None:
         """Take off to a height, or end a landing: then the drone hovers where it is."""

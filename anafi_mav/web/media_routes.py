@@ -12,6 +12,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import re
 from collections.abc import Awaitable, Callable
 from contextlib import aclosing
 
@@ -35,6 +36,8 @@ BROWSER_HEADERS = ("Origin", "Sec-Fetch-Site", "Sec-Fetch-Mode")
 
 PROXY_HEADERS = ("Forwarded", "Via", "X-Forwarded-For", "X-Real-IP")
 """A reverse proxy on this computer adds one of these, where it is set up to name its clients (RFC 7239, RFC 9110)."""
+
+_NO_SUFFIX = re.compile(r"bytes=-0+")
 
 Answer = Callable[[web.Request, Drone], Awaitable[web.StreamResponse]]
 """Answers a request for the media of a drone."""
@@ -98,7 +101,9 @@ class MediaRoutes:
         headers = {"Accept-Ranges": "bytes"}
         if "Range" in request.headers and resource.size:
             with contextlib.suppress(ValueError):  # a range that cannot be read is none (RFC 9110 §14.2)
-                first, end, _ = request.http_range.indices(resource.size)
+                # The last 0 bytes are no bytes (RFC 9110 §14.1.2). aiohttp has them as slice(0, None), like "bytes=0-".
+                is_empty = _NO_SUFFIX.fullmatch(request.headers["Range"]) is not None
+                first, end = (1, 0) if is_empty else request.http_range.indices(resource.size)[:2]
                 status, headers["Content-Range"] = 206, f"bytes {first}-{end - 1}/{resource.size}"
             if first >= end:
                 return web.Response(status=416, headers={"Content-Range": f"bytes */{resource.size}"})

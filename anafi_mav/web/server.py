@@ -226,7 +226,8 @@ class HttpServer:
             return ConfigError("http.port", f"{place} is in use by another program; expected a free port, or 0")
         if error.errno in (errno.EACCES, errno.EPERM):
             return ConfigError("http.port", f"this user may not open {place}; expected a port from 1024 to 65535")
-        if isinstance(error, socket.gaierror) or error.errno == errno.EADDRNOTAVAIL:
+        # asyncio of Python 3.13 has no number for an address of another computer.
+        if isinstance(error, socket.gaierror) or error.errno in (errno.EADDRNOTAVAIL, None):
             return ConfigError("http.host", f"expected an address of this computer, got {self.host}")
         return ConfigError("http", f"cannot open {place}: {error.strerror or error}")
 

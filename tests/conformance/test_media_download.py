@@ -87,6 +87,7 @@ async def test_media_over_http_has_the_drones_paths_and_ranges(quirks: tuple[Qui
             status, body, headers = await ask(w, "GET", path, Range=wanted)
             assert (status, body == expected, headers["content-range"]) == (206, True, place)
         assert (await ask(w, "GET", path, Range="bytes=9999999999-"))[0] == 416
+        assert (await ask(w, "GET", path, Range="bytes=-0"))[0] == 416
         assert (await ask(w, "GET", path, Range="lines=1-2"))[:2] == (200, content)
         assert (await ask(w, "GET", f"/data/thumb/{photo.id}"))[:2] == (200, photo.thumbnail())
         md5 = json.loads((await ask(w, "GET", f"/api/v1/media/md5/{video.id}"))[1])["md5"]

@@ -32,7 +32,7 @@ class _KnownFrame:
         format, position = f"<{number.start}s{number.stop - number.start}x", number.stop
         for begin, end in places:
             value = values[data[begin : begin + HEADER.size]]
-            found[value.kind] = slice(begin, end)
+            found[value.kind] = slice(begin - number.stop, end - number.stop)
             named = begin + value.name_size
             format += f"{named - position}s{end - named}x"
             position = end
@@ -62,7 +62,9 @@ class KnownFrames:
         """
         for known in self._by_size.get(len(data), ()):
             if known.unpack(data) == known.fixed:
-                return known.id, self._unpack_number(data)[0], Values(known.layout, data)
+                # A copy: what a socket has read lies in the memory of a longest datagram, and would divide it.
+                values = Values(known.layout, data[self._number.stop :])
+                return known.id, self._unpack_number(data)[0], values
         return None
 
     def learn(self, data: bytes, frame: Frame, commands: Sequence[bytes], messages: Sequence[Received]) -> None:

@@ -179,6 +179,8 @@ class GuidedMoves:
 
         The cancellations go through the command queue in sequence, so a later move is not hit.
         """
+        if self._moves.to is None and not self._moves.by:
+            return False
         journey = self._moves.cancel_to(why)
         if journey is not None:
             self._commander.cancel(journey.answer.token)

@@ -304,15 +304,16 @@ class Piloting(PilotingSettings):
         if command is None:
             self._sticks.let_go()
             return
-        limits = self.state.limits
+        state = self.state
+        limits = state.limits
         if limits is None:
             raise NotSupported("reported tilt and speed limits")
         position = percent(command, limits)
         if self._sticks.blocked is None:
             self._guided.stop("taken over by the sticks")
-            if self.state.following != FollowMeMode.LOOK_AT:  # which leaves the flying to the sticks
-                self._stop_following()
-            self._stop_animation()
+            if state.following != FollowMeMode.LOOK_AT:  # which leaves the flying to the sticks
+                self._stop_following(state)
+            self._stop_animation(state)
             self._sticks.hold(position, age)
         else:
             self._sticks.pump()
@@ -345,8 +346,8 @@ class Piloting(PilotingSettings):
                 self._commander.send_stop(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
         if state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING):
             self._commander.send_stop(ardrone3.StopPilotedPOI())
-        self._stop_following()
-        self._stop_animation()
+        self._stop_following(state)
+        self._stop_animation(state)
         if state.plan == PlayingState.PLAYING or self._commander.sent.is_executed(Slot.PLAN):
             self._commander.send_stop(common.Pause())
 
@@ -378,12 +379,12 @@ class Piloting(PilotingSettings):
             for answer in answers:
                 answer.close()
 
-    def _stop_following(self) -> None:
-        if self.state.following not in (None, FollowMeMode.NONE):
+    def _stop_following(self, state: PilotingState) -> None:
+        if state.following not in (None, FollowMeMode.NONE):
             self._stop_once(follow_me.Stop())
 
-    def _stop_animation(self) -> None:
-        if self.state.animation not in (None, animation.Type.NONE):
+    def _stop_animation(self, state: PilotingState) -> None:
+        if state.animation not in (None, animation.Type.NONE):
             self._stop_once(animation.Cancel())
 
     def _stop_once(self, order: Message) -> None:

@@ -10,12 +10,10 @@ Rules: conformance R5-R10, C2, MAVLink command.md.
 from __future__ import annotations
 
 import asyncio
-import itertools
 import logging
 from collections.abc import Callable, Coroutine, Hashable, Mapping
 from typing import Any
 
-from msgspec import Struct
 from msgspec.structs import replace
 
 from anafi_mav import texts
@@ -72,11 +70,10 @@ _RESULT_BY_ERROR: tuple[tuple[type[AnafiMavError], int], ...] = (
 )
 
 
-class RunningAction(Struct, eq=False):
-    """A running action that changes the vehicle's state."""
+class RunningAction(FlightAction, eq=False):
+    """A running action that changes the vehicle's state, of a command or another message."""
 
-    client: Hashable
-    answer: tuple[Inbound, Execution] | None
+    answer: tuple[Inbound, Execution] | None = None
     """Client and command to acknowledge; None for messages without acknowledgement."""
     group: ActionGroup = ActionGroup.FLIGHT
 
@@ -84,43 +81,26 @@ class RunningAction(Struct, eq=False):
 class RunningActions:
     """Running actions of one system, and the histories of its components."""
 
-    def __init__(self, flight: FlightActions | None = None) -> None:
-        """`flight`: the actions of the vehicle, whose control ends those that fly."""
-        self.flight = flight or FlightActions()
-        self.flight.on_begun(self.forget)
-        self.flight.on_replaced(self._supersede)
-        self.tasks: dict[asyncio.Task[None], RunningAction] = {}
-        """In the sequence of their arrival, which is not that of their first steps."""
+    def __init__(self, actions: FlightActions | None = None) -> None:
+        """`actions`: those of the vehicle, whose control ends the ones that fly."""
+        self.actions = actions or FlightActions()
+        self.actions.on_begun(self.forget)
+        self.actions.on_replaced(self._supersede)
         self.histories: list[CommandHistory] = []
-
-    @property
-    def current(self) -> RunningAction | None:
-        """The action that calls; None outside of them."""
-        task = asyncio.current_task()
-        return None if task is None else self.tasks.get(task)
-
-    def add(self, task: asyncio.Task[None], running: RunningAction, *, is_order: bool) -> None:
-        """Note an action that begins."""
-        self.tasks[task] = running
-        self.flight.add(task, FlightAction(running.client, is_order, flies=running.group is ActionGroup.FLIGHT))
 
     def is_full(self, group: ActionGroup) -> bool:
         """Return True when a group whose actions run in order takes no further one."""
-        return group.in_order and sum(one.group is group for one in self.tasks.values()) >= MAX_WAITING
+        return group.in_order and self.actions.count(_of(group)) >= MAX_WAITING
 
     def end_others(self, group: ActionGroup) -> list[asyncio.Task[None]]:
         """Cancel all actions of a group that are older than the calling one.
 
-        Their senders get CANCELLED. A newer action than the calling one continues: it will replace this one.
+        Their senders get CANCELLED.
         """
         if group is ActionGroup.FLIGHT:
-            return self.flight.end_older()
-        task, current = asyncio.current_task(), self.current
-        older = itertools.takewhile(lambda other: other is not task, self.tasks)
-        others = [other for other in older if self.tasks[other].group is group]
-        for other in others:
-            other.cancel()
-        self._supersede(None if current is None else current.client, group)
+            return self.actions.end_older()
+        others = self.actions.cancel_older(_of(group))
+        self._supersede(self.actions.client, group)
         return others
 
     def _supersede(self, client: Hashable, group: ActionGroup = ActionGroup.FLIGHT) -> None:
@@ -132,6 +112,21 @@ class RunningActions:
         """Forget this client's newest action of a group in all components."""
         for history in self.histories:
             history.forget(client, group)
+
+
+def _action(
+    client: Hashable,
+    group: ActionGroup,
+    answer: tuple[Inbound, Execution] | None = None,
+    *,
+    is_order: bool = True,
+) -> RunningAction:
+    return RunningAction(client, is_order, flies=group is ActionGroup.FLIGHT, answer=answer, group=group)
+
+
+def _of(group: ActionGroup) -> Callable[[FlightAction], bool]:
+    """Return the test for actions of a group."""
+    return lambda action: isinstance(action, RunningAction) and action.group is group
 
 
 class CommandService(Service):
@@ -195,7 +190,7 @@ class CommandService(Service):
         action = self._actions.get(inbound.message.command)
         if action is None:
             return None
-        is_long = inbound.message.get_msgId() == dialect.MAVLINK_MSG_ID_COMMAND_LONG
+        is_long = inbound.id == dialect.MAVLINK_MSG_ID_COMMAND_LONG
         decode: _Decode = from_long if is_long else from_int
         return decode(inbound.message, action, inbound.client, flavour_of(inbound.channel))
 
@@ -241,7 +236,7 @@ class CommandService(Service):
     ) -> asyncio.Task[None]:
         """Run an action of a message that has no acknowledgement; its refusal is sent as a text."""
         self._all.forget(client, group)  # this client used other means than its newest command
-        task = self._spawn(self._explained(work), RunningAction(client, None, group), is_order=is_order)
+        task = self._spawn(self._explained(work), _action(client, group, is_order=is_order))
         # Cancelled before it began, `work` would complain that nothing awaited it.
         task.add_done_callback(lambda _: work.close())
         return task
@@ -249,7 +244,7 @@ class CommandService(Service):
     @property
     def replaced_by_order(self) -> bool:
         """True in an action that a newer order of a client has ended."""
-        action = self._all.flight.current
+        action = self._all.actions.current
         return action is not None and action.replaced_by_order
 
     def end_others(self, group: ActionGroup = ActionGroup.FLIGHT) -> list[asyncio.Task[None]]:
@@ -301,8 +296,7 @@ class CommandService(Service):
             self._note(inbound, command.id, dialect.MAV_RESULT_TEMPORARILY_REJECTED, "too many commands wait")
             return
         execution = self._history.begin(command.client, command) if flies else self.host.payload_history.begin(command)
-        running = RunningAction(command.client, (inbound, execution), group=group)
-        self._spawn(self._execute(inbound, execution), running, is_order=True)
+        self._spawn(self._execute(inbound, execution), _action(command.client, group, (inbound, execution)))
 
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:
         command = execution.command
@@ -353,15 +347,14 @@ class CommandService(Service):
         now = self.host.clock.monotonic()
         self.log.refuse(Refusal(now, inbound.sysid, inbound.compid, client, command, result, reason))
 
-    def _spawn(self, work: Coroutine[Any, Any, None], running: RunningAction, *, is_order: bool) -> asyncio.Task[None]:
+    def _spawn(self, work: Coroutine[Any, Any, None], running: RunningAction) -> asyncio.Task[None]:
         task = self.host.spawn(work)
         self._running[task] = running
-        self._all.add(task, running, is_order=is_order)
+        self._all.actions.add(task, running)
         task.add_done_callback(self._done)
         return task
 
     def _done(self, task: asyncio.Task[None]) -> None:
-        self._all.tasks.pop(task, None)
         running = self._running.pop(task, None)
         if running is not None and running.answer is not None:
             # It has answered by itself, unless it was cancelled before it began.

@@ -26,7 +26,6 @@ from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
 from anafi_mav.vehicle.base.right import Extent, Right
-from anafi_mav.vehicle.guided_flight import GOTO
 from anafi_mav.vehicle.vehicle import Vehicle
 
 FORCE = 21196
@@ -146,10 +145,8 @@ class FlightService(Service):
             if attitude is None:
                 raise Refused(texts.GOTO, texts.HEADING_UNKNOWN)
             heading += attitude.yaw
-        if vehicle.takeoff.rises:
-            vehicle.guided.check(where, ato)  # one that is refused replaces none that waits
-            await vehicle.takeoff.over(GOTO)
-        await vehicle.guided.reposition(where, ato, heading, speed if speed > 0.0 else None, mode, by=command.right)
+        speed_limit = speed if speed > 0.0 else None
+        await vehicle.reposition(where, ato, heading, speed_limit, mode=mode, by=command.right)
 
     async def _terminate(self, command: Command) -> None:
         """MAV_CMD_DO_FLIGHTTERMINATION: param1 1 cuts the motors."""

@@ -33,7 +33,7 @@ from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.yaw import DEG_PER_TURN, heading_of
-from anafi_mav.vehicle.guided_flight import GOTO, Goto
+from anafi_mav.vehicle.guided_flight import Goto
 from anafi_mav.vehicle.vehicle import Vehicle
 
 KEEP, DEFAULT = -1.0, -2.0
@@ -69,10 +69,7 @@ async def _fly_item(host: Host, inbound: Inbound, by: Right) -> None:
                 raise Refused(texts.GOTO, texts.NOT_A_WAY_POINT, lasting=True)
             where = GeoPoint(item.x / scale, item.y / scale)
             check_on_earth(where, texts.GOTO)
-            if vehicle.takeoff.rises:
-                vehicle.guided.check(where, ato)
-                await vehicle.takeoff.over(GOTO)
-            await vehicle.guided.reposition(where, ato, None, mode=flavour.guided_mode, by=by)
+            await vehicle.reposition(where, ato, None, mode=flavour.guided_mode, by=by)
         else:
             await change_altitude(vehicle, ato, flavour, by)
         result = dialect.MAV_MISSION_ACCEPTED

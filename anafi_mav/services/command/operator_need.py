@@ -64,8 +64,7 @@ def need_of(inbound: Inbound, action_of: Callable[[Inbound], Command | None]) ->
     `action_of` decodes a COMMAND_LONG or COMMAND_INT that changes something; None for a query, and for a command that
     the component does not have.
     """
-    message = inbound.message
-    id = message.get_msgId()
+    id = inbound.id
     if id in COMMANDS:
         command = action_of(inbound)
         free = command is None or command.id in GIMBAL_COMMANDS or command.is_stop_of_flight
@@ -74,7 +73,7 @@ def need_of(inbound: Inbound, action_of: Callable[[Inbound], Command | None]) ->
         return Need.COMMAND if stop_of(inbound, action_of) is None else Need.NOTHING
     if id in INPUT_MESSAGES or id in GIMBAL_MESSAGES or id in ACKNOWLEDGEMENTS:
         return Need.NOTHING
-    return Need.NOTHING if needed_access(message) is Access.OBSERVE else Need.COMMAND
+    return Need.NOTHING if needed_access(inbound.message) is Access.OBSERVE else Need.COMMAND
 
 
 def stop_of(inbound: Inbound, action_of: Callable[[Inbound], Command | None]) -> Effect | None:
@@ -82,7 +81,7 @@ def stop_of(inbound: Inbound, action_of: Callable[[Inbound], Command | None]) ->
 
     `action_of` as in `need_of`.
     """
-    id = inbound.message.get_msgId()
+    id = inbound.id
     if id in COMMANDS:
         command = action_of(inbound)
         if command is None or command.id in GIMBAL_COMMANDS or not command.is_stop_of_flight:

@@ -137,7 +137,7 @@ class OrbitService(Service, PlainTask):
         """
         vehicle, circle = self.host.vehicle, self._described(command)
         async with vehicle.control.acquire(self, by=command.right, condition=lambda: self._way(circle)) as grant:
-            start, is_away = self._way(circle)
+            start, is_away = grant.found
             orbit = _Orbit(Lap(self._held_back(circle)), vehicle.cruise_speed)
             if is_away:
                 heading = heading_at(orbit.lap.circle, _bearing(circle.centre, start))

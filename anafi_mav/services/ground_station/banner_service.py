@@ -7,7 +7,7 @@ firmware from a text that begins like ArduCopter's (conformance D3, F 149).
 from __future__ import annotations
 
 import logging
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 
 from anafi_mav import __version__, texts
 from anafi_mav.clock import NEVER
@@ -24,20 +24,11 @@ from anafi_mav.vehicle.failsafe_settings import warnings_of
 
 logger = logging.getLogger(__name__)
 
-GONE = 30.0
-"""s of silence after which a client counts as a new one, for example when restarted."""
-
 GREET_AFTER = 1.5
 """s from a client's first message to its banner.
 
 QGroundControl creates its vehicle on the first heartbeat, and shows texts only after that.
 """
-
-MAX_CLIENTS = 64
-"""Clients that are remembered; there are a handful."""
-
-_NO_CLIENTS = (dialect.MAV_TYPE_CAMERA, dialect.MAV_TYPE_GIMBAL, dialect.MAV_TYPE_ADSB)
-
 
 PILOT_IN_CONTROL = (
     texts.SKYCONTROLLER_IN_CONTROL,
@@ -63,12 +54,8 @@ class BannerService(Service):
     A station that has just found a vehicle does not show texts yet.
     """
 
-    hears_observers = True
-
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._heard: dict[Hashable, tuple[float, Channel]] = {}
-        """Client -> when its last message arrived, and where."""
         self._due: dict[Channel, float] = {}
         """When a channel is to be greeted."""
 
@@ -79,29 +66,13 @@ class BannerService(Service):
         for text in self._failsafe_warnings():  # the clients get theirs with the banner
             logger.warning("%s: %s", self.host.drone.name, text)
         now = self.host.clock.monotonic()
-        self._due = {channel: now + GREET_AFTER for heard, channel in self._heard.values() if now - heard <= GONE}
+        self._due = dict.fromkeys(self.host.heard_channels(), now + GREET_AFTER)
 
     def channel_closed(self, channel: Channel) -> None:
         self._due.pop(channel, None)
-        self._heard = {client: known for client, known in self._heard.items() if known[1] is not channel}
 
-    def received(self, inbound: Inbound) -> None:
-        self._note(inbound)
-
-    def heartbeat(self, inbound: Inbound) -> None:
-        beat = inbound.message
-        if beat.autopilot != dialect.MAV_AUTOPILOT_INVALID or beat.type in _NO_CLIENTS:
-            return  # another vehicle, or a part of one
-        self._note(inbound)
-
-    def _note(self, inbound: Inbound) -> None:
-        client = inbound.client
-        last = self._heard.pop(client, None)
-        self._heard[client] = inbound.now, inbound.channel
-        if len(self._heard) > MAX_CLIENTS:
-            del self._heard[next(iter(self._heard))]
-        if last is None or inbound.now - last[0] > GONE:
-            self._due.setdefault(inbound.channel, inbound.now + GREET_AFTER)
+    def client_appeared(self, channel: Channel, now: float) -> None:
+        self._due.setdefault(channel, now + GREET_AFTER)
 
     def tick(self, now: float) -> float:
         if not self._due:

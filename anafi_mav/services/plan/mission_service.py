@@ -186,7 +186,7 @@ class MissionService(Service):
 
         self.host.send_by_flavour(changed)
         current = vehicle.mission.machine.progress.current
-        if vehicle.mode is FlightMode.MISSION and current != self._sent_item:
+        if current != self._sent_item and vehicle.mode is FlightMode.MISSION:
             self.host.send_heartbeat()
         self._sent_item = current
 

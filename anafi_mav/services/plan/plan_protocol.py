@@ -52,30 +52,31 @@ class MissionProtocol:
     def __init__(self, kinds: Iterable[PlanKind]) -> None:
         self.transfers = {kind.mission_type: PlanTransfer(kind) for kind in kinds}
         """By MAV_MISSION_TYPE."""
-        self._waiting: deque[tuple[Any, Peer]] = deque()
+        self._waiting: deque[tuple[Any, int, Peer]] = deque()
 
     def receive(self, message: Any, peer: Peer, now: float) -> list[Effect]:
         """A message of `MESSAGES` from a client."""
-        if message.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_ACK:  # it gives up what it has asked for
+        id = message.get_msgId()
+        if id == dialect.MAVLINK_MSG_ID_MISSION_ACK:  # it gives up what it has asked for
             self._waiting = deque(
-                (other, who)
-                for other, who in self._waiting
+                (other, its_id, who)
+                for other, its_id, who in self._waiting
                 if (other.mission_type, who.client) != (message.mission_type, peer.client)
             )
-        if message.get_msgId() not in _WHOLE:
-            return self._handle(message, peer, now)
+        if id not in _WHOLE:
+            return self._handle(message, id, peer, now)
         for kind, transfer in self.transfers.items():
             if kind != message.mission_type:
                 transfer.gone_on(peer)
         if not self._waiting and not self._storing(message.mission_type):
-            return self._handle(message, peer, now)
+            return self._handle(message, id, peer, now)
         if len(self._waiting) >= MAX_WAITING:
             return [_ack(peer, dialect.MAV_MISSION_ERROR, message.mission_type)]
-        self._waiting.append((message, peer))
+        self._waiting.append((message, id, peer))
         return []
 
-    def _handle(self, message: Any, peer: Peer, now: float) -> list[Effect]:
-        id, kind = message.get_msgId(), message.mission_type
+    def _handle(self, message: Any, id: int, peer: Peer, now: float) -> list[Effect]:
+        kind = message.mission_type
         if kind == ALL and id == dialect.MAVLINK_MSG_ID_MISSION_CLEAR_ALL:
             return self._clear_all(peer, now)
         transfer = self.transfers.get(kind)
@@ -135,7 +136,7 @@ class MissionProtocol:
 
     def leave(self, gone: Callable[[Hashable], bool]) -> None:
         """Some clients' channel is gone; whatever they transferred ends."""
-        self._waiting = deque((message, peer) for message, peer in self._waiting if not gone(peer.client))
+        self._waiting = deque(waiting for waiting in self._waiting if not gone(waiting[-1].client))
         for transfer in self.transfers.values():
             transfer.leave(gone)
 

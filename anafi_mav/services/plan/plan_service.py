@@ -25,13 +25,14 @@ from anafi_mav.services.memory import NOT_KEPT
 from anafi_mav.services.plan import plan_files
 from anafi_mav.services.plan.fence_kind import FenceKind, summary
 from anafi_mav.services.plan.mission_kind import MissionKind
+from anafi_mav.services.plan.mission_service import RECORD
 from anafi_mav.services.plan.plan_protocol import MESSAGES, MissionProtocol
 from anafi_mav.services.plan.plan_transfer import Changed, Commit, Effect, Peer, PlanKind, Reply, Say
 from anafi_mav.services.plan.rally_kind import RallyKind
 from anafi_mav.services.service import Host, MessageHandler, Service
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, PlanFault, PlanItem
+from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, PlanFault, PlanItem, opaque_id
 from anafi_mav.vehicle.fence.rally import Return
 from anafi_mav.vehicle.operator_control import Need
 
@@ -122,11 +123,12 @@ class PlanService(Service):
         return True
 
     def _peer(self, inbound: Inbound) -> _ChannelPeer:
-        operators = self.host.vehicle.operators
-        is_refused = operators.objection(inbound.sysid, Need.COMMAND) is not None
+        operators, system = self.host.vehicle.operators, inbound.sysid
+        is_other = operators.operator not in (0, system)
+        is_refused = is_other and operators.objection(system, Need.COMMAND) is not None
         return _ChannelPeer(
             inbound.client,
-            inbound.sysid,
+            system,
             inbound.compid,
             flavour_of(inbound.channel),
             channel=inbound.channel,
@@ -166,10 +168,10 @@ class PlanService(Service):
 
     def _receive(self, inbound: Inbound) -> None:
         message = inbound.message
-        if message.get_msgId() in _ITEMS and (handler := self._item_commands.get(message.current)) is not None:
+        if inbound.id in _ITEMS and (handler := self._item_commands.get(message.current)) is not None:
             handler(inbound)
             return
-        self._perform(self._protocol.receive(message, self._peer(inbound), self.host.clock.monotonic()))
+        self._perform(self._protocol.receive(message, self._peer(inbound), inbound.now))
 
     def _perform(self, effects: Sequence[Effect]) -> None:
         for effect in effects:
@@ -206,15 +208,22 @@ class PlanService(Service):
                 self.host.warn_throttled(texts.REFUSED.fill(what=what, reason=fault.reason))
             self._perform(self._protocol.stored(commit, self.host.clock.monotonic(), fault))
 
+    @property
+    def _flown_identity(self) -> int:
+        """Identity of the mission in force."""
+        return self.host.vehicle.mission.machine.mission.identity
+
     async def _put(self, commit: Commit) -> PlanFault | None:
         """Keep plans; what is wrong with the mission, if anything is."""
-        mission = commit.plans.get(self._mission.mission_type)
+        settings, mission = self.host.memory.settings, commit.plans.get(self._mission.mission_type)
         if mission:
             fault = await asyncio.to_thread(self._mission.examine, mission, commit.peer.flavour)
             if fault is not None:
                 return fault
         for kind, items in commit.plans.items():
             self.host.memory.put(kind, items)
+        if mission is not None and RECORD in settings and opaque_id(mission) != self._flown_identity:
+            del settings[RECORD]  # of the mission that this one replaces: one file is written, not two
         problem = await self.host.memory.save()
         if problem is not None:
             logger.warning("%s: %s", self.host.drone.name, problem)
@@ -256,19 +265,17 @@ class PlanService(Service):
     def _changed(self, kind: int) -> None:
         """Put an uploaded plan in force and notify all clients."""
         mission = self.host.vehicle.mission
-        if (
-            kind == MissionKind.mission_type
-            and self._protocol.transfers[kind].opaque_id == mission.machine.mission.identity
-        ):
+        if kind == MissionKind.mission_type and self._protocol.transfers[kind].opaque_id == self._flown_identity:
             mission.taken_again()
         self._take(kind)
-        mission.outlet.mission_changed()
+        if kind != MissionKind.mission_type:
+            mission.outlet.mission_changed()
 
     def _take(self, kind: int) -> None:
         vehicle, transfer = self.host.vehicle, self._protocol.transfers[kind]
         items, identity = transfer.items, transfer.opaque_id
         if kind == MissionKind.mission_type:
-            if identity != vehicle.mission.machine.mission.identity:
+            if identity != self._flown_identity:
                 examined = self._mission.examined(items)
                 self.host.text(Severity.INFO, examined.words)
                 vehicle.mission.take(examined.neutral, identity)

@@ -21,7 +21,7 @@ from anafi_mav.mavlink.frames import Packed, pack
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.streams import Streams
 from anafi_mav.services.commands import Command
-from anafi_mav.services.flavours import flavour_of
+from anafi_mav.services.flavours import by_flavour, flavour_of
 from anafi_mav.services.pose import UNKNOWN_POSE, VehiclePose, reported_pose
 from anafi_mav.services.service import Answer, Host, MessageHandler, Query, Request, Service
 from anafi_mav.services.stream import MessageStream, Times
@@ -314,23 +314,27 @@ class MessageService(Service):
         stream = self._table[id]
         try:
             if stream.flavoured:
-                self._flush()
-                vehicle = self.host.vehicle
-                self.host.send_by_flavour(lambda flavour: stream.build(vehicle, times.for_flavour(flavour)), to)
-                return True
-            if (message := stream.build(self.host.vehicle, times)) is None:
-                return False
-            packed = pack(message)
-            if to is not self._gathered_for:
-                self._flush()
-                self._gathered_for = to
-            self._gathered.append(packed)
+                for flavour, channels in by_flavour(to):
+                    self._gather(stream.build(self.host.vehicle, times.for_flavour(flavour)), channels)
+            else:
+                return self._gather(stream.build(self.host.vehicle, times), to)
         except Exception as error:
             # An unforeseen value of the drone's. The other messages, and the heartbeat, are sent without it.
             now = self.host.clock.monotonic()
             if now - self._failed.get(id, -math.inf) >= LOG_EVERY:
                 self._failed[id] = now
                 logger.error("%s: message %d cannot be made: %r", self.host.drone.name, id, error)
+        return True
+
+    def _gather(self, message: dialect.MAVLink_message | None, to: Sequence[Channel]) -> bool:
+        """Have a message sent with the next `_flush`; return False if there is none."""
+        if message is None:
+            return False
+        packed = pack(message)
+        if to is not self._gathered_for:
+            self._flush()
+            self._gathered_for = to
+        self._gathered.append(packed)
         return True
 
     def _flush(self) -> None:

@@ -93,9 +93,11 @@ what the drone does by itself is notified by `Vehicle`, once it has noted all of
 class Grant:
     """A request whose predecessors have ended."""
 
-    def __init__(self, control: Control, attempt: Attempt[FlightTask]) -> None:
+    def __init__(self, control: Control, attempt: Attempt[FlightTask], found: Any) -> None:
         self._control = control
         self.attempt = attempt
+        self.found = found
+        """Result of the request's condition at the last check: what it flies is decided by that."""
 
     def begin(self, task: FlightTask | None = None, *, pauses: bool | None = None) -> None:
         """Make the task active: its mode is shown from now on. Later calls do nothing.
@@ -237,8 +239,8 @@ class Control:
         the drone flies it on. A newer request cancels the action, and is not disturbed by either.
 
         `below`: the hovering mode after the task; None: Hold. `pauses`: streams do not leave it. `rules`: for this
-        request, instead of the task's own. `condition`: what the request needs beyond them. A caller checks nothing
-        before or after: it would be true on one side of the wait only.
+        request, instead of the task's own. `condition`: what the request needs beyond them; what it returns is
+        `Grant.found`. A caller checks nothing before or after: it would be true on one side of the wait only.
 
         Raises `Refused` by the policy, for a need or a condition that is not met, while the motors are being cut, and
         when the drone rejects what is sent to it.
@@ -246,33 +248,35 @@ class Control:
         own_rules, rules = rules, rules or task.rules
         piloting = self._aircraft.drone.piloting
 
-        def check() -> None:
+        def check() -> Any:
             self.check(task, by, own_rules)  # those of some tasks depend on the drone's state
-            condition()
+            return condition()
 
-        check()
+        found = check()
         before, number = self.active, self.epoch + 1
         own = task if rules.lasts and not rules.is_hover else None
         hover = task if rules.is_hover else below
         attempt = Attempt(own, number, hover, rules.keeps_below, pauses, rules.is_urgent)
-        grant = Grant(self, attempt)
+        grant: Grant | None = None
         try:
             has_waited = await self._release(attempt, rules.wait)
             self.handle(Event.RELEASED, Input(attempt))
             if rules.start is Preparation.STOP:
                 await piloting.stop()
             if has_waited or rules.start is Preparation.STOP:  # else no event was received since the first check
-                check()
+                found = check()
             # A return that is commanded and not reported. Raises when it is the drone's own.
             if Needs.NO_DESCENT in rules.needs and await piloting.cancel_return_home():
-                check()
+                found = check()
             if rules.start is Preparation.HOVER:
                 piloting.hover()
+            grant = Grant(self, attempt, found)
             yield grant
             grant.begin()
         except BaseException as error:
             self.handle(Event.FAIL, Input(attempt))
-            self.handle(Event.FINISH, Input(task=grant.attempt.task, number=number))
+            if grant is not None:
+                self.handle(Event.FINISH, Input(task=grant.attempt.task, number=number))
             if before is not None and self.is_free and before.is_flown(piloting):
                 self.adopt(before, keeps_below=True)
             if isinstance(error, CommandRejected):

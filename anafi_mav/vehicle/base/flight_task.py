@@ -240,6 +240,11 @@ class FlightActions:
         return None if task is None else self._tasks.get(task)
 
     @property
+    def client(self) -> Hashable:
+        """Client of the action that calls; None: the gateway's, or none."""
+        return None if self.current is None else self.current.client
+
+    @property
     def is_idle(self) -> bool:
         """True when no action runs, or has arrived, that may fly the drone."""
         return not any(action.flies for action in self._tasks.values())
@@ -262,19 +267,34 @@ class FlightActions:
         """Call this each time an action replaces the others, with its client; None: the gateway's."""
         self._replaced.append(call)
 
+    def count(self, belongs: Callable[[FlightAction], bool]) -> int:
+        """Return the number of actions for which `belongs` returns True."""
+        return sum(map(belongs, self._tasks.values()))
+
     def end_older(self) -> list[asyncio.Task[None]]:
-        """Cancel all actions that are older than the calling one; all of them outside of an action."""
+        """Cancel the actions that may fly and are older than the calling one.
+
+        Outside of an action these are all.
+        """
+        older = self.cancel_older(lambda action: action.flies)
+        for call in self._replaced:
+            call(self.client)
+        return older
+
+    def cancel_older(self, belongs: Callable[[FlightAction], bool]) -> list[asyncio.Task[None]]:
+        """Cancel the actions that belong to a group and are older than the calling one.
+
+        A newer action than the calling one continues: it will replace this one.
+        """
         task, current = asyncio.current_task(), self.current
         before = itertools.takewhile(lambda other: other is not task, self._tasks)
-        older = [other for other in before if self._tasks[other].flies]
+        older = [other for other in before if belongs(self._tasks[other])]
         for other in older:
             if current is not None:
                 self._tasks[other].replaced_by = current.client
             if current is not None and current.is_order:
                 self._tasks[other].replaced_by_order = True
             other.cancel()
-        for call in self._replaced:
-            call(None if current is None else current.client)
         return older
 
     def link_down(self) -> None:

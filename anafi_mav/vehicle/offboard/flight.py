@@ -44,7 +44,7 @@ from anafi_mav.vehicle.base.velocity_loop import (
 from anafi_mav.vehicle.offboard.goals import Goal, resolve
 from anafi_mav.vehicle.offboard.moves import OffboardMoves
 from anafi_mav.vehicle.offboard.setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint, Setpoint
-from anafi_mav.vehicle.offboard.stream import COUNTS, STREAMS, Event, OffboardStream, State, Steering, lasts
+from anafi_mav.vehicle.offboard.stream import COUNTS, FLYING, STREAMS, Event, OffboardStream, State, Steering, lasts
 from anafi_mav.vehicle.offboard.takeoff import Launcher, climbs
 
 WARN_AGAIN = 1.0
@@ -200,8 +200,9 @@ class OffboardFlight(PlainTask):
         self._watch()  # the pilot's newest setpoint may last for less time than the one before
         if self._stands:
             return self._on_ground(sender, setpoint, now, guided=guided)
-        if self.engaged and sender == stream.pilot:
-            if stream.state is State.SINGLE and not stream.received[sender].is_single:
+        engagement = stream.engagement
+        if engagement is not None and engagement.state in FLYING and sender == engagement.pilot:
+            if engagement.state is State.SINGLE and not stream.received[sender].is_single:
                 self._stream = stream.after(Event.ENGAGE)
                 self._watch()
                 self._vehicle.changed()
@@ -354,7 +355,7 @@ class OffboardFlight(PlainTask):
             control.succeed(self)
             return
         async with control.acquire(self, by=by, condition=lambda: self._pilot_for(client)) as grant:
-            self._engage(Event.ENGAGE, self._pilot_for(client), client)
+            self._engage(Event.ENGAGE, grant.found, client)
             grant.begin()
             self._begin()
 
@@ -534,7 +535,7 @@ class OffboardFlight(PlainTask):
     def _fly(self, now: float) -> OperatorText | None:
         """Fly the pilot's newest setpoint at this moment; return why it is not flown, or None."""
         vehicle, stream = self._vehicle, self._stream
-        setpoint, steering, limits = stream.setpoint, stream.steering, vehicle.drone.piloting.limits
+        setpoint, steering, limits = stream.setpoint, stream.steering, vehicle.drone.piloting.state.limits
         if setpoint is None or steering is None or limits is None or not vehicle.in_air:
             return None
         if not vehicle.control.keeps(self):

@@ -276,8 +276,9 @@ class OffboardStream(Struct, frozen=True):
     def deadline(self) -> float | None:
         """When the pilot's silence will have lasted too long; None without a stream."""
         engagement = self.engagement
-        silenced = engagement is not None and engagement.state in SILENCED
-        return self.received[self.pilot].over if silenced else None
+        if engagement is None or engagement.state not in SILENCED:
+            return None
+        return self.received[engagement.pilot].over
 
     @property
     def climbs_since(self) -> float | None:
@@ -303,12 +304,13 @@ class OffboardStream(Struct, frozen=True):
         follows = before is not None and now - before.at < TOGETHER
         ended, since = self.fell_silent or (None, -math.inf)
         is_late = ended == sender and now < since + LATE_AFTER_STREAM
-        newest = Received(setpoint, now, lasts, is_position(setpoint) and not (follows or is_late))
+        newest = Received(setpoint, now, lasts, not (follows or is_late) and is_position(setpoint))
         return replace(self, received={**received, sender: newest})
 
     def objection(self, sender: Hashable) -> OperatorText | None:
         """Return why the setpoints of a client do not count at present; None: they do."""
-        if self.state in STREAMS and sender != self.pilot:
+        engagement = self.engagement
+        if engagement is not None and engagement.state in STREAMS and sender != engagement.pilot:
             return texts.OTHER_PROGRAM
         return None if sender in self.received else texts.TOO_MANY_PROGRAMS
 

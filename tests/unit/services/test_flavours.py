@@ -7,7 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import anafi_mav
-from anafi_mav.services.flavours import FLAVOURS
+from anafi_mav.endpoint_options import EndpointOptions
+from anafi_mav.mavlink.channel import Channel
+from anafi_mav.services.flavours import ARDUPILOT, FLAVOURS, PX4, by_flavour
 from anafi_mav.services.parameter.parameter_service import NAME_TABLES, parameters_of
 from anafi_mav.vehicle.base.modes import FlightMode
 
@@ -51,3 +53,20 @@ def test_flavour_has_the_names_of_its_record() -> None:
         assert flavour.parameter_names in NAME_TABLES
         assert parameters_of(flavour)
         assert set(flavour.modes.values()) <= set(flavour.mode_names)
+
+
+def channel(flavour: str | None) -> Channel:
+    return Channel("a", lambda raw: None, options=EndpointOptions(flavour=flavour))
+
+
+def test_channels_are_grouped_by_their_flavour() -> None:
+    one, other, third = channel(None), channel(ARDUPILOT.name), channel(PX4.name)
+    assert by_flavour([one, other, third]) == [(PX4, [one, third]), (ARDUPILOT, [other])]
+    assert by_flavour([]) == []
+
+
+def test_channels_of_one_flavour_stay_one_list() -> None:
+    channels = [channel(None), channel(PX4.name)]
+    ((flavour, same),) = by_flavour(channels)
+    assert flavour is PX4
+    assert same is channels  # messages for one list leave together

@@ -91,6 +91,15 @@ def test_values_of_another_camera_or_gimbal_have_another_layout(other: list[Mess
     assert found[0].layout is not found[1].layout
 
 
+def test_values_do_not_keep_what_the_socket_has_read() -> None:
+    known = KnownFrames(3)
+    datagram = encode(3, telemetry(1.0))
+    read(3, known, datagram)
+    values = read(3, known, datagram)
+    assert values is not None
+    assert len(values.data) < len(datagram)
+
+
 @pytest.mark.parametrize(
     "messages",
     [

@@ -88,7 +88,7 @@ async def system() -> System:
 
 def inbound(message: Any, flavour: str = "px4") -> Inbound:
     channel = Channel("test", lambda data: None, options=EndpointOptions(flavour=flavour))
-    return Inbound(message, channel, 250, 190, 0.0)
+    return Inbound(message, message.get_msgId(), channel, 250, 190, 0.0)
 
 
 def needed(system: System, message: Any, flavour: str = "px4", component: int = 0) -> Need:

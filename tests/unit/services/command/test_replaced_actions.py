@@ -80,13 +80,12 @@ async def test_action_ends_older_ones_of_other_components_alone() -> None:
     newer.cancel()
 
 
-def test_actions_that_run_in_order_are_bounded_by_group() -> None:
-    running = RunningActions()
+async def test_actions_that_run_in_order_are_bounded_by_group() -> None:
+    running, never = RunningActions(), asyncio.get_running_loop().create_future()
     for group in (ActionGroup.CAMERA, ActionGroup.FLIGHT):
-        for number in range(MAX_WAITING):
+        for _ in range(MAX_WAITING):
             assert not running.is_full(group)
-            task: Any = (group, number)
-            running.tasks[task] = RunningAction("client", None, group=group)
+            running.actions.add(asyncio.ensure_future(asyncio.wait([never])), RunningAction("client", group=group))
     assert running.is_full(ActionGroup.CAMERA)
     assert not running.is_full(ActionGroup.PHOTO)
     assert not running.is_full(ActionGroup.FLIGHT)  # newer flight commands replace older ones

@@ -74,7 +74,7 @@ class Bench:
 
     def post(self, secret: bytes, *, target: int = 2, timestamp: int = 0, is_permitted: bool = True) -> None:
         message = dialect.MAVLink_setup_signing_message(target, 1, list(secret), timestamp)
-        self.setup.receive(Inbound(message, self.channels[0], 255, 190, 0.0, is_permitted))
+        self.setup.receive(Inbound(message, message.get_msgId(), self.channels[0], 255, 190, 0.0, is_permitted))
 
     async def send(self, secret: bytes, *, target: int = 2, timestamp: int = 0, is_permitted: bool = True) -> None:
         """Send it, and wait for its answer."""
