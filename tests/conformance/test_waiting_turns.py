@@ -74,9 +74,9 @@ async def test_turn_that_waits_ends_with_the_link(monkeypatch: pytest.MonkeyPatc
     async with world(speed=1.0) as w:
         await w.client.wait("SYS_STATUS")
         turns.hold()
-        await asyncio.sleep(1.5)
+        await w.client.silence("SYS_STATUS", 1.5)  # a turn waits
         w.drone.faults.mute = True
-        await asyncio.sleep(4.0)
+        await w.client.silence("HEARTBEAT", 2.0)  # the link is lost
         assert turns.release() == 0
         w.drone.faults.mute = False
         mark = w.client.mark()

@@ -300,7 +300,7 @@ async def test_timer_that_is_too_early_reads_no_socket() -> None:
     heard = Heard()
     async with flying() as (drone, server):
         session = await join(server, heard, ping_after=0.5)
-        await asyncio.sleep(0.3)
+        await asyncio.sleep(0.3)  # less than until the ping, which what is heard now puts off
         drone.sessions[0].send(ardrone3.AltitudeChanged(1.0))
         assert await heard.next() == ardrone3.AltitudeChanged(1.0)
         never_read(session)
