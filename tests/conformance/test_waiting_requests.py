@@ -34,6 +34,7 @@ from support.setpoints import allow_speed, heard, local, motion, streaming
 from support.world import HOME, World, world
 
 from anafi_mav.arsdk.messages import ardrone3, rth
+from anafi_mav.sim.skycontroller import Skycontroller
 
 START, ORBIT = dialect.MAV_CMD_MISSION_START, dialect.MAV_CMD_DO_ORBIT
 PAUSE = dialect.MAV_CMD_DO_PAUSE_CONTINUE
@@ -158,14 +159,19 @@ async def test_target_is_refused_when_a_fence_that_excludes_it_is_stored_in_the_
 # The pilot at the Skycontroller.
 
 
+async def flying_beside_pilot(w: World) -> Skycontroller:
+    """Fly north under a goto; return the pilot's Skycontroller."""
+    await w.take_off(UP)
+    assert await goto(w, 90.0, UP) == ACCEPTED
+    await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 2.0, 20.0)
+    assert w.drone.skycontroller is not None
+    return w.drone.skycontroller
+
+
 async def test_goto_is_refused_when_the_pilot_moves_a_stick_in_its_wait() -> None:
     """The stick is newer than the command, also when it is centred again by the time the wait is over."""
     async with world(speed=1.0, skycontroller=3) as w:
-        await w.take_off(UP)
-        assert await goto(w, 90.0, UP) == ACCEPTED
-        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 2.0, 20.0)
-        pilot = w.drone.skycontroller
-        assert pilot is not None
+        pilot = await flying_beside_pilot(w)
         await home_being_undone(w)
         mark, began = w.client.mark(), now()
         w.client.send_command(GOTO, -1, 1, 0, NAN, frame=6, x=HOME[0] - 0.0005, y=HOME[1], z=UP)
@@ -197,11 +203,7 @@ async def test_hold_leaves_a_return_that_the_pilot_begins_in_its_wait() -> None:
 async def test_change_of_altitude_is_refused_when_the_pilot_moves_a_stick_before_it_asks_for_control() -> None:
     """It waits first for the move that means the same; the stick is newer than its message all the same."""
     async with world(speed=1.0, skycontroller=3) as w:
-        await w.take_off(UP)
-        assert await goto(w, 90.0, UP) == ACCEPTED
-        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 2.0, 20.0)
-        pilot = w.drone.skycontroller
-        assert pilot is not None
+        pilot = await flying_beside_pilot(w)
         w.drone.faults.unreported = frozenset({ardrone3.MoveToChanged.NAME})
         client, mark = await w.connect(sysid=250), w.client.mark()
         w.client.send_command(GOTO, -1, 1, 0, NAN, frame=6, x=HOME[0] - 0.0005, y=HOME[1], z=UP)

@@ -66,7 +66,7 @@ def test_run_and_sim_import_neither_numpy_nor_rich() -> None:
     assert done.stdout == "set()\n"
 
 
-@pytest.mark.skipif(os.name != "posix", reason="a shell closes the streams")
+@pytest.mark.skipif(os.name != "posix", reason="closing a standard stream (`>&-`) needs a POSIX shell")
 @pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
 def test_program_with_closed_standard_streams_does_its_work(closed: str, tmp_path: Path) -> None:
     words = f'exec "$0" -m anafi_mav keygen field --hex --state "$1" {closed}'
@@ -77,7 +77,7 @@ def test_program_with_closed_standard_streams_does_its_work(closed: str, tmp_pat
     assert (tmp_path / "keys" / "field.key").exists() is not is_blind
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no such device")
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full, which only Linux has")
 def test_output_on_a_full_disk_is_reported_and_an_error(tmp_path: Path) -> None:
     words = [sys.executable, "-m", "anafi_mav", "keygen", "field", "--state", str(tmp_path)]
     assert subprocess.run(words, stdout=subprocess.DEVNULL).returncode == 0

@@ -300,14 +300,14 @@ async def test_timer_that_is_too_early_reads_no_socket() -> None:
     heard = Heard()
     async with flying() as (drone, server):
         session = await join(server, heard, ping_after=0.5)
-        await asyncio.sleep(0.3)  # less than until the ping, which what is heard now puts off
-        drone.sessions[0].send(ardrone3.AltitudeChanged(1.0))
+        loop, send = asyncio.get_running_loop(), drone.sessions[0].send
+        loop.call_later(0.3, send, ardrone3.AltitudeChanged(1.0))
         assert await heard.next() == ardrone3.AltitudeChanged(1.0)
+        began = loop.time()
         never_read(session)
-        drone.sessions[0].send(ardrone3.AltitudeChanged(2.0))
-        await asyncio.sleep(0.3)  # beyond the timer, and not beyond the next ping
-        assert heard.queue.empty()
+        send(ardrone3.AltitudeChanged(2.0))
         assert await heard.next() == ardrone3.AltitudeChanged(2.0)  # read before the ping
+        assert loop.time() - began >= 0.49  # the first timer is due after 0.2 s, the ping after 0.5 s
         await session.close()
 
 
