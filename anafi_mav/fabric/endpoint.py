@@ -254,10 +254,10 @@ class FabricEndpoint(Endpoint):
         for change in self.claims.decide(now, is_listed=can_hold, can_claim=self._systems.is_on_ground):
             sysid, token = change.sysid, keys.drone_token(change.sysid, self._connection.session_text)
             if change.step is ClaimStep.HOLD:
-                session.declare_token(token)
                 session.subscribe(keys.up(sysid, "**"))
                 session.answer_queries(keys.state(sysid))
                 session.publish_on(keys.down(sysid))
+                session.declare_token(token)  # last: stations publish to `up` as soon as they see it
                 continue
             also = ", too" if change.step is ClaimStep.CLASH else ""
             logger.critical("%s: system %d is held by gateway %s%s", self.url, sysid, change.holder, also)

@@ -66,8 +66,8 @@ class FabricGround:
         """
         self.counters: Counter[str] = Counter()
         """unknown_keys, refused_keys (of SETUP_SIGNING without a signature), no_system (frames for systems that are not
-        on the fabric), stale (frames that waited while the host stalled, and are published with that age), lost_frames
-        (from gateways to stations), and those of the queues."""
+        on the fabric, as far as it has reported), stale (frames that waited while the host stalled, and are published
+        with that age), lost_frames (from gateways to stations), and those of the queues."""
         self._clock = clock
         self._on_systems = on_systems
         self._url = fabric
@@ -92,11 +92,21 @@ class FabricGround:
         """Time of the last warning about lost frames."""
         self._holders: defaultdict[int, set[str]] = defaultdict(set)
         """Gateways that hold a system id: one, but for a moment."""
+        self._shown: set[int] = set()
+        """Systems whose frames have reached stations: frames may arrive before the token of their system.
+
+        zenoh reports tokens and samples in a thread each, and over `udp` a token may be lost for seconds. A station
+        that is shown a system commands it: such a command must not be dropped."""
 
     @property
     def sysids(self) -> list[int]:
         """The systems on the fabric, sorted."""
         return sorted(sysid for sysid, holders in self._holders.items() if holders)
+
+    @property
+    def _reachable(self) -> set[int]:
+        """The systems to which stations' frames are published."""
+        return self._shown.union(self.sysids)
 
     async def start(self) -> None:
         """Open everything. Raises `ConfigError`; nothing is then left open."""
@@ -175,6 +185,7 @@ class FabricGround:
         waited = self._stalls.waited
         if waited:
             self.counters["stale"] += len(frames)
+        reachable = self._reachable
         by_system: defaultdict[int, list[bytes]] = defaultdict(list)
         for received in frames:
             if received.id == dialect.MAVLINK_MSG_ID_SETUP_SIGNING and not received.raw[2] & SIGNED:
@@ -183,7 +194,7 @@ class FabricGround:
                 logger.warning("%s: key of SETUP_SIGNING not published: use anafi-mav keygen", channel.name)
                 continue
             target = targets(received.message)[0]
-            systems = self.sysids if target == 0 else [target] if self._holders.get(target) else []
+            systems = reachable if target == 0 else reachable & {target}
             if not systems:
                 self.counters["no_system"] += 1
             for sysid in systems:
@@ -224,6 +235,8 @@ class FabricGround:
             self._holders[key.sysid].add(key.owner)
         else:
             self._holders[key.sysid].discard(key.owner)
+            if not self._holders[key.sysid]:
+                self._shown.discard(key.sysid)
             self._forget_frames()
         if self.sysids != before:
             self._on_systems(self.sysids)
@@ -244,6 +257,7 @@ class FabricGround:
                 pong_key = keys.pong(key.sysid, station.name)
                 self._connection.publish(pong_key, pong.encode(), is_urgent=True)
         elif key.kind is KeyKind.DOWN:
+            self._shown.add(key.sysid)
             for raw in split_frames(sample.payload):
                 self._count_lost(station.received.missing(raw))
                 station.channel.forward(raw, is_answer=True)

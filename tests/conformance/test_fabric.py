@@ -424,6 +424,45 @@ async def test_frames_that_do_not_reach_a_station_are_counted() -> None:
         await fabric.close()
 
 
+async def test_command_to_a_system_whose_token_is_late_is_published() -> None:
+    """zenoh reports tokens and samples in a thread each: a station may see a system before its token is known."""
+    beat = pack(own.MAVLink_heartbeat_message(2, 12, 81, 0, 4, 3))
+    loop, commands = asyncio.get_running_loop(), asyncio.Queue[int]()
+
+    def publish(sample: zenoh.Sample) -> None:
+        for message in own.MAVLink(None).parse_buffer(sample.payload.to_bytes()) or ():
+            if message.get_msgId() == own.MAVLINK_MSG_ID_COMMAND_LONG:
+                loop.call_soon_threadsafe(commands.put_nowait, message.command)
+
+    async with router() as node:
+        fabric = FabricGround(parse_endpoint(node.url), [parse_endpoint("udpin://127.0.0.1:0")], SystemClock())
+        await fabric.start()
+        station = FabricStation()
+        try:
+            with await asyncio.to_thread(opened, node) as session:
+                tokens = session.liveliness().declare_subscriber("anafi/station/v1/*", history=True)
+                session.declare_subscriber("anafi/1/up/*", publish)
+                joining = asyncio.ensure_future(station.join(fabric.endpoints[0].local_port or 0))
+                name = str((await asyncio.to_thread(tokens.recv)).key_expr).rpartition("/")[2]
+                session.put(f"anafi/1/down/{name}", frame(beat, 0, 1, 1))
+                await joining
+                station.send_command(LAND)
+                assert await asyncio.wait_for(commands.get(), 10.0) == LAND
+                # The end of a token ends it: what is sent then reaches no system, as before the first frame.
+                with session.liveliness().declare_token(f"anafi/1/drone/v1/{7:016x}"):
+                    while fabric.sysids != [1]:
+                        await watched(0.05)
+                while fabric.sysids:
+                    await watched(0.05)
+                before = fabric.all_counters()["no_system"]
+                station.send_command(LAND)
+                while fabric.all_counters()["no_system"] == before:
+                    await watched(0.05)
+        finally:
+            await station.close()
+            await fabric.close()
+
+
 async def test_oversized_samples_are_counted_and_disturb_no_station() -> None:
     async with router() as node, world(endpoints=(node.url,)) as w:
         name = f"{7:016x}-1"
