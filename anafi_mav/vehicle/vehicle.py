@@ -38,6 +38,7 @@ from anafi_mav.errors import CommandRejected
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.aborted_return import AbortedReturn
 from anafi_mav.vehicle.base.aircraft import Aircraft, CommandedSpeeds
+from anafi_mav.vehicle.base.bounds import check_height
 from anafi_mav.vehicle.base.control_machine import DroneAct, State
 from anafi_mav.vehicle.base.flight_task import LAND, MOTOR_CUT, FlightTask, Hover, TaskRules, end_of_descent
 from anafi_mav.vehicle.base.flying import AIRBORNE, LANDING, ON_GROUND, TAKING_OFF
@@ -481,6 +482,8 @@ class Vehicle(Aircraft):
             return
 
         def condition() -> None:
+            if ato is not None:
+                check_height(self, ato)
             if self.on_ground:
                 raise Refused(texts.LANDING, texts.ALREADY_LANDED, form=texts.NOT_ABORTED)
 
