@@ -19,7 +19,7 @@ from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import PilotingCommand
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
-from anafi_mav.vehicle.base.flight_task import STOP_WAIT, PlainTask, TaskRules
+from anafi_mav.vehicle.base.flight_task import PlainTask, stop_rules
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.right import Extent, system_of
 from anafi_mav.vehicle.base.severity import Severity
@@ -48,14 +48,7 @@ class Sticks:
 class ManualFlight(PlainTask):
     """Flies one vehicle by the sticks of ground stations: the hovering mode Position."""
 
-    rules = TaskRules(
-        texts.Subject(FlightMode.POSITION.value),
-        wait=STOP_WAIT,
-        is_hover=True,
-        ends_landing=Extent.ALL,
-        ends_return=Extent.ALL,
-        is_flight=False,
-    )
+    rules = stop_rules(texts.Subject(FlightMode.POSITION.value), Extent.ALL, Extent.ALL)
     mode = FlightMode.POSITION
 
     def __init__(

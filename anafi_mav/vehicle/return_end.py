@@ -37,6 +37,7 @@ from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.flight_task import PlainTask, TaskRules
 from anafi_mav.vehicle.base.flying import LANDING
 from anafi_mav.vehicle.base.geo_point import GeoPoint
+from anafi_mav.vehicle.base.preparation import Preparation
 from anafi_mav.vehicle.base.right import Extent
 from anafi_mav.vehicle.base.severity import Severity
 
@@ -123,6 +124,7 @@ class ReturnEnd(PlainTask):
 
     rules = TaskRules(
         texts.RETURN,
+        start=Preparation.END_LANDING,
         ends_landing=Extent.COMMANDED,
         ends_return=Extent.COMMANDED,
         follows=True,

@@ -38,12 +38,14 @@ from anafi_mav.errors import CommandRejected
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.aborted_return import AbortedReturn
 from anafi_mav.vehicle.base.aircraft import Aircraft, CommandedSpeeds
+from anafi_mav.vehicle.base.bounds import check_height
 from anafi_mav.vehicle.base.control_machine import DroneAct, State
-from anafi_mav.vehicle.base.flight_task import LAND, MOTOR_CUT, FlightTask, Hover
+from anafi_mav.vehicle.base.flight_task import LAND, MOTOR_CUT, FlightTask, Hover, TaskRules, end_of_descent
 from anafi_mav.vehicle.base.flying import AIRBORNE, LANDING, ON_GROUND, TAKING_OFF
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.height import ESTIMATE_ERROR, TakeoffRecord
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.preparation import DescentEnd, Preparation, PreparationStep
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import By, Source, client_of, right_of
 from anafi_mav.vehicle.base.right import Extent, Right, system_of
@@ -369,8 +371,7 @@ class Vehicle(Aircraft):
         """Fly home by the drone's own return. A landing goes on unless `by` may end it."""
         if self.return_end.shown:
             return  # it waits above home or lands there, and would climb and fly home once more
-        async with self.control.acquire(self.return_end, by=by, condition=lambda: self._require_return(by)):
-            await self._end_settled_landing(self.return_end, by)
+        async with self.control.acquire(self.return_end, by=by, condition=self._require_return):
             self._initiators.return_commanded(self._clock.monotonic())
             attempt = self.return_end.command()
             try:
@@ -380,17 +381,15 @@ class Vehicle(Aircraft):
                 raise
         self.return_end.announce(attempt, system_of(client_of(by)))
 
-    def _require_return(self, by: By) -> None:
-        """Raise `Refused` when the drone stands, or lands and `by` may not end that.
+    def _require_return(self) -> None:
+        """Raise `Refused` when the drone stands, or lands and cannot return.
 
         A drone that is held for a launch stands too: no return may wait there.
         """
         if self.on_ground or self.flying_state is FlyingState.USERTAKEOFF:
             raise Refused(texts.RETURN, self.activity)
-        if self.landing:
-            self._require_endable(self.return_end, by)
-            if self.drone.home.state.rth == RthState.UNAVAILABLE:  # the landing would be ended for nothing
-                raise Refused(texts.RETURN, texts.RETURN_UNAVAILABLE)
+        if self.landing and self.drone.home.state.rth == RthState.UNAVAILABLE:  # it would be ended for nothing
+            raise Refused(texts.RETURN, texts.RETURN_UNAVAILABLE)
 
     async def hold(self, mode: FlightMode, by: By, *, chosen: bool = False, pause: bool = False) -> None:
         """Stop and hover. A landing or return goes on, and this is refused, unless `by` may end it.
@@ -401,14 +400,9 @@ class Vehicle(Aircraft):
         pauses = pause or (self.control.paused and mode is self.mode)
         hover = Hover(mode, client_of(by) if chosen else None, self._paused_task if pauses else None)
         task = self.manual if mode is FlightMode.POSITION else hover
-        own = self.returning_by_itself
         rising = self.drone.piloting.about_to_fly
         starts = self.flying_state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF)
-        async with self.control.acquire(
-            task, by=by, pauses=pauses, condition=lambda: self._require_endable(task, by)
-        ) as grant:
-            if not self.on_ground or rising:
-                await self._stop(task, by, own=own)
+        async with self.control.acquire(task, by=by, pauses=pauses) as grant:
             grant.begin(pauses=pauses and (rising or not self.on_ground))
         if rising or starts:
             self.text(Severity.WARNING, texts.MODE_MAY_RISE.fill(mode=mode.value))
@@ -444,9 +438,9 @@ class Vehicle(Aircraft):
         if may_rise or self.flying_state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF):
             await self.takeoff.abort(by)
             return
-        async with control.acquire(hold := Hover(), by=by):
-            if not self.on_ground and not self.descends:
-                await self._stop(hold, by)
+        start = Preparation.AS_IT_IS if self.descends else Preparation.END_DESCENT
+        async with control.acquire(hold := Hover(), by=by, rules=replace(hold.rules, start=start)):
+            pass
 
     @property
     def _paused_task(self) -> FlightTask | None:
@@ -486,10 +480,16 @@ class Vehicle(Aircraft):
         if not self.landing or self.on_ground:
             await self.takeoff.take_off(ato, by)
             return
-        async with self.control.acquire(Hover(), by=by, condition=lambda: self._require_endable(self.takeoff, by)):
-            await self._end_settled_landing(self.takeoff, by, take_off=True)
+
+        def condition() -> None:
+            if ato is not None:
+                check_height(self, ato)
             if self.on_ground:
                 raise Refused(texts.LANDING, texts.ALREADY_LANDED, form=texts.NOT_ABORTED)
+
+        rules = end_of_descent(self.takeoff.rules, Preparation.RISE_AGAIN)
+        async with self.control.acquire(Hover(), by=by, rules=rules, condition=condition):
+            pass
 
     async def set_mode(self, mode: FlightMode, by: Right) -> None:
         """Do what this mode means, for the client that chose it: Offboard flies its setpoints."""
@@ -508,12 +508,10 @@ class Vehicle(Aircraft):
             case FlightMode.OFFBOARD:
                 if self.descends and not self.offboard.streamed_for(by.client):
                     raise Refused(texts.OFFBOARD, texts.NO_SETPOINTS)
-                self.control.require_allowed(self.offboard, by)
                 await self._free(self.offboard, by)
                 await self.offboard.engage(by)
             case FlightMode.MISSION:
                 if self.mission.there and not self.mission.flying:
-                    self.control.require_allowed(self.mission, by)
                     await self._free(self.mission, by)
                 await self.mission.engage(by)
             case FlightMode.TERMINATED:
@@ -553,11 +551,13 @@ class Vehicle(Aircraft):
         forced = alerts.forced_landing not in (None, ForcedLandingReason.NONE) and not alerts.forced_landing_delay_s
         return self.flying_state == FlyingState.EMERGENCY_LANDING or (forced and self.flying_state in LANDING)
 
-    def _require_endable(self, task: FlightTask, by: By) -> None:
-        """Raise `Refused` when the drone lands or returns, and the task or `by` may not end that."""
-        what, right = task.rules.what, right_of(by)
+    def require_endable(self, rules: TaskRules, by: By) -> None:
+        """Raise `Refused` when the drone lands or returns, and the rules or `by` may not end that."""
+        what, right = rules.what, right_of(by)
         lands = self.landing
-        ends = task.rules.ends_landing if lands else task.rules.ends_return
+        if not lands and rules.start is not Preparation.END_DESCENT:
+            return
+        ends = rules.ends_landing if lands else rules.ends_return
         extent = None if right is None else right.covered(ends)
         if lands:
             initiator = self._initiators.landing or Initiator.CLIENT
@@ -591,32 +591,40 @@ class Vehicle(Aircraft):
 
         Returns at once when the drone neither lands nor returns.
         """
+        self.control.require_allowed(task, by)
         if self.descends:
-            async with self.control.acquire(Hover(), by=by, condition=lambda: self._require_endable(task, by)):
-                await self._stop(task, by)
+            async with self.control.acquire(Hover(), by=by, rules=end_of_descent(task.rules)):
+                pass
 
-    async def _stop(self, task: FlightTask, by: By, *, own: bool = False) -> None:
-        """Hover, and end the landing or return that the task and `by` may end.
+    def descent_end(self, rules: TaskRules, by: By) -> DescentEnd:
+        right = right_of(by)
+        if right is None or rules.start is not Preparation.END_DESCENT:
+            return DescentEnd(right)
+        return DescentEnd(right, self.returning_by_itself, self._cancels_announced(rules, right))
 
-        `own`: the drone returned by itself when the command arrived. A return that it begins afterwards goes on.
-        """
-        piloting, home, right = self.drone.piloting, self.drone.home, right_of(by)
-        await self._end_landing(by)
-        announced = None if right is None else self._announced_for(task, right)
-        if own and right is not None and self.returning_by_itself:
-            reason = home.state.reason
-            await piloting.cancel_return_home(even_its_own=True)
-            self._return_aborted(right, reason)
-        await piloting.stop()
-        self._require_endable(task, by)  # what began meanwhile
-        # One asked for through another controller, or before the link was lost. Raises when it is the drone's own.
-        await piloting.cancel_return_home()
-        if await self._end_settled_landing(task, by):  # one that began meanwhile
-            await piloting.stop()
-        if announced is not None and right is not None:
-            await self._answer_announced(announced, right)
+    async def end_descent(self, what: PreparationStep, end: DescentEnd) -> bool:
+        piloting, right = self.drone.piloting, end.right
+        match what:
+            case PreparationStep.END_LANDING:
+                return await self._end_landing(right)
+            case PreparationStep.SETTLE_LANDING:
+                await piloting.settle_landing()
+                return True  # it has waited, maybe for none
+            case PreparationStep.RISE_AGAIN:
+                return await self._end_landing(right, take_off=True)
+            case PreparationStep.CANCEL_OWN_RETURN if (
+                right is not None and end.is_of_own_return and self.returning_by_itself
+            ):
+                reason = self.drone.home.state.reason
+                await piloting.cancel_return_home(even_its_own=True)
+                self._return_aborted(right, reason)
+                return True
+            case PreparationStep.ANSWER_ANNOUNCED if right is not None and end.cancels_announced is not None:
+                await self._answer_announced(end.cancels_announced, right)
+                return True
+        return False
 
-    def _announced_for(self, task: FlightTask, by: Right) -> bool | None:
+    def _cancels_announced(self, rules: TaskRules, by: Right) -> bool | None:
         """A return is announced and this Hold counts.
 
         True: it cancels it, False: it is the first; None otherwise.
@@ -626,7 +634,7 @@ class Vehicle(Aircraft):
         if not cancellable:
             self.holds.withdraw()
             return None
-        if self.returning or by.covered(task.rules.ends_return) is not Extent.ALL or not by.counted:
+        if self.returning or by.covered(rules.ends_return) is not Extent.ALL or not by.counted:
             return None
         return self.holds.answers(by.client, by.at)
 
@@ -663,24 +671,18 @@ class Vehicle(Aircraft):
         elif aborted is not None and aborted.due(self, now):
             aborted.report(self, now)
 
-    async def _end_settled_landing(self, task: FlightTask, by: By, *, take_off: bool = False) -> bool:
-        """End a landing, also one that a withdrawn command has begun; return True if there is one."""
-        if lands := await self.drone.piloting.settle_landing() or self.landing:
-            self._require_endable(task, by)
-            await self._end_landing(by, take_off=take_off)
-        return lands
-
-    async def _end_landing(self, by: By, *, take_off: bool = False) -> None:
-        """End the landing that the drone flies; at once when it flies none."""
+    async def _end_landing(self, right: Right | None, *, take_off: bool = False) -> bool:
+        """End the landing that the drone flies; return False at once when it flies none."""
         if self.flying_state not in LANDING:
-            return
+            return False
         try:
             await self.drone.piloting.end_landing(take_off=take_off)
         except CommandRejected as error:
             raise Refused(texts.LANDING, texts.from_below(error.reason), form=texts.NOT_ABORTED) from None
         self.flight_facts = replace(self.flight_facts, landing_ended_at=self._clock.monotonic())
-        if (right := right_of(by)) is not None:
+        if right is not None:
             self.text(Severity.NOTICE, texts.LANDING_ABORTED.fill(system=right.system))
+        return True
 
     # What the drone reports.
 
@@ -883,11 +885,11 @@ class Vehicle(Aircraft):
 
     async def _stay(self) -> None:
         """Hover, or stay on the ground."""
-        async with self.control.acquire(Hover(), by=Source.GATEWAY):
-            if self.drone.piloting.about_to_fly:
+        rising, hover = self.drone.piloting.about_to_fly, Hover()
+        rules = replace(hover.rules, start=Preparation.AS_IT_IS) if rising else None
+        async with self.control.acquire(hover, by=Source.GATEWAY, rules=rules):
+            if rising:
                 await self._command_landing()
-            if not self.on_ground:
-                await self.drone.piloting.stop()
 
     def _note_landing(self, before: FlyingState | None) -> None:
         """Record the initiator of the landing that begins or ends."""

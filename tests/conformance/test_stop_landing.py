@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.callers import CALLERS, system_of
 from support.fault_scenarios import (
     ACCEPTED,
+    DENIED,
     LAND_CMD,
     PX4_HOLD,
     PX4_OFFBOARD,
@@ -135,6 +136,15 @@ async def test_landing_is_not_ended_by_goto_setpoints_or_sticks() -> None:
             await asyncio.sleep(0.05)
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
         assert flown(w)[-2:] == ["landing", "landed"]
+
+
+async def test_takeoff_to_a_height_above_the_ceiling_does_not_end_a_landing() -> None:
+    async with world(speed=1.0) as w:
+        await landing(w)
+        assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=1e30)).result == DENIED
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 30.0)
+        assert heard(w, "TakeOff") == ["TakeOff"]  # the one of the flight
+        assert flown(w).count("landing") == 1
 
 
 @pytest.mark.parametrize("quirk", [Quirk.LANDING_IGNORES_TAKEOFF, Quirk.LANDING_IGNORES_GAZ])

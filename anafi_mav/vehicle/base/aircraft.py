@@ -22,12 +22,13 @@ from anafi_mav.drone.events import FlyingState, PilotingStyleStyle
 from anafi_mav.errors import LinkLost
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.control import Control
-from anafi_mav.vehicle.base.flight_task import Needs
+from anafi_mav.vehicle.base.flight_task import Needs, TaskRules
 from anafi_mav.vehicle.base.flying import AIRBORNE, ON_GROUND
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.height import HeightReference
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.move_heading import MoveHeading
+from anafi_mav.vehicle.base.preparation import DescentEnd, PreparationStep
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import By
 from anafi_mav.vehicle.base.right import Extent, Right
@@ -250,6 +251,18 @@ class Aircraft(ABC):
             if is_unmet(self):
                 return reason
         return None
+
+    @abstractmethod
+    def require_endable(self, rules: TaskRules, by: By) -> None:
+        """Raise `Refused` when the drone lands or returns, and a request may not end that."""
+
+    @abstractmethod
+    def descent_end(self, rules: TaskRules, by: By) -> DescentEnd:
+        """Return the facts of a request that arrives now and may end a landing or a return."""
+
+    @abstractmethod
+    async def end_descent(self, what: PreparationStep, end: DescentEnd) -> bool:
+        """Perform a step that ends a landing or a return; return True when there was one to end."""
 
     def prearm_problems(self) -> list[OperatorText]:
         """Return the reasons why the drone would not take off, in sentences; empty without any."""

@@ -5,7 +5,7 @@
 1. The policy, the task's needs and the request's own condition are checked. A request that is refused disturbs nothing.
 2. What flies is ended at once, and all older actions are cancelled. From now on they can send only what stops them.
 3. Their end is awaited: without that an aborted move could cancel the one that follows it.
-4. The drone is stopped where the task needs it, and a return that is not reported yet is cancelled.
+4. The drone is prepared by the steps of `preparation`: it stops, say, and a landing is ended that the request may end.
 5. After each wait all conditions are checked again, and that the pilot has moved no stick since the client's message
    arrived. From the last check to the first command of the task there is no wait.
 
@@ -42,11 +42,11 @@ from anafi_mav.vehicle.base.flight_task import (
     FlightActions,
     FlightTask,
     Needs,
-    Preparation,
     TaskRules,
     lasting_needs,
 )
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.preparation import DescentEnd, PreparationStep, begin
 from anafi_mav.vehicle.base.refusal import Refused, text_of
 from anafi_mav.vehicle.base.requester import By, Source, client_of
 from anafi_mav.vehicle.base.right import Right
@@ -83,6 +83,19 @@ class Conditions(Protocol):
 
     def lacking(self, needs: Needs) -> OperatorText | None:
         """Return the first condition that is not met, as the reason of a refusal; None: all are."""
+
+    @property
+    def on_ground(self) -> bool:
+        """True while the drone stands."""
+
+    def require_endable(self, rules: TaskRules, by: By) -> None:
+        """Raise `Refused` when the drone lands or returns, and a request may not end that."""
+
+    def descent_end(self, rules: TaskRules, by: By) -> DescentEnd:
+        """Return the facts of a request that arrives now and may end a landing or a return."""
+
+    async def end_descent(self, what: PreparationStep, end: DescentEnd) -> bool:
+        """Perform a step that ends a landing or a return; return True when there was one to end."""
 
 
 _SHOWN = (Event.GRANT, Event.FAIL, Event.ADOPT, Event.FINISH, Event.LOSE)
@@ -253,6 +266,7 @@ class Control:
             return condition()
 
         found = check()
+        end = self._aircraft.descent_end(rules, by) if rules.start.ends_landing else None
         before, number = self.active, self.epoch + 1
         own = task if rules.lasts and not rules.is_hover else None
         hover = task if rules.is_hover else below
@@ -261,15 +275,15 @@ class Control:
         try:
             has_waited = await self._release(attempt, rules.wait)
             self.handle(Event.RELEASED, Input(attempt))
-            if rules.start is Preparation.STOP:
-                await piloting.stop()
-            if has_waited or rules.start is Preparation.STOP:  # else no event was received since the first check
+            if has_waited:  # else no event was received since the first check
                 found = check()
-            # A return that is commanded and not reported. Raises when it is the drone's own.
-            if Needs.NO_DESCENT in rules.needs and await piloting.cancel_return_home():
-                found = check()
-            if rules.start is Preparation.HOVER:
-                piloting.hover()
+            stands = end is not None and self._aircraft.on_ground and not piloting.about_to_fly
+            preparing = begin(rules.start, stands=stands, cancels_return=Needs.NO_DESCENT in rules.needs)
+            while (what := preparing.next) is not None:
+                has_ended = await self._prepare(what, end)
+                if has_ended:
+                    found = check()
+                preparing = preparing.after(has_ended=has_ended)
             grant = Grant(self, attempt, found)
             yield grant
             grant.begin()
@@ -294,6 +308,8 @@ class Control:
             raise Refused(rules.what, reason)
         if (pending := self._situation.pending) is not None and pending.is_urgent:
             raise Refused(texts.FLIGHT_COMMAND, texts.MOTORS_STOPPING)
+        if rules.start.ends_landing:
+            self._aircraft.require_endable(rules, by)
 
     def require_allowed(self, task: FlightTask, by: By, rules: TaskRules | None = None) -> None:
         """Raise `Refused` for the policy, and for the pilot.
@@ -317,6 +333,20 @@ class Control:
         controller = self._aircraft.drone.controller
         yields = isinstance(by, Source) and by.yields_to_pilot
         return yields and (controller.pilot_has_source or controller.pilot_acquired_control)
+
+    async def _prepare(self, what: PreparationStep, end: DescentEnd | None) -> bool:
+        """Perform a step of a preparation; return True when there was something to end."""
+        piloting = self._aircraft.drone.piloting
+        match what:
+            case PreparationStep.HOVER:
+                piloting.hover()
+                return False
+            case PreparationStep.STOP:
+                await piloting.stop()
+                return True
+            case PreparationStep.CANCEL_RETURN:
+                return await piloting.cancel_return_home()  # raises when the return is the drone's own
+        return end is not None and await self._aircraft.end_descent(what, end)
 
     async def _release(self, attempt: Attempt[FlightTask], limit: float | None) -> bool:
         """End what flies, which can fly the drone no further; return True after a wait for it."""

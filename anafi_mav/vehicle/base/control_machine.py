@@ -91,7 +91,7 @@ class Situation(Struct, Generic[TaskT], frozen=True):
     task: TaskT | None = None
     """The active flight task, above the hovering mode."""
     granted: int = 0
-    """Number of the attempt by which it is active; `ADOPTED` if it was adopted."""
+    """Number of the attempt by which it is active; `ADOPTED` if it was adopted or has followed another task."""
     is_paused: bool = False
     act: DroneAct | None = None
     pending: Attempt[TaskT] | None = None
@@ -278,7 +278,8 @@ def _finish(now: Situation[TaskT], about: Input[TaskT]) -> Step[TaskT]:
         return Step(replace(now, successor=None), (about.task,))
     if about.task is not now.task or about.number not in (None, now.granted):
         return Step(now)
-    return Step(replace(now, task=now.successor, successor=None), (about.task,), now.successor)
+    after = replace(now, task=now.successor, successor=None, granted=ADOPTED)  # no request has begun the successor
+    return Step(after, (about.task,), now.successor)
 
 
 def _lose(now: Situation[TaskT], about: Input[TaskT]) -> Step[TaskT]:

@@ -22,6 +22,7 @@ from anafi_mav import texts
 from anafi_mav.drone.piloting.piloting import Piloting
 from anafi_mav.texts import Subject
 from anafi_mav.vehicle.base.modes import FlightMode
+from anafi_mav.vehicle.base.preparation import Preparation
 from anafi_mav.vehicle.base.right import Extent
 
 
@@ -61,14 +62,6 @@ def lasting_needs(needs: Needs) -> Needs:
     return needs & STEERING
 
 
-class Preparation(enum.Enum):
-    """How the drone is prepared for a task."""
-
-    AS_IT_IS = "nothing is sent: the task itself replaces the motion, or stops it"
-    HOVER = "hover, without waiting: what moves is cancelled, the sticks are centred"
-    STOP = "stop, and wait until the drone has confirmed the end of its moves"
-
-
 @dataclass(frozen=True)
 class TaskRules:
     """Differences of a flight task from the others, as data."""
@@ -106,6 +99,20 @@ STOP_WAIT = 0.5
 
 An action that has not ended by then can send nothing.
 """
+
+
+def stop_rules(
+    what: Subject, landing: Extent | None, to_home: Extent | None, start: Preparation = Preparation.END_DESCENT
+) -> TaskRules:
+    """Return the rules of a stop that ends these landings and returns; then the drone hovers."""
+    return TaskRules(
+        what, start=start, wait=STOP_WAIT, is_hover=True, ends_landing=landing, ends_return=to_home, is_flight=False
+    )
+
+
+def end_of_descent(rules: TaskRules, start: Preparation = Preparation.END_DESCENT) -> TaskRules:
+    """Return the rules of the stop that ends, before a task, what the task may end."""
+    return stop_rules(rules.what, rules.ends_landing, rules.ends_return, start)
 
 
 class FlightTask(Protocol):
@@ -177,7 +184,7 @@ class Hover(PlainTask):
         Programs choose it routinely.
         """
         ends, what = Extent.ALL if self.client is None else Extent.COMMANDED, texts.Subject(self.mode.value)
-        return TaskRules(what, wait=STOP_WAIT, is_hover=True, ends_landing=ends, ends_return=ends, is_flight=False)
+        return stop_rules(what, ends, ends)
 
 
 @dataclass(frozen=True)

@@ -146,6 +146,15 @@ def test_take_off_end_makes_newest_successor_active() -> None:
     assert after.situation.below == "guided"
 
 
+def test_end_of_older_request_leaves_its_task_active_as_successor() -> None:
+    now = granted(Situation(), Attempt("mission", 1))
+    for successor, over in (("return", "mission"), ("mission", "return")):
+        now = step(now, Event.SUCCEED, Input(task=successor)).situation
+        now = step(now, Event.FINISH, Input(task=over)).situation
+    assert (now.task, now.granted) == ("mission", ADOPTED)
+    assert step(now, Event.FINISH, Input(task="mission", number=1)) == Step(now)
+
+
 def test_request_withdraws_successor_of_take_off() -> None:
     now = step(granted(Situation(), Attempt("takeoff", 1)), Event.SUCCEED, Input(task="goto")).situation
     after = step(now, Event.REQUEST, Input(Attempt(None, 2)))
