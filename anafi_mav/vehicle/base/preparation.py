@@ -30,7 +30,7 @@ class Preparation(enum.Enum):
 
 
 class PreparationStep(enum.Enum):
-    """PreparationStep of a preparation."""
+    """A step of a preparation; its value is the explanation."""
 
     HOVER = "cancel what moves, without waiting"
     STOP = "stop, and wait until the drone has confirmed it"
