@@ -334,6 +334,7 @@ TASK_ENDED = Template("{what} ended: {reason}", what="Offboard", reason="r" * RE
 TAKEOFF_FAILED = Template("Takeoff failed: {error}", error=BELOW)
 TAKEOFF_UNFINISHED = ReasonTemplate("takeoff not over after {seconds:.0f} s", seconds=99)
 TAKEOFF_TOO_LOW = Reason("takeoff ended below its height")
+CLIMB_ENDED = Template("Climb to {height:g} m ended at {reached:.1f} m", height=99.5, reached=99.9)
 CLIMB_ABORTED = Template("Climb to {height:g} m aborted: {error}", height=99.5, error=BELOW)
 DISARMED = OperatorText("Disarmed: no takeoff")
 MODE_MAY_RISE = Template("{mode}: takeoff possible, to 1 m", mode="Position")

@@ -45,6 +45,14 @@ _SHORT = {MoveEnd.ERROR: texts.MOVE_FAILED, MoveEnd.CANCELED: texts.MOVE_CANCELL
 GOTO = TaskRules(texts.GOTO, needs=Needs.NO_DESCENT | Needs.IN_AIR, follows=True)
 
 
+def _rules_of_offset(what: Subject) -> TaskRules:
+    """Return the rules of a moveBy, which ends in a hovering mode by itself."""
+    return TaskRules(what, needs=Needs.NO_DESCENT | Needs.IN_AIR, start=Preparation.STOP, is_hover=True, follows=True)
+
+
+TURN = _rules_of_offset(texts.TURN)
+
+
 @dataclass(frozen=True)
 class Goto(PlainTask):
     """Target of a guided move; the flight task that flies to it."""
@@ -245,7 +253,7 @@ class GuidedFlight:
         `angle_from` returns the angle to turn (rad, clockwise +) from the heading (rad) at which the drone has come to
         rest; `rate_dps` in deg/s (None: the drone's own).
         """
-        vehicle, hover, rules = self._vehicle, Hover(mode), _rules_of_offset(texts.TURN)
+        vehicle, hover, rules = self._vehicle, Hover(mode), TURN
         async with vehicle.control.acquire(hover, by=by, rules=rules) as grant:
             grant.begin()
             angle = angle_from(await self._resting_heading())
@@ -292,8 +300,3 @@ class GuidedFlight:
         if is_short:
             reason = texts.PILOT if vehicle.drone.controller.pilot_acquired_control else _SHORT[how]
             vehicle.text(Severity.WARNING, texts.TASK_ENDED.fill(what=texts.GOTO, reason=reason))
-
-
-def _rules_of_offset(what: Subject) -> TaskRules:
-    """Return the rules of a moveBy, which ends in a hovering mode by itself."""
-    return TaskRules(what, needs=Needs.NO_DESCENT | Needs.IN_AIR, start=Preparation.STOP, is_hover=True)

@@ -20,6 +20,7 @@ from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import check_height
 from anafi_mav.vehicle.base.control import Control
+from anafi_mav.vehicle.base.control_machine import State as ControlState
 from anafi_mav.vehicle.base.flight_task import DISARM, HAND_LAUNCH, FlightTask, PlainTask, TaskRules
 from anafi_mav.vehicle.base.flying import AIRBORNE
 from anafi_mav.vehicle.base.modes import FlightMode
@@ -153,7 +154,7 @@ class Takeoff(PlainTask):
         waiting = self._situation.attempt
         if not (isinstance(waiting, WaitingTakeoff) and waiting.client == by.client and self.is_armed_by(by.client)):
             return False
-        self._start(self._rise(waiting.height, by, lifts_off=True))
+        self._start(self._rise(waiting.height, by, lifts_off=True), waiting.height)
         return True
 
     async def disarm(self, by: Right, *, force: bool) -> None:
@@ -230,7 +231,7 @@ class Takeoff(PlainTask):
             return
         async with vehicle.control.acquire(self, by=by, below=self._below, rules=_RISES, condition=condition):
             await self.launch()
-        self._start(self._rise(height, by))
+        self._start(self._rise(height, by), height)
 
     async def abort(self, by: By) -> None:
         """Disarm a drone that stands, land one that is about to leave the ground.
@@ -278,8 +279,13 @@ class Takeoff(PlainTask):
     def end(self) -> list[asyncio.Task[None]]:
         """End the take-off: another flight task is active now. Also one that waits for arming.
 
+        A request that ends the climb leaves the drone at another height than its client wanted: a text reports it.
         Returns tasks that are about to end.
         """
+        vehicle, attempt = self._vehicle, self._situation.attempt
+        reached, is_replaced = vehicle.drone.piloting.state.altitude, vehicle.control.state is ControlState.RELEASING
+        if isinstance(attempt, RunningTakeoff) and attempt.climbs and is_replaced and reached is not None:
+            vehicle.text(Severity.NOTICE, texts.CLIMB_ENDED.fill(height=attempt.height, reached=reached))
         return self._enter(step(self._situation, Event.END))
 
     @property
@@ -366,10 +372,10 @@ class Takeoff(PlainTask):
 
     # Machinery.
 
-    def _start(self, work: Coroutine[Any, Any, bool]) -> None:
-        """Begin the part of a take-off that no command waits for."""
+    def _start(self, work: Coroutine[Any, Any, bool], height: float) -> None:
+        """Begin the part of a take-off to a height (m, above take-off) that no command waits for."""
         task = asyncio.get_running_loop().create_task(work)
-        self._enter(step(self._situation, Event.START, attempt=RunningTakeoff(task)))
+        self._enter(step(self._situation, Event.START, attempt=RunningTakeoff(task, height)))
 
     def _enter(self, now: TakeoffSituation[asyncio.Task[Any]]) -> list[asyncio.Task[None]]:
         """Enter a situation; return the task of the take-off that ends thereby, if there is one."""

@@ -67,6 +67,8 @@ class RunningTakeoff(Generic[TaskT]):
     """A take-off that is under way."""
 
     task: TaskT
+    height: float
+    """m above take-off."""
     climbs: bool = False
     """The drone has taken off to its own height."""
 

@@ -333,6 +333,65 @@ async def test_goto_during_takeoff_waits_for_the_climb(flavour: str) -> None:
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 11.0, 20.0)
 
 
+async def climbing(w: World, height: float) -> None:
+    """The climb that follows the drone's own take-off has begun."""
+    await rising(w, height)
+    await w.drone.wait_log(lambda e: e.name.endswith("moveBy"), 20.0)
+
+
+TURN, ROI, ORBIT = dialect.MAV_CMD_CONDITION_YAW, dialect.MAV_CMD_DO_SET_ROI_LOCATION, dialect.MAV_CMD_DO_ORBIT
+
+
+async def turned(w: World) -> None:
+    ack = await w.client.command(TURN, 90.0, 0.0, 0.0, 0.0, timeout=20.0)
+    assert ack.result == ACCEPTED
+    assert math.degrees(w.drone.pose.yaw) == pytest.approx(90.0, abs=3.0)
+
+
+async def looked(w: World) -> None:
+    assert (await w.client.command(ROI, frame=6, **place(20.0), z=0.0, timeout=20.0)).result == ACCEPTED
+
+
+async def looked_by_mount(w: World) -> None:
+    """The mount protocol's way to a place (MAVProxy, Mission Planner)."""
+    gps = dialect.MAV_MOUNT_MODE_GPS_POINT
+    ack = await w.client.command(dialect.MAV_CMD_DO_MOUNT_CONTROL, frame=6, **place(20.0), z=gps, timeout=20.0)
+    assert ack.result == ACCEPTED
+
+
+async def orbited(w: World) -> None:
+    ack = await w.client.command(ORBIT, 8.0, 2.0, x=NAN, y=NAN, z=NAN, timeout=20.0)
+    assert ack.result == ACCEPTED
+
+
+@both
+@pytest.mark.parametrize("follow", [turned, looked, looked_by_mount, orbited])
+@pytest.mark.parametrize("begin", [rising, climbing])
+async def test_turn_or_look_during_a_takeoff_waits_for_the_climb(
+    flavour: str, begin: Callable[[World, float], Any], follow: Callable[[World], Any]
+) -> None:
+    """The climb goes on to its height; what was commanded meanwhile is done then, and accepted only then."""
+    async with world(flavour=flavour) as w:
+        await begin(w, 9.0)
+        await follow(w)
+        assert w.drone.pose.up == pytest.approx(9.0, abs=0.5)
+        end = next(e for e in w.drone.log if e.name.endswith("moveByEnd"))
+        assert end.args["error"] == 0
+        later = [e for e in heard(w, "moveBy", "moveTo", "extended_move_to", "StartPilotedPOIV2") if e.t > end.t]
+        assert later or follow is orbited
+
+
+@pytest.mark.parametrize("stop", [(SET_MODE, 1, 4, 3), (dialect.MAV_CMD_DO_PAUSE_CONTINUE, 0)])
+async def test_climb_that_a_command_ends_is_reported_with_its_height(stop: tuple[int, ...]) -> None:
+    """The take-off was accepted long before: its client reads that the drone is lower than it was commanded to."""
+    async with world() as w:
+        await climbing(w, 30.0)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["up"] > 3.0, 20.0)
+        mark = w.client.mark()
+        assert (await w.client.command(*stop)).result == ACCEPTED
+        await said(w.client, "Climb to 30 m ended at ", mark)
+
+
 async def test_goto_after_hold_during_takeoff_awaits_first_hover() -> None:
     """MAVSDK's goto_location changes to Hold before it sends the target, in this example 1 s after the take-off."""
     async with world(speed=1.0) as w:

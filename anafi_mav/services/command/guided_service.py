@@ -33,7 +33,7 @@ from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.yaw import DEG_PER_TURN, heading_of
-from anafi_mav.vehicle.guided_flight import Goto
+from anafi_mav.vehicle.guided_flight import TURN, Goto
 from anafi_mav.vehicle.vehicle import Vehicle
 
 KEEP, DEFAULT = -1.0, -2.0
@@ -124,7 +124,11 @@ class GuidedService(Service):
                 still_holds=lambda: not self.host.vehicle.guided.has_failed,
             ),
             dialect.MAV_CMD_CONDITION_YAW: Action(
-                self._turn, location=False, altitude=Altitude.UNUSED, effect=_effect_of_turn
+                self._turn,
+                location=False,
+                altitude=Altitude.UNUSED,
+                effect=_effect_of_turn,
+                progress=ProgressPolicy.EARLY,
             ),
             dialect.MAV_CMD_DO_PAUSE_CONTINUE: Action(
                 self._pause_or_continue, location=False, altitude=Altitude.UNUSED, effect=_effect_of_pause
@@ -198,7 +202,8 @@ class GuidedService(Service):
         """Run MAV_CMD_CONDITION_YAW: turn to a heading or by an angle.
 
         param1 deg, param2 deg/s (unset or 0: the drone's own), param3 direction, param4 relative. On the way to a
-        place the drone turns while it flies on, the shorter way; else it turns where it hovers.
+        place the drone turns while it flies on, the shorter way; else it turns where it hovers. A take-off under way
+        is flown to its end before.
         """
         angle, rate, way, relative = command.params
         if not math.isfinite(angle) or abs(angle) > DEG_PER_TURN:
@@ -208,6 +213,7 @@ class GuidedService(Service):
         if not (math.isnan(relative) or relative in (0.0, 1.0)):  # ArduCopter refuses it too
             raise Refused(texts.TURN, texts.PARAM4_BINARY, lasting=True)
         vehicle = self.host.vehicle
+        await vehicle.takeoff.over(TURN)
         attitude = vehicle.drone.piloting.state.attitude
         if not vehicle.in_air or attitude is None:
             raise Refused(texts.TURN, texts.HEADING_UNKNOWN if vehicle.in_air else vehicle.activity)

@@ -17,7 +17,7 @@ from anafi_mav.drone import events
 from anafi_mav.drone.piloting.moves import Move, MoveEnd
 from anafi_mav.drone.values import Values
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.commands import Action, Altitude, Command, Effect
+from anafi_mav.services.commands import Action, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.texts import OperatorText
@@ -72,7 +72,9 @@ class _Orbit:
 class OrbitService(Service, PlainTask):
     """Flies circles; the vehicle's flight task while it does."""
 
-    rules = TaskRules(texts.ORBIT, needs=Needs.NO_DESCENT | Needs.IN_AIR | Needs.FIX | Needs.LIMITS | STEERING)
+    rules = TaskRules(
+        texts.ORBIT, needs=Needs.NO_DESCENT | Needs.IN_AIR | Needs.FIX | Needs.LIMITS | STEERING, follows=True
+    )
     mode = FlightMode.ORBIT
 
     def __init__(self, host: Host) -> None:
@@ -98,6 +100,7 @@ class OrbitService(Service, PlainTask):
                 location=True,
                 altitude=Altitude.AMSL,
                 effect=Effect.CHANGE,
+                progress=ProgressPolicy.EARLY,
                 still_holds=lambda: self._newest is not None and (not self._newest.is_over or self._newest.lap.done),
             )
         }
@@ -133,9 +136,11 @@ class OrbitService(Service, PlainTask):
 
         param3 is the yaw behaviour, param4 the angle to fly. The centre is the drone's position unless it is set, z
         is AMSL in every frame but ArduPilot's clients'. ACCEPTED when the drone is on its way to the circle, or on
-        it.
+        it. A take-off under way is flown to its end before.
         """
-        vehicle, circle = self.host.vehicle, self._described(command)
+        vehicle = self.host.vehicle
+        await vehicle.takeoff.over(self.rules)
+        circle = self._described(command)
         async with vehicle.control.acquire(self, by=command.right, condition=lambda: self._way(circle)) as grant:
             start, is_away = grant.found
             orbit = _Orbit(Lap(self._held_back(circle)), vehicle.cruise_speed)

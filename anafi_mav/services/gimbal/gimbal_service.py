@@ -26,7 +26,7 @@ from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.gimbal import gimbal_messages, mount, targets
 from anafi_mav.services.gimbal.control import NO_CLIENT, Answer, ClientId, GimbalControl, Heartbeats
 from anafi_mav.services.gimbal.motion import GimbalMotion
-from anafi_mav.services.gimbal.roi import RegionOfInterest
+from anafi_mav.services.gimbal.roi import Region, RegionOfInterest
 from anafi_mav.services.gimbal.targets import Frames, GimbalTarget
 from anafi_mav.services.service import LOOK_EVERY, Host, MessageHandler, Service
 from anafi_mav.services.stream import MessageStream, Times
@@ -349,10 +349,17 @@ class GimbalService(Service):
         await self._look(command, where, command.height(self.host.vehicle, flown=False) or 0.0)
 
     async def _look(self, command: Command, where: GeoPoint, ato: float) -> None:
+        region = await self._prepare_region(command)
+        await self._roi.look_at(region, where, ato)
+
+    async def _prepare_region(self, command: Command) -> Region:
+        """Return an attempt to look at a place, once no take-off is under way and the gimbal rests."""
+        self._require_control(command.client)
+        await self._roi.takeoff_over()
         self._require_control(command.client)
         region = self._roi.prepare(command.right)
         await self._motion.rest()
-        await self._roi.look_at(region, where, ato)
+        return region
 
     async def _look_at_system(self, command: Command) -> None:
         """Run MAV_CMD_DO_SET_ROI_SYSID: param1 system, param2 gimbal device."""
@@ -362,8 +369,7 @@ class GimbalService(Service):
     async def _look_at_number(self, command: Command, system: float) -> None:
         self._require_control(command.client)
         self._roi.position_of(system)
-        region = self._roi.prepare(command.right)
-        await self._motion.rest()
+        region = await self._prepare_region(command)
         await self._roi.look_at_system(region, system)
 
     async def _look_anywhere(self, command: Command) -> None:

@@ -69,7 +69,7 @@ class Region:
 class RegionOfInterest(PlainTask):
     """The region of interest of one vehicle: one of its flight tasks."""
 
-    rules = TaskRules(texts.ROI, needs=Needs.NO_DESCENT | Needs.IN_AIR, keeps_below=True)
+    rules = TaskRules(texts.ROI, needs=Needs.NO_DESCENT | Needs.IN_AIR, keeps_below=True, follows=True)
     mode = None
     """The drone looks there in any hovering mode."""
 
@@ -115,12 +115,23 @@ class RegionOfInterest(PlainTask):
 
         Raises `Refused` when no region can begin: landing, return, mission, ground.
         """
+        self._require_no_mission()
+        self._host.vehicle.control.check(self, by)
+        self._prepared = Region(PoiMode.LOCKED_GIMBAL, by)
+        return self._prepared
+
+    async def takeoff_over(self) -> None:
+        """Wait for the end of a take-off under way, which a region would end.
+
+        Raises `Refused` during a mission, and `Unfinished` when the take-off fails.
+        """
+        self._require_no_mission()
+        await self._host.vehicle.takeoff.over(self.rules)
+
+    def _require_no_mission(self) -> None:
         vehicle = self._host.vehicle
         if vehicle.control.active is vehicle.mission or vehicle.mode is FlightMode.MISSION:
             raise Refused(texts.ROI, texts.GIMBAL_OF_MISSION)
-        vehicle.control.check(self, by)
-        self._prepared = Region(PoiMode.LOCKED_GIMBAL, by)
-        return self._prepared
 
     async def look_at(self, region: Region, where: GeoPoint, ato: float) -> None:
         """Look at a place (height: m above take-off), with the gimbal locked on it.

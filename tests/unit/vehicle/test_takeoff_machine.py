@@ -23,7 +23,12 @@ from anafi_mav.vehicle.takeoff_machine import (
 Situation = TakeoffSituation[str]
 
 ARMINGS = (None, Arming(frozenset({"a"}), 20.0), Arming(frozenset({"a", "b"}), None))
-ATTEMPTS = (None, WaitingTakeoff(3.0, "b", 12.0), RunningTakeoff("lift"), RunningTakeoff("climb", climbs=True))
+ATTEMPTS = (
+    None,
+    WaitingTakeoff(3.0, "b", 12.0),
+    RunningTakeoff("lift", 3.0),
+    RunningTakeoff("climb", 3.0, climbs=True),
+)
 SITUATIONS = [Situation(arming, attempt) for arming, attempt in itertools.product(ARMINGS, ATTEMPTS)]
 SEQUENCES, LENGTH = 20_000, 8
 
@@ -38,7 +43,7 @@ def inputs(event: Event) -> dict[str, Any]:
         case Event.REQUEST:
             return {"attempt": WaitingTakeoff(5.0, "c", 30.0)}
         case Event.START:
-            return {"attempt": RunningTakeoff("new")}
+            return {"attempt": RunningTakeoff("new", 3.0)}
     return {}
 
 
@@ -110,7 +115,7 @@ def test_waiting_takeoff_ends_when_the_drone_comes_down() -> None:
 
 
 def test_newer_takeoff_replaces_the_one_under_way() -> None:
-    now = after(Situation(attempt=RunningTakeoff("old", climbs=True)), Event.START)
+    now = after(Situation(attempt=RunningTakeoff("old", 3.0, climbs=True)), Event.START)
     assert (now.state, now.task) == (State.LIFTING, "new")
 
 
