@@ -134,7 +134,7 @@ class ManualFlight(PlainTask):
             self._centre()
 
     def _objection(self, sticks: Sticks) -> OperatorText | None:
-        """Return why these sticks may not fly the drone; None in the air and in mode Position."""
+        """Return why deflected sticks may not fly the drone; None in the air, in mode Position."""
         vehicle, mode = self._vehicle, self._vehicle.mode
         if vehicle.on_ground:
             is_gesture = sticks.climb <= -GESTURE and sticks.turn >= GESTURE
@@ -143,7 +143,7 @@ class ManualFlight(PlainTask):
             return reason
         if mode is not FlightMode.POSITION:
             return texts.STICKS_IGNORED_MODE.fill(mode=mode.value)
-        return texts.PILOT if vehicle.drone.controller.pilot_acquired_control else None
+        return texts.PILOT if vehicle.drone.controller.refuse_sticks() else None
 
     def end(self) -> list[asyncio.Task[None]]:
         """End this flight task: something else flies the drone now."""

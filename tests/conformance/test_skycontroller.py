@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import dataclass
 from typing import Any
 
 import pytest
@@ -57,6 +58,17 @@ async def greeted(w: World) -> None:
     """Wait for the last text that a client is greeted with."""
     w.client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
     await w.client.wait("STATUSTEXT", lambda m: "firmware" in m.text, since=0, timeout=10.0)
+
+
+@dataclass
+class Joystick:
+    """MANUAL_CONTROL of a station."""
+
+    pitch: int
+    """Forward, -1000 to 1000."""
+
+    def message(self) -> Any:
+        return dialect.MAVLink_manual_control_message(1, self.pitch, 0, 500, 0, 0)
 
 
 STREAMS: dict[str, tuple[tuple[float, ...], Any]] = {
@@ -170,6 +182,33 @@ async def test_goto_right_after_pilots_stick_is_refused() -> None:
         pilot.stick(PITCH_STICK, 40)
         await source_is(w, Source.SKY_CONTROLLER)
         assert await goto(w, 70.0, 10.0) == REJECTED  # another place, or it counts as a retransmission
+
+
+@generations
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+async def test_joystick_that_is_held_does_not_take_the_drone_from_the_pilot(flavour: str, generation: int) -> None:
+    """The pilot stops the drone and centres his sticks. The joystick flies again after a rest of two seconds."""
+    async with world(speed=1.0, skycontroller=generation, flavour=flavour) as w:
+        pilot, joystick = w.drone.skycontroller, Joystick(400)
+        assert pilot is not None
+        await to_the_pilot(w)
+        position = (1, 3, 0) if flavour == "px4" else (1, 5)
+        assert (await w.client.command(SET_MODE, *position)).result == ACCEPTED
+        async with streaming(w.client, joystick.message):
+            await source_is(w, Source.CONTROLLER)
+            await w.drone.wait_log(lambda e: pilot.grabbed_axes != 0, 10.0)
+            pilot.stick(PITCH_STICK, 60)
+            await source_is(w, Source.SKY_CONTROLLER)
+            pilot.stick(PITCH_STICK, 0)
+            began = asyncio.get_running_loop().time()
+            await watched(8.0)
+            assert pilot.source is Source.SKY_CONTROLLER
+            assert not any(sticks(w, began + 0.5))
+            assert w.drone.pose.ground_speed < 0.3
+            joystick.pitch = 0
+            await watched(2.5)
+            joystick.pitch = 400
+            await source_is(w, Source.CONTROLLER)
 
 
 async def test_return_while_pilot_has_source_sends_no_pcmd() -> None:

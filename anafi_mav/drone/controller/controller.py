@@ -176,6 +176,17 @@ class Controller(Element[ControllerState]):
         """
         return self.present and not self.taken and self.state.source != Source.CONTROLLER
 
+    def refuse_sticks(self) -> bool:
+        """Note a deflected stick of our user; return True when it must not fly.
+
+        That is while the pilot keeps control. The pilot's time begins again with each: a stick that is held, or a
+        joystick that was forgotten, never gets the drone back.
+        """
+        if not self.pilot_acquired_control:
+            return False
+        self._pilot_keeps_until = max(self._pilot_keeps_until, loop_time() + PILOT_KEEPS)
+        return True
+
     def allows(self, message: Message) -> bool:
         """Shown every command before it is sent.
 
@@ -188,13 +199,12 @@ class Controller(Element[ControllerState]):
             return True
         if not is_motion(message):
             return not (isinstance(message, ardrone3.PCMD) and self.pilot_has_source)
-        now = loop_time()
-        if now < self._pilot_keeps_until:
-            if isinstance(message, ardrone3.PCMD):
-                self._pilot_keeps_until = max(self._pilot_keeps_until, now + PILOT_KEEPS)
+        if isinstance(message, ardrone3.PCMD):
+            if self.refuse_sticks():
                 return False
+        elif self.pilot_acquired_control:
             raise CommandRejected("the pilot at the Skycontroller flies")
-        self._last_motion = now
+        self._last_motion = loop_time()
         if not self.taken:
             self._take()
         if self._watching.at is None:
