@@ -133,7 +133,9 @@ async def test_declarations_that_a_session_in_use_loses_are_made_beside_it() -> 
                 await asyncio.to_thread(theirs.put, up, b"frames")
                 await asyncio.sleep(0.02)
 
-        await asyncio.to_thread(lambda: theirs.liveliness().declare_subscriber(KEYS.drone_token("*", "*"), see))
+        # With history: the router may hear of our token first.
+        tokens = KEYS.drone_token("*", "*")
+        await asyncio.to_thread(lambda: theirs.liveliness().declare_subscriber(tokens, see, history=True))
         ours.declare_token(OURS)
         await seen.wait(TokenChange(OURS, True))
         using = asyncio.create_task(use())
