@@ -266,12 +266,16 @@ class Takeoff(PlainTask):
             control.release(waiting)
 
     async def _until_risen(self) -> bool:
-        """Wait for the end of a take-off, or of a rise; True: it has reached its height."""
-        if (task := self._situation.task) is not None:
-            await asyncio.wait({task})
-            return not task.cancelled() and task.result() is True
-        with contextlib.suppress(AnafiMavError):
-            await self._vehicle.drone.expect(FlyingStateChanged, lambda m: m.state not in _RISING, TAKEOFF_WAIT)
+        """Wait for the end of a take-off, or of a rise; True: it has reached its height.
+
+        The climb of a take-off that starts its motors begins while its rise is waited for.
+        """
+        while self.rises:
+            if (task := self._situation.task) is not None:
+                await asyncio.wait({task})
+                return not task.cancelled() and task.result() is True
+            with contextlib.suppress(AnafiMavError):
+                await self._vehicle.drone.expect(FlyingStateChanged, lambda m: m.state not in _RISING, TAKEOFF_WAIT)
         return self._vehicle.in_air
 
     # What ends it.

@@ -333,6 +333,15 @@ async def test_goto_during_takeoff_waits_for_the_climb(flavour: str) -> None:
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 11.0, 20.0)
 
 
+async def starting(w: World, height: float) -> None:
+    """The motors start: the drone has not confirmed that it takes off."""
+    if w.flavour == "ardupilot":
+        assert (await w.client.command(SET_MODE, 1, 4)).result == ACCEPTED
+    assert (await w.client.command(ARM, 1)).result == ACCEPTED
+    w.client.send_command(TAKEOFF, x=0.0, y=0.0, z=height)
+    await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "motor_ramping", 10.0)
+
+
 async def climbing(w: World, height: float) -> None:
     """The climb that follows the drone's own take-off has begun."""
     await rising(w, height)
@@ -359,15 +368,19 @@ async def looked_by_mount(w: World) -> None:
     assert ack.result == ACCEPTED
 
 
+async def gone(w: World) -> None:
+    assert (await w.client.command(GOTO, -1, 1, 0, NAN, frame=6, **place(12.0), z=9.0, timeout=20.0)).result == ACCEPTED
+
+
 async def orbited(w: World) -> None:
     ack = await w.client.command(ORBIT, 8.0, 2.0, x=NAN, y=NAN, z=NAN, timeout=20.0)
     assert ack.result == ACCEPTED
 
 
 @both
-@pytest.mark.parametrize("follow", [turned, looked, looked_by_mount, orbited])
-@pytest.mark.parametrize("begin", [rising, climbing])
-async def test_turn_or_look_during_a_takeoff_waits_for_the_climb(
+@pytest.mark.parametrize("follow", [turned, looked, looked_by_mount, orbited, gone])
+@pytest.mark.parametrize("begin", [starting, rising, climbing])
+async def test_command_during_a_takeoff_waits_for_the_climb(
     flavour: str, begin: Callable[[World, float], Any], follow: Callable[[World], Any]
 ) -> None:
     """The climb goes on to its height; what was commanded meanwhile is done then, and accepted only then."""
