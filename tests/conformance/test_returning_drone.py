@@ -12,7 +12,7 @@ from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, Simulator
 
-RETURNS = 20
+RETURNS = 10
 
 HELD = 6.0
 """s of a connection: a shorter one would count as taken by another controller."""
@@ -20,7 +20,7 @@ HELD = 6.0
 SETTLED = 3
 """Returns after which lists of bounded length are full."""
 
-TOLERANCE = 300
+TOLERANCE = 200
 """Objects more after the last return: log records that pytest keeps, five for each return.
 
 One that froze the heap would leave a hundred.
