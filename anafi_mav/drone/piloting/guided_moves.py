@@ -306,9 +306,9 @@ class ReturnHome:
         return True
 
     async def wait_for_end(self, answer: Expectation[Any], what: str, timeout: float) -> None:
-        """Wait until the drone has received the abort of a return, and reports none or answers nothing.
+        """Wait for the end of a return that was aborted.
 
-        A drone whose return has ended without a report has none to abort: it is asked for its states. Raises
+        The drone has then received the abort, and reports no return or answers nothing. A drone whose return has ended without a report has none to abort: it is asked for its states. Raises
         `CommandTimeout` about `what` when it then still reports a return.
         """
         assert self._abortion is not None
