@@ -30,6 +30,7 @@ from anafi_mav.sim.world.quirks import Quirk
 ACCEPTED, REJECTED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_TEMPORARILY_REJECTED
 RTL, LAND = dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, dialect.MAV_CMD_NAV_LAND
 GOTO, SET_HOME, SET_MODE = dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_SET_HOME, dialect.MAV_CMD_DO_SET_MODE
+PAUSE = dialect.MAV_CMD_DO_PAUSE_CONTINUE
 PX4_HOLD = (1, 4, 3)
 INT32, REAL32, INT16 = 6, 9, 4
 FAST = 8.0
@@ -296,6 +297,29 @@ async def test_return_not_reported_as_finished_hovers_with_a_text() -> None:
         assert landings(w) == []
         assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
         await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
+
+
+@pytest.mark.parametrize("own", [False, True])
+@pytest.mark.parametrize("command", [(SET_MODE, *PX4_HOLD), (PAUSE, 0)])
+async def test_hold_after_the_unreported_end_of_a_return_is_accepted(command: tuple[int, ...], own: bool) -> None:
+    """Quirk rth-finished-missing: the drone hovers at home already, so it has nothing to report of the Hold."""
+    async with world(speed=FAST, quirks=("rth-finished-missing",)) as w:
+        await away(w)
+        mark = w.client.mark()
+        if own:
+            return_by_itself(w)
+        else:
+            await go_home(w)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.returning, since=mark)
+        hovers_at = await w.drone.wait_log(
+            lambda e: e.name == "flying" and e.args["to"] == "hovering" and not w.drone.firmware.homing.active,
+            30.0,
+            since=w.drone.log[-1].t,
+        )
+        mark = w.client.mark()
+        assert (await w.client.command(*command, timeout=12.0)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, since=mark)
+        assert not [e for e in w.drone.log if e.t > hovers_at.t and e.name == "flying"]
 
 
 async def test_return_not_reported_as_finished_ends_with_the_landing() -> None:

@@ -7,6 +7,7 @@ return may have begun by itself, or become one of the drone's own while it was o
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import math
 from collections.abc import Callable
 
@@ -295,10 +296,12 @@ class ReturnHome:
         began = loop_time()
         try:
             await answer.wait_or_quiet(self.abort(even_its_own), rth.Abort.NAME, timeout)
+            # The event may have been about an earlier return: what ends this one is that the drone has the order.
+            await self._commander.stops_delivered(rth.Abort.NAME, timeout - (loop_time() - began))
+            if self._home.state.returning:
+                await answer.wait()  # for the states that `abort` has requested
         finally:
             answer.close()
-        # The event may have been about an earlier return: what ends this one is that the drone has the order.
-        await self._commander.stops_delivered(rth.Abort.NAME, timeout - (loop_time() - began))
         if self._home.state.returning:
             raise CommandTimeout(rth.Abort.NAME, timeout)
         return True
@@ -306,7 +309,8 @@ class ReturnHome:
     def abort(self, even_its_own: bool = False) -> asyncio.Future[None]:
         """End a return.
 
-        Until the drone has answered, what it last said of a return is no longer true.
+        Until the drone has answered, what it last said of a return is no longer true. One that reports nothing is asked
+        for its states: it may have ended the return before without a report, and an abort that finds none is silent.
         """
         self._moves.aborting = True
         self._abortion_insists = even_its_own
@@ -314,6 +318,9 @@ class ReturnHome:
         def quiet(delivery: asyncio.Future[None]) -> None:
             if delivery is self._abortion:  # a newer one has its own time
                 self._moves.aborted()
+                if self._home.state.returning:
+                    with contextlib.suppress(LinkLost):
+                        self._home.request_states()
 
         def heard(delivery: asyncio.Future[None]) -> None:
             asyncio.get_running_loop().call_later(QUIET, quiet, delivery)
