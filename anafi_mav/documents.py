@@ -26,7 +26,10 @@ def expected(what: str) -> dict[str, Any]:
 
 
 def open_file(path: Path) -> BinaryIO:
-    """Open a file for reading. Raises `OSError`, also for what is no file: a pipe would be waited for."""
+    """Open a file for reading.
+
+    Raises `OSError`, also for what is no file: a pipe would be waited for.
+    """
     file = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     mode = os.fstat(file).st_mode
     if not stat.S_ISREG(mode):

@@ -132,12 +132,21 @@ async def _guarded(name: str, ending: Awaitable[None]) -> None:
 class _Supervised:
     """A drone with its system and the task that keeps them connected."""
 
-    def __init__(self, config: DroneConfig, drone: Drone, system: System, changed: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        config: DroneConfig,
+        drone: Drone,
+        system: System,
+        changed: Callable[[], None],
+        on_first_connection: Callable[[], None],
+    ) -> None:
         """`changed` is called whenever the drone has connected or disconnected."""
         self.config = config
         self.drone = drone
         self.system = system
         self._changed = changed
+        self._on_first_connection: Callable[[], None] | None = on_first_connection
+        """None once it was called."""
         self.first_attempt = asyncio.Event()
         self.problem = ""
         """Why the last attempt to connect failed; empty while connected."""
@@ -195,6 +204,9 @@ class _Supervised:
                         self.system.link_up(memory_problem)
                         self._changed()
                         self.first_attempt.set()
+                        if self._on_first_connection is not None:
+                            self._on_first_connection()
+                            self._on_first_connection = None
                     reason = await asyncio.shield(self.drone.lost)
                     logger.warning("%s: link lost: %s", self.config.name, reason)
                     self.problem = f"link lost: {reason}"
@@ -311,10 +323,17 @@ class Gateway:
     Every drone of the configuration needs an address.
     """
 
-    def __init__(self, config: Config, *, clock: Clock | None = None, saves: bool = True) -> None:
+    def __init__(
+        self,
+        config: Config,
+        *,
+        clock: Clock | None = None,
+        saves: bool = True,
+        on_first_connection: Callable[[], None] = lambda: None,
+    ) -> None:
         """Without `saves` nothing is written to a disk, and the state folder is not locked.
 
-        `anafi-mav run --check` opens and closes such a gateway.
+        `anafi-mav run --check` opens and closes such a gateway. `on_first_connection` is called once for each drone.
         """
         for index, drone in enumerate(config.drones):
             if drone.address is None:
@@ -323,6 +342,7 @@ class Gateway:
         self._clock: Clock = clock or SystemClock()
         state = state_folder(config.state)
         self._saves = saves
+        self._on_first_connection = on_first_connection
         self._keys = KeyRing(None if state is None else folder_of(state), self._clock, saves=saves)
         self._signing_setup = SigningSetup(self._keys, lambda: self._node.channels, lambda: self.systems)
         self._node = Node(
@@ -514,7 +534,7 @@ class Gateway:
                 self.relay.add(DroneSource(config.sysid, config.name, drone))
             if self._recorder is not None:
                 self._recorder.add(drone)
-            supervised = _Supervised(config, drone, system, self._write_lock)
+            supervised = _Supervised(config, drone, system, self._write_lock, self._on_first_connection)
             supervised.task = asyncio.get_running_loop().create_task(supervised.run())
             self._supervised.append(supervised)
         self._write_lock()

@@ -439,9 +439,9 @@ MOVE_FAILED = Reason("drone aborted the move")
 NOT_ITS_TAKEOFF = Reason("takeoff of another client")
 FOREIGN_TAKEOFF = Reason("takeoff by another controller")
 GROUND_SETPOINTS_STOPPED = OperatorText("Setpoints stopped on the ground: disarming")
-OFFBOARD_STOPPED_ON_GROUND = OperatorText("Offboard setpoints stopped: on the ground")
-OFFBOARD_STOPPED_TAKEOFF = OperatorText("Offboard setpoints stopped: takeoff continues")
-OFFBOARD_STOPPED_HOVER = OperatorText("Offboard setpoints stopped: hovering")
+OFFBOARD_STOPPED_ON_GROUND = OperatorText("Setpoints stopped: on the ground")
+OFFBOARD_STOPPED_TAKEOFF = OperatorText("Setpoints stopped: takeoff continues")
+OFFBOARD_STOPPED_HOVER = OperatorText("Setpoints stopped: hovering")
 TILT_HELD = Template("Tilt limit {tilt:.0f} deg: roll sign not verified", tilt=99)
 TILT_WIND = Template(  #
     "MaxTilt {tilt:.0f}: {speed:.1f} m/s at {wind:g} m/s wind needs {needed}", tilt=40, speed=99.9, wind=10, needed=89

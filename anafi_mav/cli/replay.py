@@ -131,7 +131,10 @@ class VehicleFrames:
 async def play(
     tlogs: Sequence[Path], traces: Sequence[Path], endpoints: Sequence[str], speed: float, start: float
 ) -> int:
-    """Send everything at its time; return the number of frames. Raises `AnafiMavError` as `run` does."""
+    """Send everything at its time; return the number of frames.
+
+    Raises `AnafiMavError` as `run` does.
+    """
     node = Node(flavours=tuple(FLAVOURS))
     await node.start(endpoints)
     try:

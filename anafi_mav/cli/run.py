@@ -18,6 +18,7 @@ import msgspec
 from anafi_mav.cli import event_loop, interrupts, log, run_check, start_warnings
 from anafi_mav.cli.addresses import Reservations, spot
 from anafi_mav.cli.child import SimulatorProcess
+from anafi_mav.cli.heap_freezer import HeapFreezer, frozen_afterwards
 from anafi_mav.cli.service_manager import ServiceManager
 from anafi_mav.cli.terminal import complain, say
 from anafi_mav.config import Config, from_mapping, load
@@ -184,7 +185,8 @@ async def _run(config: Config, sim_log: Path | None) -> list[str]:
     async with contextlib.AsyncExitStack() as stack:
         manager = stack.enter_context(ServiceManager(os.environ))  # signs of life go on while the gateway closes
         gateway_config, fleet = place(config, stack.enter_context(Reservations()))
-        gateway = Gateway(gateway_config)
+        freezer = stack.enter_context(contextlib.closing(HeapFreezer()))
+        gateway = Gateway(gateway_config, on_first_connection=freezer.request)
         if not await _unless(signals.stop, _start(gateway, fleet, sim_log, stack)):
             return []
         signals.flying = gateway.drones_in_air
@@ -216,7 +218,8 @@ async def _start(
         death = asyncio.create_task(_tell_death(simulator, names))
         stack.callback(death.cancel)
         stack.push_async_callback(_close, gateway)  # before the simulator: the last hover has to reach it
-    await gateway.start()
+    with frozen_afterwards():
+        await gateway.start()
     await gateway.ready(READY_LIMIT)
 
 

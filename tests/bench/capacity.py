@@ -67,7 +67,7 @@ SETTLE = 6.0
 FIRST_HEIGHT = 1000.0
 """m: heights that no drone on the ground reports by itself; each event's is 0.25 m above the one before."""
 
-AS_INSTALLED = "import sys; sys.modules['aiortc'] = None; from anafi_mav.cli import main; sys.exit(main())"
+AS_INSTALLED = "import sys; sys.modules['aiortc'] = None; from anafi_mav.__main__ import main; sys.exit(main())"
 """Runs `anafi-mav` as if the extra `web` were not installed."""
 
 

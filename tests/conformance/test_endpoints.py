@@ -60,7 +60,7 @@ async def fly_to(client: Client, place: tuple[float, float], height: float) -> N
     assert ack.result == ACCEPTED
     await client.wait(
         "GLOBAL_POSITION_INT",
-        lambda m: geo.distance(*place, m.lat / 1e7, m.lon / 1e7) < 1.0 and abs(m.relative_alt / 1000 - height) < 0.5,
+        lambda m: geo.distance(*place, m.lat / 1e7, m.lon / 1e7) < 0.5 and abs(m.relative_alt / 1000 - height) < 0.3,
         timeout=20.0,
     )
 

@@ -176,7 +176,7 @@ async def test_setpoint_after_guided_velocity_has_its_own_timeout(kind: str) -> 
         async with streaming(w.client, last):
             pass
         died = loop.time()
-        await said(w.client, "Offboard setpoints stopped: hovering", mark)
+        await said(w.client, "Setpoints stopped: hovering", mark)
         assert loop.time() - died < 0.8
 
 

@@ -23,7 +23,7 @@ async def test_velocity_once_a_second_flies_on_in_guided() -> None:
         level = [e for e in heard(w, "PCMD") if not e.args["pitch"]]
         begun = next(e.t for e in heard(w, "PCMD") if e.args["pitch"] > 0)
         assert [e for e in level if e.t > begun] == []
-        await said(w.client, "Offboard setpoints stopped: hovering")
+        await said(w.client, "Setpoints stopped: hovering")
         assert w.drone.pose.north > 6.5
 
 
@@ -34,7 +34,7 @@ async def test_guided_timeout_follows_the_clients_parameter(seconds: float) -> N
         await w.take_off()
         mark, sent = w.client.mark(), asyncio.get_running_loop().time()
         w.client.send(NORTH)
-        await said(w.client, "Offboard setpoints stopped: hovering", mark)
+        await said(w.client, "Setpoints stopped: hovering", mark)
         deflected = [e.t - sent for e in heard(w, "PCMD", since=sent) if e.args["pitch"]]
         assert seconds - 0.3 < max(deflected) <= seconds
 
@@ -47,4 +47,4 @@ async def test_velocity_once_a_second_stops_in_between_in_offboard() -> None:
         async with streaming(w.client, NORTH):
             await engage(w.client, "px4")
             mark = w.client.mark()
-        await said(w.client, "Offboard setpoints stopped: hovering", mark)
+        await said(w.client, "Setpoints stopped: hovering", mark)

@@ -99,6 +99,8 @@ async def test_pose_at_30_hz_is_the_truth_of_its_time(model: str, flavour: str, 
         ack = await w.client.command(REPOSITION, -1, 1, 0, NAN, frame=RELATIVE, x=place[0], y=place[1], z=12.0)
         assert ack.result == ACCEPTED  # without a heading: it leans to the side
         await w.client.wait("ANAFI_PICTURE", timeout=10.0)
+        # Its climb begins with a jerk, of which the log's ten poses a second are no truth.
+        await w.client.wait("LOCAL_POSITION_NED", lambda m: m.vz < -1.5, timeout=10.0)
         mark = w.client.mark()
         await asyncio.sleep(4.0)
         assert video.state.playing

@@ -298,6 +298,24 @@ async def test_return_not_reported_as_finished_hovers_with_a_text() -> None:
         await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
 
 
+@pytest.mark.parametrize("began", ["by itself", "commanded"])
+async def test_hold_after_a_return_that_is_not_reported_as_finished_is_accepted(began: str) -> None:
+    """Quirk rth-finished-missing: the drone hovers at home, and has no return that Hold could abort."""
+    async with world(speed=FAST, quirks=("rth-finished-missing",)) as w:
+        await away(w)
+        mark = w.client.mark()
+        if began == "by itself":
+            return_by_itself(w)
+        else:
+            await go_home(w)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.returning, since=mark)
+        await w.drone.wait_log(lambda e: not w.drone.firmware.homing.active, 30.0, since=w.drone.log[-1].t)
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
+        assert w.drone.pose.ground_speed < 0.3
+        assert landings(w) == []
+
+
 async def test_return_not_reported_as_finished_ends_with_the_landing() -> None:
     """Quirk rth-finished-missing: a return of the flight before neither ends the next climb nor shows mode Return."""
     async with world(speed=FAST, quirks=("rth-finished-missing",)) as w:

@@ -103,7 +103,7 @@ async def test_climbing_offboard_setpoint_takes_off_and_is_flown(
             early = [e for e in heard(w, "PCMD", "moveTo", "moveBy") if e.t < hovering.t and any(e.args.values())]
             assert [e for e in early if not e.name.endswith("PCMD") or e.args["gaz"] or e.args["pitch"]] == []
             await w.client.heartbeat(lambda beat: beat.custom_mode == OFFBOARD and beat.base_mode & ARMED)
-        await said(w.client, "Offboard setpoints stopped: hovering")
+        await said(w.client, "Setpoints stopped: hovering")
 
 
 async def test_trajectory_from_the_ground_takes_off_and_is_flown() -> None:
@@ -132,7 +132,7 @@ async def test_guided_attitude_with_thrust_takes_off() -> None:
             await lifted(w)
             await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["up"] > 3.0, 15.0)
         mark = w.client.mark()
-        await said(w.client, "Offboard setpoints stopped: hovering")
+        await said(w.client, "Setpoints stopped: hovering")
         await w.client.heartbeat(lambda beat: beat.custom_mode == COPTER_GUIDED, since=mark)
         async with streaming(w.client, local(VELOCITY_ONLY, v=(1.0, 0.0, 0.0))):
             await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 2.0, 15.0)
@@ -248,7 +248,7 @@ async def test_silence_in_setpoint_takeoff_disarms_on_ground_hovers_airborne(mom
             await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark, timeout=15.0)
             assert w.drone.flying_state.name == "LANDED"
             return
-        await said(w.client, "Offboard setpoints stopped: hovering", mark)
+        await said(w.client, "Setpoints stopped: hovering", mark)
         await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD and beat.base_mode & ARMED, timeout=10.0)
         assert heard(w, "Landing") == []
         assert w.drone.pose.up == pytest.approx(1.0, abs=0.5)
@@ -495,7 +495,7 @@ async def test_offboard_silent_during_takeoff_leaves_the_climb_alone() -> None:
         async with streaming(w.client, local(VELOCITY_ONLY, v=(2.0, 0.0, 0.0))):
             await rising(w, 4.0)
             assert (await w.client.command(SET_MODE, 1, 6, 0)).result == ACCEPTED
-        await said(w.client, "Offboard setpoints stopped: takeoff continues", mark)
+        await said(w.client, "Setpoints stopped: takeoff continues", mark)
         await w.at_height(4.0)
         assert [e for e in heard(w, "PCMD") if e.args["pitch"]] == []
 

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import math
 import os
 import selectors
 import socket
@@ -136,30 +137,23 @@ class Selector(selectors.DefaultSelector):
 
     def _select(self, timeout: float | None) -> Any:
         global _ahead, _newest, _computing
-        if timeout is None or not self._alone():
-            return self._select_beside_others(timeout)
+        is_alone = timeout is not None and self._alone()
+        if not (is_alone or self._only_threads() or self._only_reactive()):
+            self._stop_computing()
+            return super().select(timeout)
         here = self._stop_computing()
         ready = super().select(0.0)
-        if not ready and timeout > 0.0:
+        if not ready and (timeout is None or timeout > 0.0):
             # What waits behind callbacks that are ready need not be seen before them.
             self._barrier.wait()
             ready = super().select(0.0)
             if not ready:
-                here += timeout
-        _ahead, _newest = here - _real(), here
+                if not is_alone:
+                    ready = super().select(timeout)
+                waited = math.inf if is_alone else now() - here
+                here += waited if timeout is None else min(waited, timeout)
+        _ahead, _newest = here - _real(), max(_newest, here)
         _computing = get_ident()
-        return ready
-
-    def _select_beside_others(self, timeout: float | None) -> Any:
-        global _ahead, _newest, _computing
-        began = self._stop_computing()
-        ready = super().select(timeout)
-        if self._only_threads() or self._only_reactive():
-            here = _real() + _ahead
-            if timeout is not None:
-                here = min(here, began + max(timeout, 0.0))
-            _ahead, _newest = here - _real(), max(_newest, here)
-            _computing = get_ident()
         return ready
 
     def _stop_computing(self) -> float:

@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+import anafi_mav.web.webrtc  # noqa: F401 - else a gateway loads it in a thread, and the clock of tests runs meanwhile
 from anafi_mav.config import Config, DroneConfig, HttpConfig, MediaConfig, RecordingConfig, VideoConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable
+from typing import Any
 
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, rth
@@ -16,7 +17,7 @@ from anafi_mav.arsdk.messages import move as guided
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, FlyingStateChanged, OrientationMode
 from anafi_mav.arsdk.messages.rth import RthState
 from anafi_mav.drone.element import Element, Position
-from anafi_mav.drone.expectation import Commander, loop_time
+from anafi_mav.drone.expectation import Commander, Expectation, loop_time
 from anafi_mav.drone.piloting.moves import Displacement, Move, MoveEnd, Moves
 from anafi_mav.drone.piloting.state import PilotingState, in_state
 from anafi_mav.drone.piloting.stick_stream import StickStream
@@ -294,7 +295,8 @@ class ReturnHome:
         answer = self._commander.expect((rth.State,), _ends_return)
         began = loop_time()
         try:
-            await answer.wait_or_quiet(self.abort(even_its_own), rth.Abort.NAME, timeout)
+            self.abort(even_its_own)
+            await self.wait_for_end(answer, rth.Abort.NAME, timeout)
         finally:
             answer.close()
         # The event may have been about an earlier return: what ends this one is that the drone has the order.
@@ -303,7 +305,18 @@ class ReturnHome:
             raise CommandTimeout(rth.Abort.NAME, timeout)
         return True
 
-    def abort(self, even_its_own: bool = False) -> asyncio.Future[None]:
+    async def wait_for_end(self, answer: Expectation[Any], what: str, timeout: float) -> None:
+        """Wait for the end of a return that was aborted.
+
+        The drone has then received the abort, and reports no return or answers nothing. A drone whose return has ended without a report has none to abort: it is asked for its states. Raises
+        `CommandTimeout` about `what` when it then still reports a return.
+        """
+        assert self._abortion is not None
+        if not await answer.wait_or_quiet(self._abortion, what, timeout) and self._home.state.returning:
+            self._home.request_states()
+            await answer.wait()
+
+    def abort(self, even_its_own: bool = False) -> None:
         """End a return.
 
         Until the drone has answered, what it last said of a return is no longer true.
@@ -320,7 +333,6 @@ class ReturnHome:
 
         delivery = self._abortion = self._commander.send_stop(rth.Abort())
         delivery.add_done_callback(heard)
-        return delivery
 
     def drop(self, why: str) -> bool:
         """The return that we asked for, running or on its way, is not ours any more.

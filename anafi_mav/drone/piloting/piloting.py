@@ -365,8 +365,9 @@ class Piloting(PilotingSettings):
             answers.append(self._commander.expect((ardrone3.MoveByEnd,), lambda message: True))
         if self.state.plan == PlayingState.PLAYING:
             answers.append(self._commander.expect((common.MavlinkFilePlayingStateChanged,), _ends_playing))
+        returning = None
         if self._moves.returning is not None and self._moves.returning.running:
-            answers.append(self._commander.expect((rth.State,), self._returns.ends_ours))
+            returning = self._commander.expect((rth.State,), self._returns.ends_ours)
         if self.state.following not in (None, FollowMeMode.NONE):
             answers.append(self._commander.expect((follow_me.State,), _ends_following))
         if self.state.animation not in (None, animation.Type.NONE):
@@ -378,10 +379,12 @@ class Piloting(PilotingSettings):
                 answer.expire_after(timeout, "hover")
             for answer in answers:
                 await answer.wait()
+            if returning is not None:
+                await self._returns.wait_for_end(returning, "hover", timeout)
             # Of what was given up before it was confirmed no event may speak; but the order to stop has to arrive.
             await self._commander.stops_delivered("hover", timeout - (loop_time() - began))
         finally:
-            for answer in answers:
+            for answer in (*answers, *filter(None, (returning,))):
                 answer.close()
 
     def _stop_following(self, state: PilotingState) -> None:
