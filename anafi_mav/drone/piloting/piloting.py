@@ -156,7 +156,7 @@ class Piloting(PilotingSettings):
 
     @property
     def rises(self) -> bool:
-        """True while the drone starts its motors or rises to its first hover, by a take-off of this program."""
+        """True from the start of the motors to the first hover, by a take-off of this program."""
         return self._motors.rises
 
     def require_free(self) -> None:
