@@ -540,6 +540,7 @@ class Drone:
         piloting = self.piloting
         return (
             piloting.moving
+            or piloting.rises
             or piloting.sticks_held
             or self._commander.begins
             or piloting.state.plan == PlayingState.PLAYING

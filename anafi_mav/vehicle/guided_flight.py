@@ -15,6 +15,7 @@ from anafi_mav.drone import MoveEnd, Position
 from anafi_mav.drone.events import AttitudeChanged
 from anafi_mav.drone.expectation import loop_time
 from anafi_mav.drone.piloting.piloting import Piloting
+from anafi_mav.errors import CommandRejected
 from anafi_mav.texts import Subject
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import check_height, check_place
@@ -23,7 +24,7 @@ from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.move_heading import MoveHeading, oriented
 from anafi_mav.vehicle.base.preparation import Preparation
-from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.base.refusal import Refused, Unfinished
 from anafi_mav.vehicle.base.requester import By
 from anafi_mav.vehicle.base.severity import Severity
 
@@ -35,6 +36,9 @@ Some millimetres distinguish two of them.
 
 AT_REST = 0.01
 """rad between two reports of the heading, 0.2 s apart, of a drone that does not turn."""
+
+SHORT_CLIMB, SHORT_TURN = 1.0, 0.2
+"""m and rad by which a moveBy that something else has ended is short of its end."""
 
 REST_WAIT = 2.0
 """s until a turn counts from the newest heading, whether or not the drone turns. MaxRotationSpeed ends within one."""
@@ -243,7 +247,7 @@ class GuidedFlight:
             if state.altitude is None:
                 raise Refused(texts.GOTO, texts.HEIGHT_UNKNOWN)
             turn = 0.0 if yaw is None or state.attitude is None else units.wrap_pi(yaw - state.attitude.yaw)
-            await vehicle.drone.piloting.move_by(0.0, 0.0, state.altitude - ato, turn)
+            await self._offset(rules, state.altitude - ato, turn)
 
     async def turn(
         self, angle_from: Callable[[float], float], rate_dps: float | None, mode: FlightMode, by: By
@@ -258,7 +262,26 @@ class GuidedFlight:
             grant.begin()
             angle = angle_from(await self._resting_heading())
             vehicle.control.check(hover, by, rules)
-            await vehicle.drone.piloting.move_by(0.0, 0.0, 0.0, angle, turn_rate_dps=rate_dps)
+            await self._offset(rules, 0.0, angle, rate_dps)
+
+    async def _offset(self, rules: TaskRules, down: float, turn: float, rate_dps: float | None = None) -> None:
+        """Fly a moveBy (m, rad) to its end. No await before it: its needs have just been checked.
+
+        Raises `Unfinished` when a landing, a return or the pilot has ended it: it was no refusal, since it had begun.
+        A drone that begins one may report the end of the move without an error, and how far it has come.
+        """
+        vehicle, controller = self._vehicle, self._vehicle.drone.controller
+        takeovers = controller.takeovers
+        try:
+            flown = await vehicle.drone.piloting.move_by(0.0, 0.0, down, turn, turn_rate_dps=rate_dps)
+        except CommandRejected as error:
+            reason = texts.PILOT if controller.takeovers != takeovers else vehicle.lacking(rules.needs)
+            if reason is None:
+                raise
+            raise Unfinished(rules.what, reason) from error
+        is_short = abs(flown.down - down) > SHORT_CLIMB or abs(units.wrap_pi(flown.turn - turn)) > SHORT_TURN
+        if is_short and (reason := vehicle.lacking(rules.needs)) is not None:
+            raise Unfinished(rules.what, reason)
 
     async def _resting_heading(self) -> float:
         """Return the heading (rad) once the drone turns no further, or after `REST_WAIT`.

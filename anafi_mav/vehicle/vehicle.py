@@ -498,7 +498,8 @@ class Vehicle(Aircraft):
             case FlightMode.HOLD | FlightMode.POSITION:
                 await self.hold(mode, by)
             case FlightMode.GUIDED:
-                await self.hold(mode, by, chosen=True)
+                if not self._keeps_takeoff(by):
+                    await self.hold(mode, by, chosen=True)
             case FlightMode.LAND:
                 await self.land(by)
             case FlightMode.RETURN:
@@ -520,6 +521,20 @@ class Vehicle(Aircraft):
                 await self.follow.engage(by)
             case FlightMode.ORBIT:
                 raise Refused(texts.ORBIT, texts.BY_COMMAND_ONLY, lasting=True)
+
+    def _keeps_takeoff(self, by: Right) -> bool:
+        """Return True when a take-off leads to Guided, which a client chooses again: it goes on.
+
+        Guided is then that client's. ArduCopter changes nothing when its present mode is chosen (mode.cpp, `set_mode`).
+        """
+        control = self.control
+        rises = control.active is self.takeoff
+        below = control.below if rises else control.next_below if control.next is self.takeoff else None
+        if below is None or below.mode is not FlightMode.GUIDED:
+            return False
+        if rises:
+            control.adopt(self.takeoff, below=Hover(FlightMode.GUIDED, by.client))
+        return True
 
     # Ending a landing or a return.
 

@@ -7,14 +7,15 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import CANCELLED, IN_PROGRESS
+from support.fault_scenarios import CANCELLED, IN_PROGRESS, another_controller, return_by_itself
 from support.flavours import both
 from support.missions import put, start, takeoff, way
 from support.params import write
-from support.setpoints import NO_YAW_RATE, VELOCITY_ONLY, engage, local, streaming
+from support.setpoints import NO_YAW_RATE, VELOCITY_ONLY, engage, local, streaming, texts
 from support.world import ARMED, HOME, World, world
 
 from anafi_mav import geo, units
+from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.mavlink import dialect as newer
 
 ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
@@ -430,3 +431,30 @@ async def test_conf_083_set_home_here_and_nowhere(flavour: str) -> None:
         assert (await w.client.command(SET_HOME, 0, x=0.0, y=0.0, z=HOME[2])).result == DENIED
         assert (await w.client.command(SET_HOME, 0)).result == DENIED
         assert (await w.client.heartbeat(lambda beat: True)).custom_mode == w.modes.hold
+
+
+@both
+@pytest.mark.parametrize("end", ["landing", "return", "pilot"])
+async def test_turn_that_something_else_ends_has_failed(flavour: str, end: str) -> None:
+    """The turn had begun, so that it was not refused: a landing or return of the drone's own, or the pilot's stick."""
+    async with world(flavour=flavour, skycontroller=3 if end == "pilot" else None) as w:
+        await w.take_off(8.0)
+        mark, yaw = w.client.mark(), w.drone.pose.yaw
+        w.client.send_command(dialect.MAV_CMD_CONDITION_YAW, 170.0, 10.0, 1.0, 1.0)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and abs(w.drone.pose.yaw - yaw) > 0.2, 20.0)
+        pilot = w.drone.skycontroller
+        if end == "landing":
+            another_controller(w, ardrone3.Landing())
+        elif end == "return":
+            return_by_itself(w)
+        elif pilot is not None:
+            pilot.stick(3, 40)
+        ack = await w.client.wait(
+            "COMMAND_ACK",
+            lambda m: m.command == dialect.MAV_CMD_CONDITION_YAW and m.result != 5,
+            since=mark,
+            timeout=20.0,
+        )
+        assert ack.result == dialect.MAV_RESULT_FAILED
+        reason = {"landing": "drone is landing", "return": "drone is returning", "pilot": "Skycontroller pilot"}[end]
+        assert any(text.startswith(f"Turn failed: {reason}") for text in texts(w.client, mark))

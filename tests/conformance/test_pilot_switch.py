@@ -210,6 +210,27 @@ async def test_pilots_stick_during_a_takeoff_leaves_the_drone_at_its_first_hover
         assert skycontroller(w).source is Source.SKY_CONTROLLER
 
 
+@pytest.mark.parametrize("state", ["motor_ramping", "takingoff"])
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+async def test_pilots_stick_during_a_takeoff_ends_its_climb(flavour: str, state: str) -> None:
+    """The axes are grabbed with the take-off: no motion of ours has preceded the stick, which rests again at once."""
+    async with world(speed=1.0, skycontroller=3, flavour=flavour) as w:
+        if flavour == "ardupilot":
+            assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4)).result == ACCEPTED
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        mark = w.client.mark()
+        w.client.send_command(TAKEOFF, x=0.0, y=0.0, z=15.0)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == state, 10.0)
+        skycontroller(w).stick(PITCH_STICK, 40)
+        await said(w.client, "Skycontroller pilot has control: stick moved", mark)
+        skycontroller(w).stick(PITCH_STICK, 0)
+        await said(w.client, "Climb to 15 m aborted: Skycontroller pilot", mark)
+        await asyncio.sleep(5.0)
+        assert heard(w, "moveBy") == []
+        assert w.drone.pose.up == pytest.approx(1.0, abs=0.2)
+        assert skycontroller(w).source is Source.SKY_CONTROLLER
+
+
 async def test_takeoff_that_waits_for_arming_ends_with_the_pilots_stick() -> None:
     """The client arms afterwards: the policy is asked again before the drone lifts off."""
     async with world(speed=1.0, skycontroller=3) as w:

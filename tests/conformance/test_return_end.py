@@ -467,3 +467,17 @@ async def test_return_over_a_bad_link_ends_landed_once(flavour: str) -> None:
         w.drone.faults.up = w.drone.faults.down = Impairment()
         assert len(landings(w)) == 1
         assert len(w.commands("rth.return_to_home")) == 1
+
+
+@both
+async def test_home_here_during_the_drones_own_return_is_refused(flavour: str) -> None:
+    """It would end the return of an empty battery in a hover that no client commanded."""
+    async with world(flavour=flavour) as w:
+        await away(w, 40.0)
+        return_by_itself(w)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.returning)
+        mark = w.client.mark()
+        assert (await w.client.command(SET_HOME, 1)).result == REJECTED
+        assert "Home refused: drone is returning by itself" in texts(w.client, mark)
+        assert w.commands("rth.set_preferred_home_type") == w.commands("rth.set_custom_location") == []
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] < 5.0, 60.0)

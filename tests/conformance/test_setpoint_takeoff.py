@@ -394,6 +394,19 @@ async def test_command_during_a_takeoff_waits_for_the_climb(
         assert later or follow is orbited
 
 
+@pytest.mark.parametrize("begin", [starting, rising, climbing])
+async def test_guided_chosen_again_during_a_takeoff_keeps_the_climb(begin: Callable[[World, float], Any]) -> None:
+    """As in ArduCopter, where the present mode chosen again changes nothing; setpoints of its client fly after it."""
+    async with world(flavour="ardupilot", clients=2) as w:
+        await begin(w, 9.0)
+        mark = w.client.mark()
+        assert (await w.clients[1].command(SET_MODE, 1, COPTER_GUIDED)).result == ACCEPTED
+        await w.at_height(9.0)
+        assert not [text for text in texts(w.client, mark) if "Climb" in text]
+        async with streaming(w.clients[1], local(VELOCITY_ONLY, v=(2.0, 0.0, 0.0))):
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 2.0, 20.0)
+
+
 @pytest.mark.parametrize("stop", [(SET_MODE, 1, 4, 3), (dialect.MAV_CMD_DO_PAUSE_CONTINUE, 0)])
 async def test_climb_that_a_command_ends_is_reported_with_its_height(stop: tuple[int, ...]) -> None:
     """The take-off was accepted long before: its client reads that the drone is lower than it was commanded to."""

@@ -19,6 +19,7 @@ from anafi_mav import geo
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.mavlink import dialect as newer
 from anafi_mav.sim.skycontroller import TAKEOFF_LAND
+from anafi_mav.vehicle.hold_rule import APART
 from support.fault_scenarios import return_by_itself
 from support.mav import NAN, Client
 from support.missions import ACTIVE, CORNERS, PAUSED, put, start, state
@@ -204,7 +205,7 @@ async def own_return(c: Cell) -> None:
     await goto(c)
     await c.until(lambda: c.w.drone.pose.north > 70.0, 60.0)
     return_by_itself(c.w)
-    await c.until(lambda: c.returns and c.speed > 1.0, 20.0)
+    await c.w.client.heartbeat(lambda beat: beat.custom_mode == c.w.modes.returning)
 
 
 async def landing(c: Cell) -> None:
@@ -388,11 +389,11 @@ async def _stop(c: Cell, *, holds: bool) -> None:
     if pilot is not None:
         pilot.stick(3, 0)
     client = c.w.client
-    for _ in range(2 if holds else 0):  # a return of the drone's own is ended by the second one
+    for _ in range(2 if holds else 0):  # a Hold ends a return of the drone's own when no other preceded it by 5 s
         hold = await client.command(Cmd.MAV_CMD_DO_SET_MODE, *((1, 4, 3) if c.px4 else (1, 17)), timeout=PATIENCE)
         if hold.result == 0:
             break
-        await asyncio.sleep(1.0)
+        await asyncio.sleep(APART)
     if holds and (hold.result != 0 or not await c.until(lambda: c.speed < 0.5 and not c.returns, 8.0)):
         c.findings.append(f"hold: {NAMES[hold.result]}, {c.speed:.1f} m/s {texts(client)[-1:]}")
     land = await client.command(Cmd.MAV_CMD_NAV_LAND, timeout=PATIENCE)

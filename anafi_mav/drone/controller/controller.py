@@ -1,10 +1,10 @@
 """Element controller: the Skycontroller between us and the drone, and its piloting source.
 
 It arbitrates between the Skycontroller's pilot and our user. The sticks normally have control. When a user commands
-motion, the piloting source is acquired and the four axes of the sticks are grabbed, so that stick input of the pilot
-is seen; when the motion is over, both are released. A pilot who moves a stick has control at once and keeps it until
-the user has sent no motion for a while. The return-home and the take-off/land button are never grabbed: they are the
-pilot's. A Skycontroller takes both back by itself when the connection ends (skyctrl.xml 4-20-0).
+a take-off or motion, the piloting source is acquired and the four axes of the sticks are grabbed, so that stick input
+of the pilot is seen; when the motion is over, both are released. A pilot who moves a stick has control at once and
+keeps it until the user has sent no motion for a while. The return-home and the take-off/land button are never grabbed:
+they are the pilot's. A Skycontroller takes both back by itself when the connection ends (skyctrl.xml 4-20-0).
 
 Without a Skycontroller the state is empty, its verbs raise `NotSupported`, and motion is not restricted.
 """
@@ -190,13 +190,15 @@ class Controller(Element[ControllerState]):
     def allows(self, message: Message) -> bool:
         """Shown every command before it is sent.
 
-        A command of motion takes sticks and source for our user.
+        A command of motion takes sticks and source for our user, and so does a take-off.
 
         False: a stick position that must not be sent, since the pilot flies; a level one while he has the source is
         among them. Raises `CommandRejected` for any other motion then.
         """
         if not self.present:
             return True
+        if isinstance(message, ardrone3.TakeOff) and not self.pilot_acquired_control:
+            self._begin_motion()  # a climb follows: the pilot's stick ends it from the start of the motors on
         if not is_motion(message):
             return not (isinstance(message, ardrone3.PCMD) and self.pilot_has_source)
         if isinstance(message, ardrone3.PCMD):
@@ -204,12 +206,16 @@ class Controller(Element[ControllerState]):
                 return False
         elif self.pilot_acquired_control:
             raise CommandRejected("the pilot at the Skycontroller flies")
+        self._begin_motion()
+        return True
+
+    def _begin_motion(self) -> None:
+        """Take sticks and source, if they are not ours, until the motion is over."""
         self._last_motion = loop_time()
         if not self.taken:
             self._take()
         if self._watching.at is None:
             self._watching.set_in(LOOK_EVERY)
-        return True
 
     def _take(self) -> None:
         """Take sticks and source for our user."""

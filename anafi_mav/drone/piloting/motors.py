@@ -42,6 +42,7 @@ EMERGENCY_TIMEOUT = 30.0
 
 TURNING = frozenset({FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF})
 """The motors turn and the drone is not in the air."""
+_RISING = frozenset({FlyingState.MOTOR_RAMPING, FlyingState.TAKINGOFF})
 _LANDING = frozenset({FlyingState.LANDING, FlyingState.LANDED, FlyingState.EMERGENCY_LANDING, FlyingState.EMERGENCY})
 _MOTORS_CUT = frozenset({FlyingState.EMERGENCY, FlyingState.LANDED})
 
@@ -116,6 +117,11 @@ class Motors:
     def has_launched(self) -> bool:
         executed = any(self._sent.is_executed(slot) for slot in (Slot.LAUNCH, Slot.PLAN))
         return executed or self._sent.has_started_motors(loop_time())
+
+    @property
+    def rises(self) -> bool:
+        """True while the drone starts its motors or rises to its first hover, by a take-off of ours."""
+        return self.has_launched and self._flight.state.flying in _RISING
 
     async def take_off(self, timeout: float) -> None:
         self._commander.require_link()

@@ -154,6 +154,11 @@ class Piloting(PilotingSettings):
         """
         return self._motors.has_launched
 
+    @property
+    def rises(self) -> bool:
+        """True from the start of the motors to the first hover, by a take-off of this program."""
+        return self._motors.rises
+
     def require_free(self) -> None:
         """Raise `CommandRejected` while the drone returns by itself or lands.
 

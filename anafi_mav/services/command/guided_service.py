@@ -265,10 +265,18 @@ class GuidedService(Service):
         """MAV_CMD_DO_SET_HOME: param1 1 takes the drone's position, else the command's place.
 
         The drone's home becomes one of Parrot's type custom, and stays that until a client changes it: a text reports
-        this.
+        this. During a return that the drone has begun by itself its position is refused: the drone would be at home at
+        once, and hover there. A place elsewhere leads it there.
         """
         vehicle, home = self.host.vehicle, self.host.drone.home
-        if command.params[0] == 1.0:
+        is_here = command.params[0] == 1.0
+
+        def require_no_own_return() -> None:
+            if is_here and vehicle.returning_by_itself:
+                raise Refused(texts.HOME, texts.RETURNS_BY_ITSELF)
+
+        require_no_own_return()
+        if is_here:
             where, ato = vehicle.place, 0.0  # below the drone, not where it flies
             if where is None:
                 raise Refused(texts.HOME, texts.POSITION_UNKNOWN)
@@ -283,6 +291,7 @@ class GuidedService(Service):
             try:
                 await home.set_preferred_type(RthHomeType.CUSTOM)
                 at = home_height(vehicle, ato)
+                require_no_own_return()
                 given = await home.set_custom_location(where.latitude, where.longitude, at)
             except BaseException:
                 # The custom home of some other day must not stay: a return that replaces this waits until it is gone.

@@ -153,9 +153,9 @@ async def test_block_behind_skycontroller_leaves_the_drone_to_its_pilot() -> Non
         real = simulator.drones[0]
         async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
             await lift(drone)
-            assert drone.controller.present
+            await real.wait_log(lambda entry: drone.controller.pilot_has_source)
         assert commands(real, "TakeOff", "PCMD", "CancelMoveTo", "Landing") == ["TakeOff"]
-        assert sources(real) == []
+        assert sources(real) == ["CONTROLLER", "SKY_CONTROLLER"]
 
 
 async def test_move_behind_skycontroller_is_stopped_and_sticks_are_released() -> None:

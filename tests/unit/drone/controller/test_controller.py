@@ -140,12 +140,17 @@ async def test_both_are_read(crew: Crew) -> None:
     assert crew.drone.counters["unknown message"] == 0
 
 
-async def test_connecting_and_taking_off_leaves_sticks_to_the_pilot(crew: Crew) -> None:
-    await crew.take_off()
-    crew.drone.piloting.hover()
-    await crew.drone.piloting.return_home()
+async def test_connecting_hover_and_return_leave_sticks_to_the_pilot(crew: Crew) -> None:
+    """A take-off takes them until the first hover."""
     assert crew.observed("setPilotingSource") == []
     assert crew.observed("grab") == []
+    await crew.take_off()
+    await crew.hears(lambda: crew.drone.controller.pilot_has_source)
+    taken = [entry.args["source"] for entry in crew.observed("setPilotingSource")]
+    assert taken == [Source.CONTROLLER, Source.SKY_CONTROLLER]
+    crew.drone.piloting.hover()
+    await crew.drone.piloting.return_home()
+    assert len(crew.observed("setPilotingSource")) == 2
     crew.sc.stick(PITCH, 50)
     await crew.until(lambda entry: entry.kind == "command" and "PCMD" in entry.name)
     assert crew.sc.dropped == 0  # no stick position of ours, level or not
