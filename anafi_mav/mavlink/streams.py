@@ -194,7 +194,10 @@ class Streams(Generic[ChannelT]):
     def _leave(
         self, audience: _Audience[ChannelT], id: int, lane: _Lane[ChannelT], now: float, *, is_repeated: bool
     ) -> Sequence[ChannelT]:
-        """Return the channels to which a message of several streams may leave now; it counts as sent there."""
+        """Return the channels on which a message of several streams may leave now.
+
+        It counts as sent there.
+        """
         assert self._phase is not None
         due: Sequence[ChannelT] = ()
         until, has_first = _NEVER, False
