@@ -173,25 +173,45 @@ class Streams(Generic[ChannelT]):
         found: list[tuple[int, Sequence[ChannelT]]] = []
         soonest = _NEVER
         for id, lane in group.lanes:
-            if now >= lane.until:
-                due: Sequence[ChannelT] = ()
-                until, has_first = _NEVER, False
-                for stream, channels in lane.streams:
+            until = lane.until
+            if now >= until:
+                if len(lane.streams) == 1:  # nearly always: channels with the same interval share one
+                    ((stream, due),) = lane.streams
                     if now >= stream.next:
-                        has_first = has_first or stream.next == -_NEVER
                         stream.leave(now, self._phase, is_repeated=is_repeated)
-                        due = [*due, *channels] if due else channels
-                    if stream.next < until:
-                        until = stream.next
-                lane.until = until
-                if due:
-                    found.append((id, due))
-                if has_first and len(lane.streams) > 1:
-                    self._share(audience, id, lane)
-            if lane.until < soonest:
-                soonest = lane.until
+                        found.append((id, due))
+                    until = lane.until = stream.next
+                else:
+                    due = self._leave(audience, id, lane, now, is_repeated=is_repeated)
+                    if due:
+                        found.append((id, due))
+                    until = lane.until
+            if until < soonest:
+                soonest = until
         group.until = soonest
         return found
+
+    def _leave(
+        self, audience: _Audience[ChannelT], id: int, lane: _Lane[ChannelT], now: float, *, is_repeated: bool
+    ) -> Sequence[ChannelT]:
+        """Return the channels on which a message of several streams may leave now.
+
+        It counts as sent there.
+        """
+        assert self._phase is not None
+        due: Sequence[ChannelT] = ()
+        until, has_first = _NEVER, False
+        for stream, channels in lane.streams:
+            if now >= stream.next:
+                has_first = has_first or stream.next == -_NEVER
+                stream.leave(now, self._phase, is_repeated=is_repeated)
+                due = [*due, *channels] if due else channels
+            if stream.next < until:
+                until = stream.next
+        lane.until = until
+        if has_first:
+            self._share(audience, id, lane)
+        return due
 
     def next_on(self, channels: Sequence[ChannelT], ids: tuple[int, ...]) -> float:
         """Return when the first of these messages may leave next (s); inf when none is streamed.

@@ -532,6 +532,7 @@ class Vehicle(Aircraft):
         below = control.below if rises else control.next_below if control.next is self.takeoff else None
         if below is None or below.mode is not FlightMode.GUIDED:
             return False
+        control.require_allowed(self.takeoff, by)
         if rises:
             control.adopt(self.takeoff, below=Hover(FlightMode.GUIDED, by.client))
         return True
