@@ -15,9 +15,14 @@ import secrets
 import stat
 from pathlib import Path
 
+from anafi_mav.documents import open_file
+
 logger = logging.getLogger(__name__)
 
 FILE = "web.token"
+
+MAX_BYTES = 256
+"""Of the file: more is no token."""
 
 BYTES = 32
 """Of randomness: it cannot be guessed over a network."""
@@ -51,7 +56,8 @@ def read_token(folder: Path | None) -> AccessToken | None:
     if folder is None:
         return None
     try:
-        text = (folder / FILE).read_text(encoding="ascii").strip()
+        with open_file(folder / FILE) as file:
+            text = file.read(MAX_BYTES).decode("ascii").strip()
     except (OSError, ValueError):
         return None
     return AccessToken(text) if _VALID.fullmatch(text) else None

@@ -1,10 +1,13 @@
-"""Reads YAML files written by hand; an error is one line that names the place."""
+"""Reads files, and YAML written by hand; an error is one line that names the place."""
 
 from __future__ import annotations
 
+import errno
+import os
 import reprlib
+import stat
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import yaml
 
@@ -20,6 +23,27 @@ MAX_LINE = 300
 def expected(what: str) -> dict[str, Any]:
     """Return the `extra` of a key: the required value, as it reads after the word "expected"."""
     return {"expected": what}
+
+
+def open_file(path: Path) -> BinaryIO:
+    """Open a file for reading. Raises `OSError`, also for what is no file: a pipe would be waited for."""
+    file = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    mode = os.fstat(file).st_mode
+    if not stat.S_ISREG(mode):
+        os.close(file)
+        if stat.S_ISDIR(mode):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+        kind = next((what for is_kind, what in _KINDS if is_kind(mode)), "something else")
+        raise OSError(errno.EINVAL, f"expected a file, got {kind}", str(path))
+    return os.fdopen(file, "rb")
+
+
+_KINDS = (
+    (stat.S_ISFIFO, "a pipe"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+    (stat.S_ISSOCK, "a socket"),
+)
 
 
 def read(path: Path) -> object:

@@ -442,7 +442,7 @@ class Gateway:
             if error.errno in NO_LOCKS:  # the folder itself may be as good as any
                 logger.warning("%s: cannot be locked: %s", self._state, error.strerror)
                 return
-            self._state_problem = f"{self._state}: {error.strerror or error}"
+            self._state_problem = f"{error.filename or self._state}: {error.strerror or error}"
             logger.warning("state folder cannot be used: %s", self._state_problem)
             return
         if holder is not None:

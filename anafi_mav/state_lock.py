@@ -202,16 +202,21 @@ def _read(file: int) -> Holder:
 def check_folder(folder: Path, *names: str) -> None:
     """Raise `OSError` unless files can be made in a folder.
 
-    Those with these `names` can then be replaced. The folder may be absent. Nothing is made.
+    Those with these `names` can then be replaced; the error names the one that cannot. The folder may be absent.
+    Nothing is made.
     """
     present = folder
     while not os.path.lexists(present):
         present = present.parent
     if not present.is_dir():
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
-    files = (folder / name for name in names if (folder / name).exists())
-    if not os.access(present, os.W_OK | os.X_OK) or not all(os.access(file, os.W_OK) for file in files):
+    if not os.access(present, os.W_OK | os.X_OK):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    for file in (folder / name for name in names):
+        if file.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(file))
+        if file.exists() and not os.access(file, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(file))
 
 
 def replace_file(path: Path, data: bytes) -> None:

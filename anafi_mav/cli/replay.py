@@ -58,7 +58,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Play to the end or to Ctrl-C.
 
-    Raises `ConfigError` for a path without a recording, and `AnafiMavError` for a file that cannot be read.
+    Raises `ConfigError` for a path without a recording, and `AnafiMavError` for a file that cannot be read or has no
+    frame.
     """
     log.set_up()
     tlogs, traces = files_of(arguments.path)
@@ -109,6 +110,8 @@ class VehicleFrames:
     """Chooses the frames of vehicles: systems that have sent a HEARTBEAT with an autopilot."""
 
     def __init__(self) -> None:
+        self.seen = 0
+        """Frames of any system."""
         self._parser = Parser()
         self._vehicles: set[int] = set()
 
@@ -117,6 +120,7 @@ class VehicleFrames:
         found = self._parser.receive_datagram(raw)
         if not found:
             return None
+        self.seen += 1
         frame = found[0]
         message = frame.message
         if frame.id == dialect.MAVLINK_MSG_ID_HEARTBEAT and message.autopilot != dialect.MAV_AUTOPILOT_INVALID:
@@ -127,7 +131,7 @@ class VehicleFrames:
 async def play(
     tlogs: Sequence[Path], traces: Sequence[Path], endpoints: Sequence[str], speed: float, start: float
 ) -> int:
-    """Send everything at its time; return the number of frames."""
+    """Send everything at its time; return the number of frames. Raises `AnafiMavError` as `run` does."""
     node = Node(flavours=tuple(FLAVOURS))
     await node.start(endpoints)
     try:
@@ -167,6 +171,8 @@ async def _send(node: Node, tlogs: Sequence[Path], traces: Sequence[Path], speed
                     count += 1
     finally:
         reader.shutdown()
+    if not vehicles.seen:
+        raise AnafiMavError(f"{tlogs[0]}: no MAVLink frame: expected a tlog")
     return count
 
 

@@ -22,6 +22,7 @@ from pathlib import Path
 
 from anafi_mav.clock import Alarm, Clock
 from anafi_mav.disk_writer import HANGS
+from anafi_mav.documents import open_file
 from anafi_mav.endpoint_options import KEY_NAME
 from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink.signing import CONTENT_BYTES, KEY_BYTES, Signing
@@ -268,7 +269,7 @@ def read_key(folder: Path, name: str, suffix: str = SUFFIX) -> bytes | None:
     path = path_of(folder, name, suffix)
     try:
         _check(folder, folder.stat(), "700")
-        with path.open("rb") as file:
+        with open_file(path) as file:
             _check(path, os.fstat(file.fileno()), "600")
             content = file.read(CONTENT_BYTES + 1)
     except FileNotFoundError:

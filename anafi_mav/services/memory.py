@@ -21,6 +21,7 @@ from msgspec import Meta
 
 from anafi_mav import texts
 from anafi_mav.disk_writer import HANGS
+from anafi_mav.documents import open_file
 from anafi_mav.state_lock import STATE_WRITER, replace_file
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.fence.plan_items import MAX_ITEMS, PlanItem
@@ -111,7 +112,7 @@ class _Stored(msgspec.Struct, frozen=True):
 def _read_file(path: Path, serial: str) -> _Stored:
     """Read a drone's file in the thread of files; put one aside that nothing can be read of."""
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             data = file.read(MAX_BYTES + 1)
         if len(data) > MAX_BYTES:
             raise ValueError(f"it is larger than {MAX_BYTES} bytes")

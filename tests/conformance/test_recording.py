@@ -99,6 +99,18 @@ def test_replay_names_a_file_that_cannot_be_read(tmp_path: Path, capsys: pytest.
     assert capsys.readouterr().err == f"anafi-mav: {tmp_path}/gateway.0001.tlog: cannot be read: Is a directory\n"
 
 
+@pytest.mark.parametrize(
+    "content", [b"", b"QGC WPL 110\n" * 40, bytes(range(256)) * 300], ids=["empty", "text", "bytes"]
+)
+def test_replay_of_a_file_without_a_frame_fails(
+    content: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "film.tlog"
+    path.write_bytes(content)
+    assert main(["replay", str(path), "--endpoint", "udpout://127.0.0.1:9"]) == 1
+    assert capsys.readouterr().err == f"anafi-mav: {path}: no MAVLink frame: expected a tlog\n"
+
+
 def test_parts_of_a_session_follow_each_other_by_number(tmp_path: Path) -> None:
     names = [f"gateway.{number:04d}.tlog" for number in (9999, 10000, 998)]
     for name in names:

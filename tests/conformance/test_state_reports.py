@@ -28,14 +28,28 @@ async def each_upload_is_reported(w: World) -> str:
     return w.gateway.state_problems()[-1]
 
 
-async def test_unreadable_state_file_is_reported_to_each_client_that_uploads() -> None:
+@pytest.mark.parametrize(
+    ("spoil", "problem"),
+    [
+        (Path.mkdir, "Is a directory"),  # reading it fails, also for root
+        pytest.param(
+            lambda path: os.mkfifo(path),
+            "expected a file, got a pipe",
+            marks=pytest.mark.skipif(os.name != "posix", reason="the pipes are those of POSIX"),
+        ),
+    ],
+    ids=["folder", "pipe"],
+)
+async def test_unreadable_state_file_is_reported_to_each_client_that_uploads(
+    spoil: Callable[[Path], None], problem: str
+) -> None:
     drone, folder = loopback(), state_folder(None)
     assert folder is not None
     async with world(drone_address=drone) as w:
         serial = w.drone.identity.serial
-    (folder / f"{serial}.json").mkdir()  # reading it fails, also for root
+    spoil(folder / f"{serial}.json")
     async with world(drone_address=drone, clients=3) as w:
-        assert (await each_upload_is_reported(w)).startswith(f"{folder / serial}.json: Is a directory")
+        assert (await each_upload_is_reported(w)).startswith(f"{folder / serial}.json: {problem}")
 
 
 def below_a_file(home: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import re
 import stat
 from collections.abc import AsyncIterator
@@ -112,6 +113,16 @@ def test_token_that_others_could_read_is_replaced(tmp_path: Path, caplog: pytest
     assert stat.S_IMODE((tmp_path / FILE).stat().st_mode) == 0o600
     assert "other users could read it" in caplog.text
     assert seen not in caplog.text
+
+
+@pytest.mark.skipif(os.name != "posix", reason="the pipes are those of POSIX")
+def test_pipe_in_place_of_the_token_is_replaced(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / FILE)
+    made = load_token(tmp_path)
+    assert (tmp_path / FILE).is_file()
+    found = read_token(tmp_path)
+    assert found is not None
+    assert found.text == made.text
 
 
 async def test_gateway_open_to_the_network_needs_the_token_it_keeps(tmp_path: Path) -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import contextlib
 import enum
 import os
-import stat
 import tempfile
 from pathlib import Path
 
+from anafi_mav.documents import open_file
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.formats import lines, parrot, qgc_plan, waypoints
 from anafi_mav.plans.plan import MAX_BYTES, Loss, Plan
@@ -41,24 +41,11 @@ def read(path: Path) -> bytes:
     Raises `PlanError`, also for what is no file: a pipe would be waited for.
     """
     source = path.name
-    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     try:
-        with os.fdopen(os.open(path, flags), "rb") as file:
-            mode = os.fstat(file.fileno()).st_mode
-            if not stat.S_ISREG(mode):
-                kind = next((what for is_kind, what in _KINDS if is_kind(mode)), "something else")
-                raise PlanError(source, f"expected a file, got {kind}")
+        with open_file(path) as file:
             return file.read(MAX_BYTES + 1)
     except OSError as error:
         raise PlanError(source, error.strerror or str(error)) from error
-
-
-_KINDS = (
-    (stat.S_ISFIFO, "a pipe"),
-    (stat.S_ISCHR, "a device"),
-    (stat.S_ISBLK, "a device"),
-    (stat.S_ISSOCK, "a socket"),
-)
 
 
 def parse(data: bytes, source: str, version: parrot.Version = 2, height: float | None = None) -> Plan:

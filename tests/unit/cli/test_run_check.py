@@ -132,6 +132,7 @@ def test_check_names_a_log_of_the_simulator_that_cannot_be_written(
     [
         ("recording: {folder: FOLDER/fleet.yaml/x}", "state", "log", "recording.folder: WRONG: expected a folder that"),
         ("", "fleet.yaml/state", "log", "state: WRONG: FOLDER/fleet.yaml/state: Not a directory"),
+        ("", "odd", "log", "state: WRONG: FOLDER/odd/gateway.lock: Is a directory"),
         ("", "state", "absent/log", "--log-file: expected a file that can be written, got FOLDER/absent/log: No such"),
         ("", "state", "", "--log-file: expected a file that can be written, got FOLDER: Is a directory"),
     ],
@@ -139,6 +140,7 @@ def test_check_names_a_log_of_the_simulator_that_cannot_be_written(
 def test_check_names_what_cannot_be_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], more: str, state: str, log_file: str, wrong: str
 ) -> None:
+    (tmp_path / "odd" / "gateway.lock").mkdir(parents=True)
     path = configuration(tmp_path, 0, more.replace("FOLDER", str(tmp_path)), state=state)
     status, out = check(path, capsys, "--log-file", str(tmp_path / log_file))
     assert status == 1

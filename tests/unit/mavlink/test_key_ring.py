@@ -70,6 +70,15 @@ def test_key_that_others_can_read_is_refused(folder: Path, what: str, mode: int,
             ring(folder).open("field", is_required=is_required)
 
 
+@posix
+def test_pipe_in_place_of_a_key_is_refused(folder: Path) -> None:
+    write_key(folder, "field", CONTENT)
+    path_of(folder, "field").unlink()
+    os.mkfifo(path_of(folder, "field"), 0o600)
+    with pytest.raises(OSError, match="expected a file, got a pipe"):
+        read_key(folder, "field")
+
+
 @pytest.mark.parametrize("content", [b"", CONTENT[:39], CONTENT + b"\n"])
 def test_key_file_of_another_length_is_refused(folder: Path, content: bytes) -> None:
     write_key(folder, "field", content)
