@@ -11,29 +11,19 @@ import contextlib
 import math
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from anafi_mav.mavlink import dialect as newer
+from support.mavlink_reader import CAMERA, Reader, Received, kind_of
+
+__all__ = ["CAMERA", "EPOCH", "NAN", "Client", "kind_of"]
 
 NAN = math.nan
 
 EPOCH = 1_420_070_400
 """s from 1970 to 2015, where time stamps of signatures begin."""
-
-CAMERA = 100
-"""Component id of a vehicle's camera."""
-
-
-def kind_of(message: Any) -> str:
-    """Return the name of a message, and CAMERA_HEARTBEAT for a heartbeat that is not the vehicle's own.
-
-    Tests of flights wait for HEARTBEAT, and mean the autopilot's.
-    """
-    name: str = message.get_type()
-    return "CAMERA_HEARTBEAT" if name == "HEARTBEAT" and message.get_srcComponent() == CAMERA else name
 
 
 class Client:
@@ -41,17 +31,21 @@ class Client:
 
     def __init__(self, sysid: int = 255, compid: int = 190) -> None:
         self.sysid, self.compid = sysid, compid
-        self.received: list[tuple[float, Any]] = []
+        self.received = Received()
         """(monotonic time, message), oldest first; messages carry their raw bytes in get_msgbuf()."""
-        self.bad = 0
-        self._parser = dialect.MAVLink(None, sysid, compid)
-        self._parser.robust_parsing = True
-        self._newer = newer.MAVLink(None, sysid, compid)
+        self._reader = Reader(sysid, compid)
+        self._parser = self._reader.parser
         self._out = dialect.MAVLink(None, sysid, compid)
-        self._updated = asyncio.Event()
+        self._waiting: dict[asyncio.Future[None], tuple[str, ...]] = {}
+        """Who waits for the next message of which kinds."""
         self._writer: asyncio.StreamWriter | None = None
         self._socket: socket.socket | None = None
         self._task: asyncio.Task[None] | None = None
+
+    @property
+    def bad(self) -> int:
+        """Pieces received that were no messages."""
+        return self._reader.bad
 
     async def connect(self, port: int, host: str = "127.0.0.1") -> Client:
         reader, self._writer = await asyncio.open_connection(host, port)
@@ -72,16 +66,15 @@ class Client:
 
     def feed(self, data: bytes) -> None:
         """Bytes from the gateway."""
-        now = time.monotonic()
-        for message in self._parser.parse_buffer(data) or ():
-            if message.get_type().startswith("UNKNOWN_"):
-                message = self._newer.parse_buffer(message.get_msgbuf())[0]
-            if message.get_type() == "BAD_DATA":
-                self.bad += 1
-            else:
-                self.received.append((now, message))
-        self._updated.set()
-        self._updated = asyncio.Event()
+        before = len(self.received)
+        self._reader.read(data, time.monotonic(), self.received)
+        if self._waiting:
+            self._tell(self.received.kinds[before:])
+
+    def _tell(self, news: Collection[str]) -> None:
+        for waiter, kinds in self._waiting.items():
+            if not waiter.done() and any(kind in news for kind in kinds):
+                waiter.set_result(None)
 
     async def close(self) -> None:
         if self._task is not None:
@@ -132,7 +125,8 @@ class Client:
 
     def since(self, mark: int, kind: str) -> list[tuple[float, Any]]:
         """What was received of one kind from a mark on."""
-        return [(at, message) for at, message in self.received[mark:] if kind_of(message) == kind]
+        found = enumerate(self.received.kinds[mark:], mark)
+        return [self.received[place] for place, one in found if one == kind]
 
     async def wait(
         self,
@@ -148,19 +142,33 @@ class Client:
         start = position
         deadline = time.monotonic() + timeout
         while True:
-            while position < len(self.received):
-                message = self.received[position][1]
-                position += 1
-                if kind_of(message) in kinds and accept(message):
+            for place, one in enumerate(self.received.kinds[position:], position):
+                if one in kinds and accept(message := self.received[place][1]):
                     return message
-            left = deadline - time.monotonic()
-            news = self._updated
-            try:
-                await asyncio.wait_for(news.wait(), max(left, 0.0))
-            except asyncio.TimeoutError:
-                observed = (*kinds, "STATUSTEXT", "COMMAND_ACK")
-                seen = [str(m) for _, m in self.received[start:] if kind_of(m) in observed]
-                raise AssertionError(f"no such {kind} within {timeout} s; seen: {seen[-8:]}") from None
+            position = self.mark()
+            if not await self._news(kinds, deadline):
+                observed = {*kinds, "STATUSTEXT", "COMMAND_ACK"}
+                seen = [
+                    str(self.received[place][1])
+                    for place in range(start, position)
+                    if self.received.kinds[place] in observed
+                ]
+                raise AssertionError(f"no such {kind} within {timeout} s; seen: {seen[-8:]}")
+
+    async def _news(self, kinds: tuple[str, ...], deadline: float) -> bool:
+        """Wait until a message of one of these kinds comes; False when none has come by the deadline."""
+        loop = asyncio.get_running_loop()
+        waiter: asyncio.Future[None] = loop.create_future()
+        timer = loop.call_at(deadline, _end, waiter)
+        self._waiting[waiter] = kinds
+        try:
+            await waiter
+            return True
+        except asyncio.TimeoutError:
+            return False
+        finally:
+            timer.cancel()
+            del self._waiting[waiter]
 
     async def silence(self, kind: str, seconds: float, *, timeout: float = 20.0) -> None:
         """Wait until nothing of a kind has come for so long."""
@@ -212,3 +220,8 @@ class Client:
     async def heartbeat(self, accept: Callable[[Any], bool], *, since: int | None = None, timeout: float = 5.0) -> Any:
         """The vehicle's next heartbeat that `accept` likes."""
         return await self.wait("HEARTBEAT", accept, since=since, timeout=timeout)
+
+
+def _end(waiter: asyncio.Future[None]) -> None:
+    if not waiter.done():
+        waiter.set_exception(asyncio.TimeoutError())
