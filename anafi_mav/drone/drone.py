@@ -904,7 +904,7 @@ class Drone:
         kind = type(message)
         for place, reducer in self._routes.get(kind, ()):
             element = self._elements[place]
-            element.state = reducer(element.state, message)
+            element.set_state(reducer(element.state, message))
         reaction = self._reactions.get(kind)
         if reaction is not None:
             reaction(message, now)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from operator import is_
 from typing import Any, ClassVar, Final, Generic, TypeAlias, TypeVar
 
@@ -68,38 +69,42 @@ class Element(Generic[StateT]):
 
     def __init__(self) -> None:
         self.settled: StateT = self.NOTHING
-        """The state without the events that wait, for fields that no value changes. Only `state` sets it."""
+        """The state without the events that wait, for fields that no value changes."""
         self.deferred: Final[dict[ValueLayout, Values]] = {}
         """Events of values to reduce when the state is read, in their sequence; always the same table."""
 
     def reset(self) -> None:
         """Forget everything the drone reported."""
-        self.state = self.NOTHING
+        self.set_state(self.NOTHING)
 
-    @property
+    @cached_property
     def state(self) -> StateT:
-        """The last state reported by the drone."""
-        if self.deferred:
-            reducers, state = self.REDUCERS, self.settled
-            for values in self.deferred.values():
-                data = values.data
-                for reducer, read in values.layout.readers(reducers):
-                    state = reducer(state, read(data))
-            self.state = state
-        return self.settled
+        """The last state reported by the drone: an attribute, made of the events that wait when it is first read.
 
-    @state.setter
-    def state(self, state: StateT) -> None:
+        `defer` removes it. It is replaced by `set_state` alone, for `settled` and `deferred` belong to it.
+        """
+        reducers, state = self.REDUCERS, self.settled
+        for values in self.deferred.values():
+            data = values.data
+            for reducer, read in values.layout.readers(reducers):
+                state = reducer(state, read(data))
         self.deferred.clear()
         self.settled = state
+        return state
+
+    def set_state(self, state: StateT) -> None:
+        """Replace the state; events that wait are lost."""
+        self.deferred.clear()
+        self.settled = self.state = state
 
 
 def defer(element: Element[Any], values: Values) -> None:
     """Let events of values wait in an element until its state is read."""
     layout, deferred = values.layout, element.deferred
     if len(deferred) > 1 and any(other is not layout and other.shares(layout) for other in deferred):
-        element.state = element.state  # in their sequence: they replace one another's
+        _ = element.state  # reduces them in their sequence: they replace one another's
     deferred[layout] = values
+    vars(element).pop("state", None)
 
 
 class StateWatch:

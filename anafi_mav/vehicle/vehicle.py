@@ -235,8 +235,8 @@ class Vehicle(Aircraft):
 
         `NEVER` on the ground and without a location.
         """
-        gps, facts = self.drone.gps.state, self.link_facts
-        if not gps.fixed or gps.location is None or self.flying_state is None or self.on_ground:
+        gps, facts, flying = self.drone.gps.state, self.link_facts, self.flying_state
+        if not gps.fixed or gps.location is None or flying is None or flying in ON_GROUND:
             return NEVER
         return facts.located_at + max(POSITION_OLD, LOCATIONS_MISSED * facts.location_every)
 

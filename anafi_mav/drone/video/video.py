@@ -208,7 +208,7 @@ class Video(Element[VideoState]):
         self._selected = title
         if self._users and self._wanted is None:
             self._end()
-            self.state = replace(self.state, shown=None, problem="")
+            self.set_state(replace(self.state, shown=None, problem=""))
             self._start()
 
     def subscribe(self, callback: FrameCallback) -> Callable[[], None]:
@@ -316,7 +316,7 @@ class Video(Element[VideoState]):
             log.info("video: %s", problem)
         played = self.state.playing
         self._forget()
-        self.state = replace(self.state, shown=stream.shown, problem=str(problem))
+        self.set_state(replace(self.state, shown=stream.shown, problem=str(problem)))
         self._fail(problem)
         return played
 
@@ -333,7 +333,7 @@ class Video(Element[VideoState]):
         self._arrivals.clear()
         self._sizes.clear()
         self._clock = None
-        self.state = replace(self.state, playing=False, frame=None, rate_hz=None)
+        self.set_state(replace(self.state, playing=False, frame=None, rate_hz=None))
 
     # -- the hot path
 
@@ -348,7 +348,7 @@ class Video(Element[VideoState]):
         taken = self._taken(picture)
         if not self.state.playing:
             shown = None if self._stream is None else self._stream.shown
-            self.state = replace(self.state, playing=True, shown=shown, problem="")
+            self.set_state(replace(self.state, playing=True, shown=shown, problem=""))
             for first in self._firsts:
                 if not first.done():
                     first.set_result(None)
@@ -360,7 +360,7 @@ class Video(Element[VideoState]):
             span = now - self._arrivals[0]
             rate = (len(self._arrivals) - 1) / span if span > 0.0 else None
             frame = VideoFrame(metadata, now, taken, picture.timestamp, *self._shot(picture, now))
-            self.state = replace(self.state, frame=frame, rate_hz=rate)
+            self.set_state(replace(self.state, frame=frame, rate_hz=rate))
             self._tell(self._frame_callbacks, frame)
         self._tell(self._picture_callbacks, picture)
 

@@ -227,7 +227,7 @@ async def test_doctor_firmware_is_compared_by_numbers(version: str, is_wrong: bo
     async with simulated() as simulated_drone:
         drone = Drone(simulated_drone.address)
         await drone.connect()
-        drone.product.state = type(drone.product.state)(firmware=version)
+        drone.product.set_state(type(drone.product.state)(firmware=version))
         assert doctor.firmware(drone).wrong is is_wrong
         await drone.close()
 

@@ -16,7 +16,7 @@ def test_watch_notices_the_first_look_and_each_update_of_its_elements() -> None:
     assert watch.has_changed()
     assert not watch.has_changed()
     message = common.BatteryStateChanged(percent=70)
-    battery.state = Battery.REDUCERS[common.BatteryStateChanged](battery.state, message)
+    battery.set_state(Battery.REDUCERS[common.BatteryStateChanged](battery.state, message))
     assert watch.has_changed()
     assert not watch.has_changed()
     battery.reset()

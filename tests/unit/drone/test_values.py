@@ -109,7 +109,7 @@ def test_reset_forgets_deferred_values() -> None:
 async def test_settled_state_has_events_but_no_waiting_values() -> None:
     piloting = Drone("127.0.42.1").piloting
     landed = ardrone3.FlyingStateChanged(FlyingState.LANDED)
-    piloting.state = piloting.REDUCERS[ardrone3.FlyingStateChanged](piloting.state, landed)
+    piloting.set_state(piloting.REDUCERS[ardrone3.FlyingStateChanged](piloting.state, landed))
     defer(piloting, arrived(ardrone3.SpeedChanged(1.0, 2.0, 3.0)))
     assert (piloting.settled.flying, piloting.settled.velocity) == (FlyingState.LANDED, None)
     assert (piloting.state.flying, piloting.state.velocity) == (FlyingState.LANDED, Velocity(1.0, 2.0, 3.0))

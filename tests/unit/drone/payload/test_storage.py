@@ -128,7 +128,7 @@ def test_storage_for_media_follows_policy_and_presence(
         ({0: replace(internal, available=0), 1: card}, full),
         ({}, 0),
     ):
-        storage.state = state
+        storage.set_state(state)
         assert storage.for_media(policy) == expected
 
 

@@ -788,7 +788,7 @@ async def test_sticks_need_the_limits_and_an_airborne_drone(drone: Drone, device
     drone.piloting.pilot(PilotingCommand(roll_deg=5.0))
     assert drone.piloting.sticks_blocked == "the drone is in the state landed"
     await flying(drone, device)
-    drone.piloting.state = type(drone.piloting.state)(flying=FlyingState.HOVERING)
+    drone.piloting.set_state(type(drone.piloting.state)(flying=FlyingState.HOVERING))
     with pytest.raises(NotSupported):
         drone.piloting.pilot(PilotingCommand(roll_deg=5.0))
     with pytest.raises(NotSupported):
