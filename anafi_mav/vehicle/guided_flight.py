@@ -138,15 +138,15 @@ class GuidedFlight:
         target = move.target
         return Goto(GeoPoint(target.latitude, target.longitude), target.altitude, None, None, FlightMode.GUIDED)
 
-    def check(self, place: GeoPoint | None, ato: float | None) -> None:
+    def check(self, place: GeoPoint | None, ato: float | None, start: GeoPoint | None = None) -> None:
         """Raise `Refused` for a place or height (m, above take-off) that cannot be flown to now.
 
-        None is not checked.
+        None is not checked. `start`: the drone's place, where the caller knows it.
         """
         if ato is not None:
             check_height(self._vehicle, ato)
         if place is not None:
-            check_place(self._vehicle, place, start=self._vehicle.place)
+            check_place(self._vehicle, place, start=start or self._vehicle.place)
 
     async def reposition(
         self,
@@ -167,18 +167,19 @@ class GuidedFlight:
         `speed` (m/s over ground) counts for this move only. `mode` is Hold or Guided.
         """
         vehicle = self._vehicle
-        if vehicle.place is None and place is None and ato is not None:
+        if place is None and ato is not None and vehicle.place is None:
             await self._climb(ato, yaw, mode, by)
             return
-        kept = self._standing if self.goto is None else self.goto.place
+        kept = place or (self._standing if (under_way := self.goto) is None else under_way.place)
 
         def target() -> Goto:
-            where, height = place or kept or vehicle.stopping_place, ato
-            if where is None or vehicle.place is None:
+            here, height = vehicle.place, ato
+            where = kept or vehicle.stopping_place
+            if where is None or here is None:
                 raise Refused(texts.GOTO, texts.NO_FIX)
             if height is None and (height := vehicle.drone.piloting.state.altitude) is None:
                 raise Refused(texts.GOTO, texts.HEIGHT_UNKNOWN)
-            self.check(place, ato)
+            self.check(place, ato, start=here)
             return Goto(where, height, yaw, speed, mode)
 
         await self._fly(target, by)
@@ -204,8 +205,16 @@ class GuidedFlight:
         control, piloting = self._vehicle.control, self._vehicle.drone.piloting
         setpoint, epoch = None if isinstance(control.active, Goto) else self.goto, control.epoch
         goto = target()
+        known: Goto | None = goto
+
+        def condition() -> Goto:
+            """Return the target of before where no wait has passed since."""
+            nonlocal known
+            found, known = known or target(), None
+            return found
+
         try:
-            async with control.acquire(goto, by=by, below=Hover(goto.mode), condition=target) as grant:
+            async with control.acquire(goto, by=by, below=Hover(goto.mode), condition=condition) as grant:
                 goto = grant.found
                 grant.begin(goto)
                 await self.move(goto)
