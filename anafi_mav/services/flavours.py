@@ -344,9 +344,10 @@ def by_flavour(channels: Sequence[Channel]) -> Sequence[tuple[Flavour, Sequence[
 
     Channels of one flavour stay in the list that they are in.
     """
-    groups: dict[str, list[Channel]] = {}
+    groups: dict[str, tuple[Flavour, list[Channel]]] = {}
     for channel in channels:
-        groups.setdefault(flavour_of(channel).name, []).append(channel)
+        flavour = flavour_of(channel)
+        groups.setdefault(flavour.name, (flavour, []))[1].append(channel)
     if len(groups) == 1:
-        return [(flavour_of(channels[0]), channels)]
-    return [(FLAVOURS[name], group) for name, group in groups.items()]
+        return [(flavour, channels)]
+    return list(groups.values())

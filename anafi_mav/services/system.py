@@ -98,7 +98,7 @@ from anafi_mav.vehicle.base.subscriptions import (
     in_order,
 )
 from anafi_mav.vehicle.failsafe_settings import FailsafeLimits
-from anafi_mav.vehicle.vehicle import Health, Landed, Vehicle
+from anafi_mav.vehicle.vehicle import Vehicle, VehicleStatus
 
 logger = logging.getLogger(__name__)
 
@@ -248,7 +248,7 @@ class System:
         self._stalled = 0.0
         """How long the host had stalled at the last tick, s."""
         self._tasks: set[asyncio.Task[None]] = set()
-        self._last_state: tuple[FlightMode, bool, Health, Landed] | None = None
+        self._last_status: VehicleStatus | None = None
         self._next_heartbeat = 0.0
         self._mission_over = Alarm(self._show_mode)
         """Runs while heartbeats still say Mission."""
@@ -324,7 +324,7 @@ class System:
             self._node.add_host(self.sysid, component.compid, component.receive)
         for compid in ABSENT:
             self._node.add_host(self.sysid, compid, self._refuse)
-        self._last_state = None
+        self._last_status = None
         if memory_problem is not None:
             self.text(Severity.WARNING, memory_problem)
         self.vehicle.link_up(TakeoffRecord.read(self.memory.settings.get(takeoff_point_service.KEY)))
@@ -521,15 +521,14 @@ class System:
 
     def send_heartbeat(self) -> None:
         """Send one more HEARTBEAT of the autopilot to all."""
-        self._send_heartbeat(self._greeted)
+        self._send_heartbeat(self._greeted, self.vehicle.status)
 
-    def _send_heartbeat(self, to: Sequence[Channel]) -> None:
-        vehicle = self.vehicle
+    def _send_heartbeat(self, to: Sequence[Channel], status: VehicleStatus) -> None:
         base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
-        if vehicle.armed:
+        if status.is_armed:
             base |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
-        mode = FlightMode.MISSION if self._mission_over.at is not None else vehicle.mode
-        health = vehicle.health.value
+        mode = FlightMode.MISSION if self._mission_over.at is not None else status.mode
+        health = status.health.value
         self._autopilot.send_by_flavour(
             lambda flavour: dialect.MAVLink_heartbeat_message(
                 dialect.MAV_TYPE_QUADROTOR, flavour.autopilot, base, flavour.custom_mode(mode), health, 3
@@ -663,33 +662,31 @@ class System:
         if not self.active:
             return
         self.look_soon()
-        vehicle, last = self.vehicle, self._last_state
-        state = (vehicle.mode, vehicle.armed, vehicle.health, vehicle.landed)
-        changed = state != last
+        status, last = self.vehicle.status, self._last_status
+        changed = status != last
         if not changed and not force:
             return
-        self._last_state = state
-        disarmed = last is not None and last[1] and not vehicle.armed
+        self._last_status = status
+        disarmed = last is not None and last.is_armed and not status.is_armed
         if changed:
-            self._hold_mode(last)
+            self._hold_mode(status, last)
             if not disarmed:
-                self.send_heartbeat()
+                self._send_heartbeat(self._greeted, status)
         for service in self._on_change:
             service.state_changed()
         if disarmed:
             self.send_heartbeat()
 
-    def _hold_mode(self, last: tuple[FlightMode, bool, Health, Landed] | None) -> None:
+    def _hold_mode(self, status: VehicleStatus, last: VehicleStatus | None) -> None:
         """Keep the mode Mission in HEARTBEAT a little longer after a mission that ended in the air.
 
         This applies while the drone hovers.
         """
-        vehicle = self.vehicle
-        hovers = vehicle.armed and vehicle.mode in (FlightMode.HOLD, FlightMode.GUIDED)
+        hovers = status.is_armed and status.mode in (FlightMode.HOLD, FlightMode.GUIDED)
         if self._mission_over.at is not None:
             if not hovers:
                 self._mission_over.cancel()
-        elif hovers and last is not None and last[0] is FlightMode.MISSION:
+        elif hovers and last is not None and last.mode is FlightMode.MISSION:
             self._mission_over.set_in(MISSION_OVER)
 
     def _show_mode(self) -> None:
@@ -747,7 +744,7 @@ class System:
         """
         self.look_soon()
         if self.active and channel in self._greeted:
-            self._send_heartbeat([channel])
+            self._send_heartbeat([channel], self.vehicle.status)
 
     def channel_closed(self, channel: Channel) -> None:
         """A client's channel is gone."""

@@ -13,6 +13,7 @@ import enum
 import math
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from anafi_mav import geo, texts
 from anafi_mav.clock import NEVER, Clock
@@ -133,6 +134,15 @@ class Health(enum.Enum):
     ACTIVE = 4
     CRITICAL = 5
     EMERGENCY = 6
+
+
+class VehicleStatus(NamedTuple):
+    """What HEARTBEAT and EXTENDED_SYS_STATE report of a vehicle at one moment."""
+
+    mode: FlightMode
+    is_armed: bool
+    health: Health
+    landed: Landed
 
 
 @dataclass(frozen=True)
@@ -303,7 +313,12 @@ class Vehicle(Aircraft):
         return Override(0)
 
     @property
-    def health(self) -> Health:
+    def status(self) -> VehicleStatus:
+        """Mode, armed state, health and landed state of this moment."""
+        is_armed = self.armed
+        return VehicleStatus(self.mode, is_armed, self._health(is_armed=is_armed), self.landed)
+
+    def _health(self, *, is_armed: bool) -> Health:
         state = self.flying_state
         if state == FlyingState.EMERGENCY:
             return Health.EMERGENCY
@@ -314,7 +329,7 @@ class Vehicle(Aircraft):
             or self.drone.battery.state.worst_alert() == AlertLevel.CRITICAL
         ):
             return Health.CRITICAL
-        return Health.ACTIVE if self.armed else Health.STANDBY
+        return Health.ACTIVE if is_armed else Health.STANDBY
 
     @property
     def mission_needs_gimbal(self) -> bool:

@@ -165,7 +165,7 @@ class MissionService(Service):
     # MISSION_CURRENT and texts.
 
     def _current(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
-        return dialect.MAVLink_mission_current_message(*_fields(vehicle)[times.flavour.zero_home])
+        return dialect.MAVLink_mission_current_message(*_fields(vehicle, vehicle.mode)[times.flavour.zero_home])
 
     def mission_changed(self) -> None:
         """Send MISSION_CURRENT to the clients for whom a field has changed.
@@ -175,7 +175,8 @@ class MissionService(Service):
         it (MissionManager::_handleHeartbeat). Without one it offers to resume a mission that is complete.
         """
         vehicle = self.host.vehicle
-        fields, before = _fields(vehicle), self._sent
+        mode, before = vehicle.mode, self._sent
+        fields = _fields(vehicle, mode)
         if fields == before:
             return
         self._sent = fields
@@ -186,7 +187,7 @@ class MissionService(Service):
 
         self.host.send_by_flavour(changed)
         current = vehicle.mission.machine.progress.current
-        if current != self._sent_item and vehicle.mode is FlightMode.MISSION:
+        if current != self._sent_item and mode is FlightMode.MISSION:
             self.host.send_heartbeat()
         self._sent_item = current
 
@@ -218,16 +219,15 @@ class MissionService(Service):
             self.host.warn_throttled(problem)
 
 
-def _fields(vehicle: Vehicle) -> Mapping[bool, tuple[int, ...]]:
+def _fields(vehicle: Vehicle, mode: FlightMode) -> Mapping[bool, tuple[int, ...]]:
     """Return the fields of MISSION_CURRENT by `Flavour.zero_home` of its receivers."""
     machine = vehicle.mission.machine
     there, current = machine.rest is not State.NO_MISSION, machine.progress.current
-    in_mission = vehicle.mode is FlightMode.MISSION and machine.state is not State.PAUSED
-    mode = IN_MISSION_MODE if in_mission else NOT_IN_MISSION_MODE
+    in_mission = mode is FlightMode.MISSION and machine.state is not State.PAUSED
     same = (
         len(machine.mission.items) if there else NO_TOTAL,
         MAVLINK_STATES[machine.rest],
-        mode if there else 0,
+        (IN_MISSION_MODE if in_mission else NOT_IN_MISSION_MODE) if there else 0,
         machine.mission.identity,
         vehicle.fence.items.identity,
         vehicle.rally.items.identity,
