@@ -137,7 +137,7 @@ class Health(enum.Enum):
 
 
 class VehicleStatus(NamedTuple):
-    """What HEARTBEAT and EXTENDED_SYS_STATE report of a vehicle at one moment."""
+    """State of a vehicle at one moment, as HEARTBEAT and EXTENDED_SYS_STATE report it."""
 
     mode: FlightMode
     is_armed: bool
