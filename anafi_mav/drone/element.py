@@ -81,7 +81,8 @@ class Element(Generic[StateT]):
     def state(self) -> StateT:
         """The last state reported by the drone: an attribute once it was read.
 
-        The first look reduces the events that wait. `defer` removes it. It is replaced by `set_state` alone, for `settled` and `deferred` belong to it.
+        The first look reduces the events that wait. `defer` removes it. It is replaced by `set_state` alone, for
+        `settled` and `deferred` belong to it.
         """
         reducers, state = self.REDUCERS, self.settled
         for values in self.deferred.values():

@@ -247,16 +247,15 @@ class GuidedFlight:
         Returns at the end of the move: a moveBy reports nothing before. The height is the barometer's, and the drone
         may drift sideways as it does when it hovers without a fix.
         """
-        vehicle, rules = self._vehicle, _rules_of_offset(texts.GOTO)
+        vehicle, hover, rules = self._vehicle, Hover(mode), _rules_of_offset(texts.GOTO)
         async with vehicle.control.acquire(
-            Hover(mode), by=by, rules=rules, condition=lambda: check_height(vehicle, ato)
+            hover, by=by, rules=rules, condition=lambda: check_height(vehicle, ato)
         ) as grant:
             grant.begin()
-            state = vehicle.drone.piloting.state
-            if state.altitude is None:
-                raise Refused(texts.GOTO, texts.HEIGHT_UNKNOWN)
-            turn = 0.0 if yaw is None or state.attitude is None else units.wrap_pi(yaw - state.attitude.yaw)
-            await self._offset(rules, state.altitude - ato, turn)
+            turn = 0.0 if yaw is None else units.wrap_pi(yaw - await self._resting_heading())
+            height = await vehicle.next_height()
+            vehicle.control.check(hover, by, rules)
+            await self._offset(rules, height - ato, turn)
 
     async def turn(
         self, angle_from: Callable[[float], float], rate_dps: float | None, mode: FlightMode, by: By

@@ -14,7 +14,7 @@ from typing import Any
 
 from anafi_mav import texts
 from anafi_mav.clock import Alarm
-from anafi_mav.drone.events import AltitudeChanged, FlyingState, FlyingStateChanged
+from anafi_mav.drone.events import FlyingState, FlyingStateChanged
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
@@ -44,9 +44,6 @@ CLIMB_WAIT = 15.0
 
 TAKEOFF_WAIT = 30.0
 """s that a command waits for the end of a take-off."""
-
-ALTITUDE_WAIT = 3.0
-"""s for the drone to report its height, which it does five times a second."""
 
 LOW = 0.5
 """m above take-off below which a drone that takes off is disarmed by a landing."""
@@ -366,8 +363,7 @@ class Takeoff(PlainTask):
         vehicle = self._vehicle
         if not vehicle.in_air:
             await vehicle.drone.expect(FlyingStateChanged, lambda m: m.state in AIRBORNE, CLIMB_WAIT)
-        # Its last report is from while it rose.
-        present = (await vehicle.drone.expect(AltitudeChanged, timeout=ALTITUDE_WAIT)).altitude
+        present = await vehicle.next_height()
         if not vehicle.in_air or vehicle.returning:
             raise Rejected(vehicle.activity)
         vehicle.control.check(self, by)

@@ -7,10 +7,12 @@ import math
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fault_scenarios import another_controller
 from support.flavours import both
 from support.world import HOME, World, world
 
 from anafi_mav import geo
+from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.sim.world.quirks import Quirk
 from anafi_mav.vehicle.vehicle import POSITION_OLD
 
@@ -116,6 +118,24 @@ async def test_height_change_without_gps_is_flown_by_move_by(flavour: str, comma
         assert moves(w) == 0
         for bad in (0.5, 1000.0):
             assert (await w.client.command(ALTITUDE, bad, RELATIVE)).result == DENIED
+
+
+async def test_height_change_without_gps_is_not_flown_from_an_old_height() -> None:
+    """A moveBy is relative: counted from a height of before, it would end as much too high as the drone has risen."""
+    async with world() as w:
+        await w.take_off(5.0)
+        await without_fix(w)
+        w.drone.faults.unreported = frozenset({ardrone3.AltitudeChanged.NAME})
+        another_controller(w, ardrone3.MoveBy(0.0, 0.0, -6.0, 0.0))
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["up"] > 10.9, 30.0)
+        before = len(w.commands("ardrone3.Piloting.moveBy"))
+        ack = await w.client.command(REPOSITION, -1, CHANGE_MODE, 0, NAN, frame=RELATIVE, z=9.0, timeout=20.0)
+        assert ack.result == dialect.MAV_RESULT_FAILED
+        assert [e for e in w.commands("ardrone3.Piloting.moveBy")[before:] if e.args["dZ"]] == []
+        w.drone.faults.unreported = frozenset()
+        ack = await w.client.command(REPOSITION, -1, CHANGE_MODE, 0, NAN, frame=RELATIVE, z=8.0, timeout=20.0)
+        assert ack.result == ACCEPTED
+        assert w.drone.pose.up == pytest.approx(8.0, abs=0.5)
 
 
 # A home that the drone refuses.

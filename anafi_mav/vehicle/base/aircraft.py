@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -18,23 +18,25 @@ from functools import cache
 from anafi_mav import texts
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
-from anafi_mav.drone.events import FlyingState, PilotingStyleStyle
+from anafi_mav.drone.events import AltitudeChanged, FlyingState, PilotingStyleStyle
 from anafi_mav.errors import LinkLost
 from anafi_mav.texts import OperatorText
-from anafi_mav.vehicle.base.control import Control
-from anafi_mav.vehicle.base.flight_task import Needs, TaskRules
+from anafi_mav.vehicle.base.control import Conditions, Control
+from anafi_mav.vehicle.base.flight_task import Needs
 from anafi_mav.vehicle.base.flying import AIRBORNE, ON_GROUND
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.height import HeightReference
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.move_heading import MoveHeading
-from anafi_mav.vehicle.base.preparation import DescentEnd, PreparationStep
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import By
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.roll_sign import RollCheck, RollSign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.fence_watch import FenceWatch, OutsideFence
+
+ALTITUDE_WAIT = 3.0
+"""s for the drone to report its height, which it does five times a second."""
 
 _ACTIVITIES: Mapping[FlyingState | None, OperatorText] = {
     FlyingState.LANDED: texts.ON_GROUND,
@@ -83,7 +85,7 @@ class CommandedSpeeds:
     """m/s up and down."""
 
 
-class Aircraft(ABC):
+class Aircraft(Conditions):
     """One drone that can be flown. All methods run on the event loop's thread."""
 
     def __init__(
@@ -243,7 +245,6 @@ class Aircraft(ABC):
         return self.drone.piloting.state.style == PilotingStyleStyle.CAMERA_OPERATED
 
     def lacking(self, needs: Needs) -> OperatorText | None:
-        """Return the first condition that is not met, as the reason of a refusal; None: all are."""
         has_descent, rows = _rows_of(needs)
         if has_descent and (descent := self.descent) is not None:
             return descent
@@ -251,18 +252,6 @@ class Aircraft(ABC):
             if is_unmet(self):
                 return reason
         return None
-
-    @abstractmethod
-    def require_endable(self, rules: TaskRules, by: By) -> None:
-        """Raise `Refused` when the drone lands or returns, and a request may not end that."""
-
-    @abstractmethod
-    def descent_end(self, rules: TaskRules, by: By) -> DescentEnd:
-        """Return the facts of a request that arrives now and may end a landing or a return."""
-
-    @abstractmethod
-    async def end_descent(self, what: PreparationStep, end: DescentEnd) -> bool:
-        """Perform a step that ends a landing or a return; return True when there was one to end."""
 
     def prearm_problems(self) -> list[OperatorText]:
         """Return the reasons why the drone would not take off, in sentences; empty without any."""
@@ -301,6 +290,13 @@ class Aircraft(ABC):
         """Centre the sticks; without a link none are held."""
         with contextlib.suppress(LinkLost):
             self.drone.piloting.pilot(None)
+
+    async def next_height(self) -> float:
+        """Return the height (m above take-off) that the drone reports next.
+
+        The last report may be from while it rose or sank. Raises `CommandTimeout`.
+        """
+        return (await self.drone.expect(AltitudeChanged, timeout=ALTITUDE_WAIT)).altitude
 
     def hover(self) -> None:
         """End every motion of ours; without a link the drone does that by itself."""

@@ -15,9 +15,10 @@ A newer request replaces a pending one. No module but this one stores who flies,
 from __future__ import annotations
 
 import asyncio
+from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Callable, Coroutine, Hashable
 from contextlib import asynccontextmanager
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -74,26 +75,31 @@ Condition: TypeAlias = Callable[[], object]
 """Raises `Refused` while a request may not be carried out, for a reason that its task does not declare as a need."""
 
 
-class Conditions(Protocol):
-    """The aircraft, as far as requests of flight tasks depend on it."""
+class Conditions(ABC):
+    """The part of an aircraft on which requests of flight tasks depend."""
 
     drone: Drone
     text: Callable[[Severity, OperatorText], None]
     changed: Callable[[], None]
 
+    @abstractmethod
     def lacking(self, needs: Needs) -> OperatorText | None:
         """Return the first condition that is not met, as the reason of a refusal; None: all are."""
 
     @property
+    @abstractmethod
     def on_ground(self) -> bool:
         """True while the drone stands."""
 
+    @abstractmethod
     def require_endable(self, rules: TaskRules, by: By) -> None:
         """Raise `Refused` when the drone lands or returns, and a request may not end that."""
 
+    @abstractmethod
     def descent_end(self, rules: TaskRules, by: By) -> DescentEnd:
         """Return the facts of a request that arrives now and may end a landing or a return."""
 
+    @abstractmethod
     async def end_descent(self, what: PreparationStep, end: DescentEnd) -> bool:
         """Perform a step that ends a landing or a return; return True when there was one to end."""
 
