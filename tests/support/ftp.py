@@ -14,6 +14,10 @@ TERMINATE, RESET, LIST, OPEN, READ, REMOVE, BURST, CRC, LIST_TIMED = 1, 2, 3, 4,
 FAIL, EOF, PROTECTED, NOT_FOUND, NO_SESSION, SESSIONS_FULL = 1, 6, 9, 10, 4, 5
 
 
+ANSWER_LIMIT = 20.0
+"""s until a test gives up: beside other processes the clock is everybody's, and the machine may be busy."""
+
+
 class Reply(NamedTuple):
     """The payload of an answer."""
 
@@ -57,7 +61,7 @@ class Ftp:
         message = dialect.MAVLink_file_transfer_protocol_message(0, 1, self.component, list(payload))
         self.client.send_raw(message.pack(self._out))
 
-    async def ask(self, opcode: int, data: bytes = b"", *, timeout: float = 2.0, **more: Any) -> Reply:
+    async def ask(self, opcode: int, data: bytes = b"", *, timeout: float = ANSWER_LIMIT, **more: Any) -> Reply:
         """Send a request and wait for its answer, which has the next sequence number."""
         seq = more.pop("seq", self.seq)
         self.seq = seq + 2
@@ -106,5 +110,6 @@ class Ftp:
             "FILE_TRANSFER_PROTOCOL",
             lambda m: (taken_apart(m).req_opcode, taken_apart(m).offset) == (BURST, offset),
             since=mark,
+            timeout=ANSWER_LIMIT,
         )
         return taken_apart(message)
