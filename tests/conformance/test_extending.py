@@ -69,8 +69,8 @@ def _restored(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def test_page_has_an_example_of_each_kind() -> None:
-    titles = ["Add a command", "Add a parameter", "Add a message", "Show a new ARSDK value", "Add a flavour"]
-    titles.append("Add a drone model")
+    titles = ["Add a command", "Add a parameter", "Add a message", "Change a default rate", "Show a new ARSDK value"]
+    titles += ["Add a flavour", "Add a drone model"]
     assert list(sections()) == titles
     assert all(len(blocks) == 2 for blocks in sections().values())
 
