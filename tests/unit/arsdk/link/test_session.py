@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import json
 import os
+import re
 import socket
 from collections.abc import AsyncIterator, Callable
 from typing import Any
@@ -262,7 +263,7 @@ async def test_silent_drone_is_lost_and_resumes_when_heard() -> None:
         assert not drone.sessions[0].lost.done()
         server.mute = True
         session.send(ardrone3.Emergency())
-        assert (await reason(session)).startswith("nothing received for 0.1")
+        assert re.match(r"nothing received for 0\.\d s", await reason(session))
         assert (await reason(drone.sessions[0])).startswith("3 pings unanswered")
         with pytest.raises(LinkLost, match="no answer"):
             await join(server, timeout=0.1)
