@@ -22,7 +22,10 @@ STALL = 1.0
 """s without one after which the host counts as stalled."""
 
 DRAIN = 0.3
-"""s after a stall within which the sockets are emptied of what arrived meanwhile."""
+"""s after a stall within which the sockets are emptied of what arrived meanwhile. It begins again after a late beat."""
+
+LATE = 0.2
+"""s without a beat, soon after a stall, in which a busy host has not let the loop empty its sockets."""
 
 
 class StallWatch:
@@ -70,7 +73,8 @@ class StallWatch:
             return 0.0
         if now - self._beaten >= STALL:
             return now - self._beaten
-        return now - self._stalled_since if now < self._drained else 0.0
+        is_draining = now < self._drained or (self._beaten < self._drained and now - self._beaten >= LATE)
+        return now - self._stalled_since if is_draining else 0.0
 
     @property
     def stalled(self) -> float:
@@ -88,4 +92,6 @@ class StallWatch:
             self._stalled_since, self._drained = before, now + DRAIN
             self._stalled += late
             self._on_stall(late)
+        elif before < self._drained and late >= LATE:
+            self._drained = now + DRAIN
         self.punctual_until = now + STALL if now >= self._drained else -math.inf

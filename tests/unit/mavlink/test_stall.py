@@ -8,7 +8,7 @@ import time
 
 from support.clock import everybodys, only_reacts
 
-from anafi_mav.mavlink.stall import STALL, StallWatch
+from anafi_mav.mavlink.stall import DRAIN, STALL, StallWatch
 
 
 async def test_stall_marks_data_old_until_sockets_are_drained() -> None:
@@ -29,6 +29,24 @@ async def test_stall_marks_data_old_until_sockets_are_drained() -> None:
         assert watch.waited == 0.0
         assert stalls[0] >= STALL
         assert watch.stalled == stalls[0]
+    watch.stop()
+
+
+async def test_host_that_is_late_again_drains_for_longer() -> None:
+    """After a stall a busy host may not let the loop run for all of the time in which it empties its sockets."""
+    watch = StallWatch(lambda seconds: None)
+    watch.start()
+    with everybodys():
+        await asyncio.sleep(0)  # the next callbacks run on the clock of everybody
+        time.sleep(1.2 * STALL)  # noqa: ASYNC251
+        await asyncio.sleep(0.05)  # a beat
+        assert watch.waited
+        time.sleep(DRAIN + 0.1)  # noqa: ASYNC251
+        assert watch.waited >= 1.2 * STALL  # before any timer has run
+        await asyncio.sleep(0.05)  # a beat
+        assert watch.waited >= 1.2 * STALL
+        while watch.waited:  # noqa: ASYNC110
+            await asyncio.sleep(0.05)
     watch.stop()
 
 
