@@ -15,6 +15,7 @@ INTERRUPTED = 130
 """Exit status of a program that Ctrl-C has ended, as shells have it."""
 
 try:
+    import atexit
     import os
     import signal  # which imports others, and is not there yet
 except KeyboardInterrupt:
@@ -24,6 +25,7 @@ except KeyboardInterrupt:
 def main() -> int:
     """Run the command line; returns the exit status."""
     _end_at_once_on_interrupt(INTERRUPTED)
+    atexit.register(_ignore_interrupt)  # the first that is registered runs last
     _open_closed_streams()
     gc.disable()
     from anafi_mav.cli import main as run
@@ -62,13 +64,20 @@ def _end_at_once_on_interrupt(status: int) -> None:
         signal.signal(signal.SIGINT, lambda number, frame: os._exit(status))
 
 
+def _ignore_interrupt() -> None:
+    """Ignore SIGINT while Python ends.
+
+    Python replaces our handler by the default one then: another Ctrl-C would replace the exit status by a signal's.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
 def _end_without_finalization(status: int) -> None:
     """End the process while threads of zenoh may still call back.
 
     Before 3.14 Python ends a thread that needs it during finalization by unwinding its stack (cpython#87135). In one of
     zenoh this aborts the process: "FATAL: exception not rethrown".
     """
-    import atexit
     import contextlib
 
     atexit._run_exitfuncs()

@@ -57,13 +57,18 @@ def run(work: Coroutine[Any, Any, ResultT]) -> ResultT:
             interrupted = True
             task.cancel()
 
-        if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-            listen(interrupt, "SIGINT")
+        if before is not signal.SIG_IGN:
+            # Not the loop's own way: as it closes it sets Python's handler, which raises wherever the program then is.
+            loop = asyncio.get_running_loop()
+            signal.signal(signal.SIGINT, functools.partial(_forward, loop, interrupt))
         return await work
 
+    before = signal.getsignal(signal.SIGINT)
     try:
         return asyncio.run(guarded())
     except asyncio.CancelledError:
         if interrupted:
             raise KeyboardInterrupt from None
         raise
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -125,6 +125,17 @@ async def test_ctrl_c_while_awaiting_a_drone_ends_the_command(words: list[str]) 
             assert (p.lines, p.complaints) == ([], [])
 
 
+async def test_ctrl_c_that_is_repeated_to_the_end_keeps_the_exit_status() -> None:
+    async with silent_device() as (address, accepted):
+        words = [sys.executable, "-m", "anafi_mav", "info", address, "--take"]
+        with subprocess.Popen(words, stderr=subprocess.DEVNULL) as process:
+            await asyncio.wait_for(accepted.wait(), 30.0)
+            while process.poll() is None:
+                process.send_signal(signal.SIGINT)
+                await asyncio.sleep(0)
+            assert process.returncode == 130
+
+
 async def test_ctrl_c_while_awaiting_a_vehicle_ends_the_upload() -> None:
     connected = asyncio.Event()
     address = loopback()
