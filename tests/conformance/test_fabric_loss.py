@@ -23,7 +23,6 @@ from support.poor_link import LossyRelay, StallingRelay
 from support.setpoints import VELOCITY_ONLY, local, streaming
 from support.world import OFFBOARD, World, world
 
-
 ACCEPTED = dialect.MAV_RESULT_ACCEPTED
 DELAY, LOSS, STALL = 0.05, 0.05, 1.0
 NORTH = local(VELOCITY_ONLY, v=(2.0, 0.0, 0.0))
