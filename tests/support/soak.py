@@ -863,8 +863,8 @@ def _judge_motors(flight: Flight) -> None:
     for entry in flight.w.drone.log:
         if entry.kind == "state" and entry.name == "flying":
             flying = entry.args["to"] != "landed"
-            # Motors that a disarming stopped, which a newer command has replaced: the vehicle stayed armed.
-            if not flying and not (entry.args["from"] == "motor_ramping" and _disarming_replaced(flight, entry.t)):
+            # Motors that a disarming or LAND stopped, which a newer command has replaced: the vehicle stayed armed.
+            if not flying and not (entry.args["from"] == "motor_ramping" and _stop_replaced(flight, entry.t)):
                 landed_at = entry.t
         if entry.kind != "command" or entry.t < began or flying:
             continue
@@ -906,10 +906,15 @@ def _judge_motors(flight: Flight) -> None:
                 flight.wrong.append(f"{name} is received after an accepted landing, without a newer command")
 
 
-def _disarming_replaced(flight: Flight, at: float) -> bool:
-    """Whether the newest disarming until then was cancelled by a newer command."""
-    disarmings = [s for s in flight.sent if s.command == ARM and s.values[:1] == (0.0,) and s.at <= at]
-    results = [result for _, result in _finals(flight, disarmings[-1])] if disarmings else []
+def _stop_replaced(flight: Flight, at: float) -> bool:
+    """Whether the newest disarming or LAND until then was cancelled by a newer command.
+
+    A TAKEOFF ends a LAND. While the report of the stopped motors is on its way, the gateway takes them for running.
+    """
+    stops = [
+        s for s in flight.sent if (s.command == LAND or (s.command == ARM and s.values[:1] == (0.0,))) and s.at <= at
+    ]
+    results = [result for _, result in _finals(flight, stops[-1])] if stops else []
     return results == [newer.MAV_RESULT_CANCELLED]
 
 
