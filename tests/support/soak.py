@@ -907,20 +907,28 @@ def _judge_motors(flight: Flight) -> None:
 
 
 def _stop_replaced(flight: Flight, at: float) -> bool:
-    """Whether the newest disarming or LAND until then was cancelled by a newer command.
+    """Whether the newest disarming or LAND before motors stopped at `at` was cancelled by a newer command.
 
-    A TAKEOFF ends a LAND. While the report of the stopped motors is on its way, the gateway takes them for running.
+    Of a LAND only by a TAKEOFF that was sent before the gateway could know of the stopped motors: it then takes the
+    vehicle for armed.
     """
     stops = [
         s for s in flight.sent if (s.command == LAND or (s.command == ARM and s.values[:1] == (0.0,))) and s.at <= at
     ]
-    results = [result for _, result in _finals(flight, stops[-1])] if stops else []
-    return results == [newer.MAV_RESULT_CANCELLED]
+    if not stops or [result for _, result in _finals(flight, stops[-1])] != [newer.MAV_RESULT_CANCELLED]:
+        return False
+    known = at + _until_known(flight)
+    return stops[-1].command == ARM or any(s.command == TAKEOFF and stops[-1].at <= s.at <= known for s in flight.sent)
+
+
+def _until_known(flight: Flight) -> float:
+    """Seconds within which the gateway has received what the drone reports."""
+    return flight.drawn.down.delay + flight.delay + LONGEST_CUT + 1.0
 
 
 def _crossed(flight: Flight, at: float) -> bool:
     """Whether a TakeOff was meant to end a landing: sent before the gateway could know of the touchdown."""
-    late = flight.drawn.down.delay + flight.delay + LONGEST_CUT + 1.0
+    late = _until_known(flight)
     return any(
         begun <= s.at <= over + late and over <= at <= over + late + 1.0
         for s in flight.sent
@@ -931,7 +939,7 @@ def _crossed(flight: Flight, at: float) -> bool:
 
 def _stopped(flight: Flight, at: float) -> bool:
     """Whether the drone is commanded to stop what a TakeOff has started, as soon as the gateway can know of it."""
-    limit = at + flight.drawn.down.delay + flight.delay + LONGEST_CUT + 1.0
+    limit = at + _until_known(flight)
     commands = [e for e in flight.w.drone.log if e.kind == "command" and at < e.t < limit]
     return any(e.name.rpartition(".")[2] in ("Landing", "UserTakeOff", "Emergency") for e in commands)
 
