@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from anafi_mav import texts, units
 from anafi_mav.drone import MoveEnd, Position
@@ -70,10 +70,7 @@ class Goto(PlainTask):
     """m/s over ground, of this move only; None: the vehicle's cruise speed."""
     mode: FlightMode
     """Mode of the vehicle on the way, and at its end: Hold or Guided."""
-
-    @property
-    def rules(self) -> TaskRules:
-        return GOTO
+    rules: ClassVar[TaskRules] = GOTO
 
     def is_flown(self, piloting: Piloting) -> bool:
         """Return True when the drone flies there."""
@@ -203,7 +200,8 @@ class GuidedFlight:
         speed is elsewhere after it.
         """
         control, piloting = self._vehicle.control, self._vehicle.drone.piloting
-        setpoint, epoch = None if isinstance(control.active, Goto) else self.goto, control.epoch
+        no_setpoint = piloting.move is None or isinstance(control.active, Goto)
+        setpoint, epoch = None if no_setpoint else self.goto, control.epoch
         goto = target()
         known: Goto | None = goto
 

@@ -115,7 +115,8 @@ class Takeoff(PlainTask):
     @property
     def rises(self) -> bool:
         """A take-off is under way, or the drone rises to its first hover after a Hold has ended one."""
-        return self.under_way or self._vehicle.flying_state in _RISING
+        is_running = isinstance(self._situation.attempt, RunningTakeoff)
+        return is_running or self._vehicle.flying_state in _RISING
 
     def is_armed_by(self, client: Hashable) -> bool:
         """Has this client armed the vehicle for the flight that begins now?"""

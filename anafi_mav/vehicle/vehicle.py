@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -127,6 +127,14 @@ class Landed(enum.Enum):
     LANDING = 4
 
 
+_LANDED_BY_STATE: Mapping[FlyingState | None, Landed] = {
+    FlyingState.LANDED: Landed.ON_GROUND,
+    **dict.fromkeys(TAKING_OFF, Landed.TAKEOFF),
+    **dict.fromkeys(LANDING, Landed.LANDING),
+    **dict.fromkeys(AIRBORNE, Landed.IN_AIR),
+}
+
+
 class Health(enum.Enum):
     """How the vehicle as a whole is."""
 
@@ -216,7 +224,10 @@ class Vehicle(Aircraft):
 
     @property
     def armed(self) -> bool:
-        return self.takeoff.armed or (self.flying_state is not None and not self.on_ground)
+        return self._is_armed_in(self.flying_state)
+
+    def _is_armed_in(self, state: FlyingState | None) -> bool:
+        return (state is not None and state not in ON_GROUND) or self.takeoff.armed
 
     def is_armed_by(self, client: Hashable) -> bool:
         return self.takeoff.is_armed_by(client)
@@ -264,14 +275,7 @@ class Vehicle(Aircraft):
 
     @property
     def landed(self) -> Landed:
-        state = self.flying_state
-        if state == FlyingState.LANDED:
-            return Landed.ON_GROUND
-        if state in TAKING_OFF:
-            return Landed.TAKEOFF
-        if state in LANDING:
-            return Landed.LANDING
-        return Landed.IN_AIR if state in AIRBORNE else Landed.UNKNOWN
+        return _LANDED_BY_STATE.get(self.flying_state, Landed.UNKNOWN)
 
     @property
     def mode(self) -> FlightMode:
@@ -282,7 +286,7 @@ class Vehicle(Aircraft):
             return FlightMode.RETURN
         if state in LANDING:
             return FlightMode.LAND
-        if self.returning or self._is_about_to_land:
+        if self.returning or (self.link_facts.lands_next is not None and self._is_about_to_land):
             return FlightMode.RETURN
         if state in TAKING_OFF or (self.takeoff.climbing and not self.on_ground):
             return FlightMode.MISSION if self.mission.flying else FlightMode.TAKEOFF
@@ -315,11 +319,12 @@ class Vehicle(Aircraft):
     @property
     def status(self) -> VehicleStatus:
         """Mode, armed state, health and landed state of this moment."""
-        is_armed = self.armed
-        return VehicleStatus(self.mode, is_armed, self._health(is_armed=is_armed), self.landed)
-
-    def _health(self, *, is_armed: bool) -> Health:
         state = self.flying_state
+        is_armed = self._is_armed_in(state)
+        health, landed = self._health(state, is_armed=is_armed), _LANDED_BY_STATE.get(state, Landed.UNKNOWN)
+        return VehicleStatus(self.mode, is_armed, health, landed)
+
+    def _health(self, state: FlyingState | None, *, is_armed: bool) -> Health:
         if state == FlyingState.EMERGENCY:
             return Health.EMERGENCY
         forced = self.drone.alerts.state.forced_landing
@@ -557,7 +562,7 @@ class Vehicle(Aircraft):
     @property
     def landing(self) -> bool:
         """The drone lands, or has been commanded to and has not answered."""
-        return self.flying_state in LANDING or (self._landing_is_sent and not self.on_ground)
+        return self.descent is texts.LANDS
 
     @property
     def _landing_is_sent(self) -> bool:
@@ -567,13 +572,14 @@ class Vehicle(Aircraft):
     @property
     def descends(self) -> bool:
         """The drone lands or returns, or has been commanded to and has not answered."""
-        return self.landing or self.returning or self.control.next is self.return_end
+        return self.descent is not None
 
     @property
     def descent(self) -> OperatorText | None:
-        if not self.descends:
-            return None
-        return texts.LANDS if self.landing else texts.RETURNS
+        state = self.flying_state
+        if state in LANDING or (self._landing_is_sent and state not in ON_GROUND):
+            return texts.LANDS
+        return texts.RETURNS if self.returning or self.control.next is self.return_end else None
 
     @property
     def _forced_landing(self) -> bool:

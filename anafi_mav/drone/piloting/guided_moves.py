@@ -194,6 +194,10 @@ class GuidedMoves:
         return journey is not None
 
     def require_free(self) -> None:
+        """Raise `CommandRejected` while the drone returns by itself or lands.
+
+        A move of ours must not interfere with these.
+        """
         if self._home.state.returning_by_itself:
             raise CommandRejected(BY_ITSELF)
         if self._flight.state.flying in (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING):

@@ -301,11 +301,15 @@ class Moves:
     def _on_move_to(self, message: ardrone3.MoveToChanged, now: float) -> None:
         move = self.to
         if message.status == MoveToStatus.RUNNING:
-            if move is None or (not move.is_to(message) and any(_same(message, one) for one in self._before(now))):
+            if move is None:
                 return
-            if not move.is_to(message) and not move.running and self._is_alone and move.may_be_to(message):
+            is_own = move.is_to(message)
+            if not is_own and any(_same(message, one) for one in self._before(now)):
+                return
+            if not is_own and not move.running and self._is_alone and move.may_be_to(message):
                 move.echo = position(message.latitude, message.longitude, message.altitude)
-            if move.is_to(message):
+                is_own = True
+            if is_own:
                 self._under_way(move)
             return
         how = _MOVE_TO_ENDS.get(message.status)

@@ -60,6 +60,7 @@ class Piloting(PilotingSettings):
         self._sticks = StickStream(commander, self, home, lambda: self.pilot_has_source())
         self._motors = Motors(commander, self, self._sticks, takeoff_blockers)
         self._guided = GuidedMoves(commander, self, home, self._sticks, self._moves)
+        self.require_free = self._guided.require_free
         self._returns = ReturnHome(commander, self, home, self._sticks, self._moves, self._end_movement)
         self.is_modern: Callable[[], bool] = lambda: False
         """True for an Ai; set by `Drone`."""
@@ -158,13 +159,6 @@ class Piloting(PilotingSettings):
     def rises(self) -> bool:
         """True from the start of the motors to the first hover, by a take-off of this program."""
         return self._motors.rises
-
-    def require_free(self) -> None:
-        """Raise `CommandRejected` while the drone returns by itself or lands.
-
-        A move of ours must not interfere with these.
-        """
-        self._guided.require_free()
 
     # -- up and down
 

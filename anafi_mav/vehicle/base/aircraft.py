@@ -136,12 +136,12 @@ class Aircraft(Conditions):
 
     @property
     def on_ground(self) -> bool:
-        return self.flying_state in ON_GROUND
+        return self.drone.piloting.settled.flying in ON_GROUND
 
     @property
     def in_air(self) -> bool:
         """True when flying, and neither taking off nor landing by itself."""
-        return self.flying_state in AIRBORNE
+        return self.drone.piloting.settled.flying in AIRBORNE
 
     @property
     @abstractmethod
@@ -158,7 +158,7 @@ class Aircraft(Conditions):
     @property
     def returning(self) -> bool:
         """True while the drone flies home, whether a client, the pilot or the drone began it."""
-        return self.drone.home.state.returning and not self.on_ground
+        return self.drone.home.state.returning and self.drone.piloting.settled.flying not in ON_GROUND
 
     @property
     def returning_by_itself(self) -> bool:

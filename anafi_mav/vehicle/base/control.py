@@ -47,7 +47,7 @@ from anafi_mav.vehicle.base.flight_task import (
     lasting_needs,
 )
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.preparation import DescentEnd, PreparationStep, begin
+from anafi_mav.vehicle.base.preparation import ENDS_LANDING, DescentEnd, PreparationStep, begin
 from anafi_mav.vehicle.base.refusal import Refused, text_of
 from anafi_mav.vehicle.base.requester import By, Source, client_of
 from anafi_mav.vehicle.base.right import Right
@@ -158,7 +158,8 @@ class Control:
     @property
     def next(self) -> FlightTask | None:
         """The task that is being acquired; None without one."""
-        return self._situation.next
+        pending = self._situation.pending
+        return None if pending is None else pending.task
 
     @property
     def is_free(self) -> bool:
@@ -272,8 +273,8 @@ class Control:
             return condition()
 
         found = check()
-        end = self._aircraft.descent_end(rules, by) if rules.start.ends_landing else None
-        before, number = self.active, self.epoch + 1
+        end = self._aircraft.descent_end(rules, by) if rules.start in ENDS_LANDING else None
+        before, number = self.active, self._situation.epoch + 1
         own = task if rules.lasts and not rules.is_hover else None
         hover = task if rules.is_hover else below
         attempt = Attempt(own, number, hover, rules.keeps_below, pauses, rules.is_urgent)
@@ -285,14 +286,15 @@ class Control:
                 found = check()
             stands = end is not None and self._aircraft.on_ground and not piloting.about_to_fly
             preparing = begin(rules.start, stands=stands, cancels_return=Needs.NO_DESCENT in rules.needs)
-            while (what := preparing.next) is not None:
-                has_ended = await self._prepare(what, end)
+            while preparing.left:
+                has_ended = await self._prepare(preparing.left[0], end)
                 if has_ended:
                     found = check()
                 preparing = preparing.after(has_ended=has_ended)
             grant = Grant(self, attempt, found)
             yield grant
-            grant.begin()
+            if (pending := self._situation.pending) is not None and pending.number == number:
+                grant.begin()
         except BaseException as error:
             self.handle(Event.FAIL, Input(attempt))
             if grant is not None:
@@ -314,7 +316,7 @@ class Control:
             raise Refused(rules.what, reason)
         if (pending := self._situation.pending) is not None and pending.is_urgent:
             raise Refused(texts.FLIGHT_COMMAND, texts.MOTORS_STOPPING)
-        if rules.start.ends_landing:
+        if rules.start in ENDS_LANDING:
             self._aircraft.require_endable(rules, by)
 
     def require_allowed(self, task: FlightTask, by: By, rules: TaskRules | None = None) -> None:
@@ -327,18 +329,17 @@ class Control:
             raise refusal
         takeovers = self._aircraft.drone.controller.takeovers
         is_older = rules.is_flight and isinstance(by, Right) and by.takeovers != takeovers
-        if is_older or self.leaves_to_pilot(by):
+        if is_older or (isinstance(by, Source) and self.leaves_to_pilot(by)):
             raise Refused(rules.what, texts.PILOT)
 
     def refusal(self, request: Request) -> Refused | None:
         """Return the refusal of the first policy that refuses a request; None: it is permitted."""
         return next((refusal for policy in self.policies if (refusal := policy(request)) is not None), None)
 
-    def leaves_to_pilot(self, by: By) -> bool:
+    def leaves_to_pilot(self, by: Source) -> bool:
         """True when a part of the gateway does not act: the Skycontroller's pilot flies, or can."""
         controller = self._aircraft.drone.controller
-        yields = isinstance(by, Source) and by.yields_to_pilot
-        return yields and (controller.pilot_has_source or controller.pilot_acquired_control)
+        return by.yields_to_pilot and (controller.pilot_has_source or controller.pilot_acquired_control)
 
     async def _prepare(self, what: PreparationStep, end: DescentEnd | None) -> bool:
         """Perform a step of a preparation; return True when there was something to end."""
@@ -357,11 +358,13 @@ class Control:
     async def _release(self, attempt: Attempt[FlightTask], limit: float | None) -> bool:
         """End what flies, which can fly the drone no further; return True after a wait for it."""
         ending = [*self.actions.end_older(), *self.handle(Event.REQUEST, Input(attempt))]
+        if not ending:
+            return False
         drone = self._aircraft.drone
         drone.retire(ending)
         if attempt.is_urgent:
             drone.silence(ending)
-        elif ending:
+        else:
             _, late = await asyncio.wait(ending, timeout=limit)
             drone.silence(late)
             return True

@@ -113,11 +113,6 @@ class Situation(Struct, Generic[TaskT], frozen=True):
         return State.IDLE if self.task is None and self.below is None else State.ACTIVE
 
     @property
-    def next(self) -> TaskT | None:
-        """The requested task; None while none is."""
-        return None if self.pending is None else self.pending.task
-
-    @property
     def holds_streams(self) -> bool:
         """True while a client's pause is in force, or is about to be."""
         return self.is_paused or (self.pending is not None and self.pending.pauses)
@@ -246,7 +241,7 @@ def _grant(now: Situation[TaskT], about: Input[TaskT]) -> Step[TaskT]:
     if attempt is None or not _is_pending(now, about):
         return Step(now)
     after = _with(replace(now, pending=None, is_released=False, act=None), attempt)
-    return Step(after, _those(now.task) if now.task is not attempt.task else ())
+    return Step(after, () if now.task is None or now.task is attempt.task else (now.task,))
 
 
 def _fail(now: Situation[TaskT], about: Input[TaskT]) -> Step[TaskT]:

@@ -14,6 +14,7 @@ import itertools
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from functools import cache
+from operator import attrgetter
 from typing import Protocol
 
 from msgspec import Struct
@@ -247,11 +248,6 @@ class FlightActions:
         return None if task is None else self._tasks.get(task)
 
     @property
-    def client(self) -> Hashable:
-        """Client of the action that calls; None: the gateway's, or none."""
-        return None if self.current is None else self.current.client
-
-    @property
     def is_idle(self) -> bool:
         """True when no action runs, or has arrived, that may fly the drone."""
         return not any(action.flies for action in self._tasks.values())
@@ -259,7 +255,7 @@ class FlightActions:
     def add(self, task: asyncio.Task[None], action: FlightAction) -> None:
         """Note an action that has arrived, until it ends."""
         self._tasks[task] = action
-        task.add_done_callback(lambda ended: self._tasks.pop(ended, None))
+        task.add_done_callback(self._tasks.pop)
 
     def announce(self, client: Hashable) -> None:
         """Notify the subscribers that an action without acknowledgement of this client begins."""
@@ -283,9 +279,9 @@ class FlightActions:
 
         Outside of an action these are all.
         """
-        older = self.cancel_older(lambda action: action.flies)
+        older, current = self.cancel_older(attrgetter("flies")), self.current
         for call in self._replaced:
-            call(self.client)
+            call(None if current is None else current.client)
         return older
 
     def cancel_older(self, belongs: Callable[[FlightAction], bool]) -> list[asyncio.Task[None]]:

@@ -23,10 +23,9 @@ class Preparation(enum.Enum):
     RISE_AGAIN = "a landing that the request may end is ended, by a TakeOff too"
     END_DESCENT = "a landing or return that the request may end is ended, then the drone stops"
 
-    @property
-    def ends_landing(self) -> bool:
-        """True when a landing is ended, or the request is refused."""
-        return self in (Preparation.END_LANDING, Preparation.RISE_AGAIN, Preparation.END_DESCENT)
+
+ENDS_LANDING = (Preparation.END_LANDING, Preparation.RISE_AGAIN, Preparation.END_DESCENT)
+"""A landing is ended, or the request is refused."""
 
 
 class PreparationStep(enum.Enum):
@@ -78,11 +77,7 @@ class Preparing:
 
     start: Preparation
     left: tuple[PreparationStep, ...]
-
-    @property
-    def next(self) -> PreparationStep | None:
-        """The next step; None: the drone is ready."""
-        return self.left[0] if self.left else None
+    """The next one first; empty: the drone is ready."""
 
     def after(self, *, has_ended: bool) -> Preparing:
         """Return the state after the next step; `has_ended`: there was something to end."""

@@ -288,9 +288,9 @@ def _on(
     ) -> Callable[Concatenate[MissionMachine, P], list[Effect]]:
         @functools.wraps(method)
         def step(self: MissionMachine, /, *args: P.args, **kwargs: P.kwargs) -> list[Effect]:
-            if event not in TRANSITIONS[self.state]:
+            if event not in TRANSITIONS[self.phase.state]:
                 return []
-            before, flew = self.progress, self.flying
+            before, flew = self.progress, self.phase.rest in FLYING
             effects = [*method(self, *args, **kwargs)]
             # What the drone flies alone while the link is lost is not known yet.
             return effects if event is E.LINK_DOWN else effects + self._kept(before, flew)
@@ -325,7 +325,7 @@ class MissionMachine:
     @property
     def is_untouched(self) -> bool:
         """True while the mission has not begun and no client has set its current item."""
-        return self.rest is S.READY and not self.progress.chosen
+        return self.phase.rest is S.READY and not self.progress.chosen
 
     @property
     def first(self) -> int:
@@ -795,8 +795,9 @@ class MissionMachine:
 
     def _kept(self, before: MissionProgress, flew: bool) -> list[Effect]:
         """Return the effect that stores the progress, if it has changed or the flight has ended."""
-        stopped = flew and not self.flying
-        if self.rest not in FLYING and self.rest is not S.PAUSED and self.progress.kept is None:
+        rest = self.phase.rest
+        stopped = flew and rest not in FLYING
+        if rest not in FLYING and rest is not S.PAUSED and self.progress.kept is None:
             return []
         if self.progress is before and not stopped:
             return []

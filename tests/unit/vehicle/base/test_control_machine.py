@@ -131,7 +131,9 @@ def test_failed_request_restores_hovering_mode_not_task() -> None:
     now = granted(Situation(), Attempt("mission", 1, "guided"))
     restart = Attempt("mission", 2, "guided")
     pending = requested(now, restart)
-    assert (pending.state, pending.task, pending.next) == (State.ACQUIRING, None, "mission")
+    assert (pending.state, pending.task) == (State.ACQUIRING, None)
+    assert pending.pending is not None
+    assert pending.pending.task == "mission"
     after = step(pending, Event.FAIL, Input(restart)).situation
     assert (after.state, after.task, after.below) == (State.ACTIVE, None, "guided")
 

@@ -14,7 +14,8 @@ def steps(
 ) -> list[PreparationStep]:
     """Return the steps of a preparation; `ended`: places of the steps that find something to end."""
     now, taken = begin(start, stands=stands, cancels_return=cancels_return), []
-    while (step := now.next) is not None:
+    while now.left:
+        step = now.left[0]
         now = now.after(has_ended=len(taken) in ended)
         taken.append(step)
     return taken
