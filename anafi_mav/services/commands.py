@@ -72,14 +72,13 @@ class ActionGroup(enum.Enum):
     STORAGE = "the storage of photos and videos"
     STREAM = "the live video"
 
-    @property
-    def in_order(self) -> bool:
-        """Actions run one after another, in the order in which they arrived.
 
-        Each then finds the state that the one before has confirmed. Those of other groups are replaced by newer
-        ones instead, or the drone itself refuses a second one.
-        """
-        return self in (ActionGroup.PHOTO, ActionGroup.RECORDING, ActionGroup.CAMERA, ActionGroup.STREAM)
+IN_ORDER = (ActionGroup.PHOTO, ActionGroup.RECORDING, ActionGroup.CAMERA, ActionGroup.STREAM)
+"""Groups whose actions run one after another, in the order in which they arrived.
+
+Each then finds the state that the one before has confirmed. Those of other groups are replaced by newer ones instead,
+or the drone itself refuses a second one.
+"""
 
 
 class Effect(enum.Enum):
@@ -385,12 +384,12 @@ def is_in_window(execution: Execution, now: float) -> bool:
 class CommandHistory:
     """Distinguishes a new action of the flight from the retransmission of one.
 
-    For each client and group only the newest action counts: arm, disarm, arm within two seconds are three actions,
-    although the third equals the first.
+    For each client only the newest action counts: arm, disarm, arm within two seconds are three actions, although the
+    third equals the first. `PayloadHistory` knows the actions of the other groups.
     """
 
     def __init__(self) -> None:
-        self._newest: dict[tuple[Hashable, ActionGroup], Execution] = {}
+        self._newest: dict[Hashable, Execution] = {}
 
     def retransmission(
         self,
@@ -408,7 +407,7 @@ class CommandHistory:
         command that another client has replaced is neither executed against that client nor confirmed: it is answered
         with CANCELLED. One that was refused had nothing to replace, and keeps its result.
         """
-        newest = self._newest.get((client, command.group))
+        newest = self._newest.get(client)
         if newest is None or not newest.command.same_as(command):
             return None
         if newest.result == dialect.MAV_RESULT_IN_PROGRESS:
@@ -428,30 +427,29 @@ class CommandHistory:
         return None if effect is Effect.RETURN or ended or not newest.still_holds else newest.result
 
     def begin(self, client: Hashable, command: Command) -> Execution:
-        """Note that an action begins; this client's next one of its group is compared with it."""
-        key = (client, command.group)
-        self._newest.pop(key, None)  # so that the dictionary is in the order of use
-        execution = self._newest[key] = Execution(client, command)
+        """Note that an action begins; this client's next one is compared with it."""
+        self._newest.pop(client, None)  # so that the dictionary is in the order of use
+        execution = self._newest[client] = Execution(client, command)
         if len(self._newest) > MAX_CLIENTS:
             del self._newest[next(iter(self._newest))]
         return execution
 
-    def supersede(self, client: Hashable, group: ActionGroup = ActionGroup.FLIGHT) -> None:
-        """Note that an action of this client has replaced those of all others in a group."""
-        for (other, used), execution in self._newest.items():
-            if other != client and used is group:
+    def supersede(self, client: Hashable) -> None:
+        """Note that an action of this client has replaced those of all others."""
+        for other, execution in self._newest.items():
+            if other != client:
                 execution.superseded = True
 
     def forget_clients(self, is_gone: Callable[[Hashable], bool]) -> None:
         """Forget the actions of the clients for which `is_gone` returns True."""
-        self._newest = {key: execution for key, execution in self._newest.items() if not is_gone(key[0])}
+        self._newest = {client: execution for client, execution in self._newest.items() if not is_gone(client)}
 
-    def forget(self, client: Hashable | None = None, group: ActionGroup = ActionGroup.FLIGHT) -> None:
-        """Forget the newest action of one client in a group, or all actions (client None).
+    def forget(self, client: Hashable | None = None) -> None:
+        """Forget the newest action of one client, or all actions (client None).
 
         For one client: it moved the vehicle, for example, by other means.
         """
         if client is None:
             self._newest.clear()
         else:
-            self._newest.pop((client, group), None)
+            self._newest.pop(client, None)

@@ -12,6 +12,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Coroutine, Hashable, Mapping
+from functools import partial
 from typing import Any
 
 from msgspec.structs import replace
@@ -24,6 +25,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.command.command_log import CommandLog, Refusal
 from anafi_mav.services.commands import (
+    IN_ORDER,
     LATE_PROGRESS_AFTER,
     PROGRESS_AFTER,
     PROGRESS_EVERY,
@@ -90,7 +92,7 @@ class RunningActions:
 
     def is_full(self, group: ActionGroup) -> bool:
         """Return True when a group whose actions run in order takes no further one."""
-        return group.in_order and self.actions.count(_of(group)) >= MAX_WAITING
+        return group in IN_ORDER and self.actions.count(_of(group)) >= MAX_WAITING
 
     def end_others(self, group: ActionGroup) -> list[asyncio.Task[None]]:
         """Cancel all actions of a group that are older than the calling one.
@@ -99,29 +101,17 @@ class RunningActions:
         """
         if group is ActionGroup.FLIGHT:
             return self.actions.end_older()
-        others = self.actions.cancel_older(_of(group))
-        self._supersede(self.actions.client, group)
-        return others
+        return self.actions.cancel_older(_of(group))
 
-    def _supersede(self, client: Hashable, group: ActionGroup = ActionGroup.FLIGHT) -> None:
+    def _supersede(self, client: Hashable) -> None:
         """Note in all components that an action of this client has replaced those of all others."""
         for history in self.histories:
-            history.supersede(client, group)
+            history.supersede(client)
 
-    def forget(self, client: Hashable, group: ActionGroup = ActionGroup.FLIGHT) -> None:
-        """Forget this client's newest action of a group in all components."""
+    def forget(self, client: Hashable) -> None:
+        """Forget this client's newest action of the flight in all components."""
         for history in self.histories:
-            history.forget(client, group)
-
-
-def _action(
-    client: Hashable,
-    group: ActionGroup,
-    answer: tuple[Inbound, Execution] | None = None,
-    *,
-    is_order: bool = True,
-) -> RunningAction:
-    return RunningAction(client, is_order, flies=group is ActionGroup.FLIGHT, answer=answer, group=group)
+            history.forget(client)
 
 
 def _of(group: ActionGroup) -> Callable[[FlightAction], bool]:
@@ -171,8 +161,8 @@ class CommandService(Service):
 
     def messages(self) -> Mapping[int, MessageHandler]:
         return {
-            dialect.MAVLINK_MSG_ID_COMMAND_LONG: lambda inbound: self._receive(inbound, from_long),
-            dialect.MAVLINK_MSG_ID_COMMAND_INT: lambda inbound: self._receive(inbound, from_int),
+            dialect.MAVLINK_MSG_ID_COMMAND_LONG: partial(self._receive, from_long),
+            dialect.MAVLINK_MSG_ID_COMMAND_INT: partial(self._receive, from_int),
             dialect.MAVLINK_MSG_ID_COMMAND_CANCEL: self._cancel,
         }
 
@@ -235,8 +225,10 @@ class CommandService(Service):
         group: ActionGroup = ActionGroup.FLIGHT,
     ) -> asyncio.Task[None]:
         """Run an action of a message that has no acknowledgement; its refusal is sent as a text."""
-        self._all.forget(client, group)  # this client used other means than its newest command
-        task = self._spawn(self._explained(work), _action(client, group, is_order=is_order))
+        if group is ActionGroup.FLIGHT:
+            self._all.forget(client)  # it used other means than its newest command
+        running = RunningAction(client, is_order, flies=group is ActionGroup.FLIGHT, group=group)
+        task = self._spawn(self._explained(work), running)
         # Cancelled before it began, `work` would complain that nothing awaited it.
         task.add_done_callback(lambda _: work.close())
         return task
@@ -254,14 +246,14 @@ class CommandService(Service):
         """
         return self._all.end_others(group)
 
-    def _receive(self, inbound: Inbound, decode: _Decode) -> None:
-        id = inbound.message.command
+    def _receive(self, decode: _Decode, inbound: Inbound) -> None:
+        id, flavour = inbound.message.command, flavour_of(inbound.channel)
         definition: Definition | None = QUERY if id in self._queries else self._actions.get(id)
-        if definition is None or not definition.offered(flavour_of(inbound.channel)):
+        if definition is None or not definition.offered(flavour):
             self._acknowledge(inbound, id, dialect.MAV_RESULT_UNSUPPORTED)
             self._note(inbound, id, dialect.MAV_RESULT_UNSUPPORTED)
             return
-        command = decode(inbound.message, definition, inbound.client, flavour_of(inbound.channel))
+        command = decode(inbound.message, definition, inbound.client, flavour)
         if definition is QUERY:
             result = dialect.MAV_RESULT_FAILED
             try:
@@ -296,7 +288,8 @@ class CommandService(Service):
             self._note(inbound, command.id, dialect.MAV_RESULT_TEMPORARILY_REJECTED, "too many commands wait")
             return
         execution = self._history.begin(command.client, command) if flies else self.host.payload_history.begin(command)
-        self._spawn(self._execute(inbound, execution), _action(command.client, group, (inbound, execution)))
+        running = RunningAction(command.client, flies=flies, answer=(inbound, execution), group=group)
+        self._spawn(self._execute(inbound, execution), running)
 
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:
         command = execution.command
@@ -314,7 +307,7 @@ class CommandService(Service):
         result, reason = dialect.MAV_RESULT_FAILED, ""
         try:
             group, handler = command.group, self._actions[command.id].handler
-            if group.in_order:
+            if group in IN_ORDER:
                 async with self.host.payload_history.turn(group):
                     await handler(command)
             else:
