@@ -341,7 +341,7 @@ class Channel:
         sequence = self._sequence.get(sender, 0)
         self._sequence[sender] = (sequence + 1) & 0xFF
         if self.signing is None or not self.signing.is_on:
-            raw = packed.framed(sequence, sysid, compid)
+            raw = frame(packed, sequence, sysid, compid)
         else:
             raw = self._signed(frame(packed, sequence, sysid, compid, SIGNED), is_own=True)
         self.sent_frames += 1

@@ -75,31 +75,22 @@ Judge = Callable[[bytes, int], Verdict]
 class Packed:
     """A message as payload bytes, not yet of a sender."""
 
-    __slots__ = ("_framed", "_header", "id", "payload")
+    __slots__ = ("framed", "header", "id", "payload")
 
     def __init__(self, id: int, payload: bytes) -> None:
         self.id = id
         self.payload = payload
         """Without the trailing zeros, but at least one byte (serialization.md §payload_truncation)."""
-        self._header = (-1, -1, -1)
-        self._framed = b""
-        """The last unsigned frame, of the sequence number and sender in `_header`."""
+        self.header = (-1, -1, -1, 0)
+        """Sequence number, sender and flags of the last frame."""
+        self.framed = b""
+        """The last frame."""
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Packed) and (self.id, self.payload) == (other.id, other.payload)
 
     def __hash__(self) -> int:
         return hash((self.id, self.payload))
-
-    def framed(self, seq: int, sysid: int, compid: int) -> bytes:
-        """Return the unsigned frame.
-
-        Channels with the same streams are at the same sequence numbers: one frame is made for all of them.
-        """
-        header = (seq, sysid, compid)
-        if header != self._header:
-            self._header, self._framed = header, frame(self, seq, sysid, compid)
-        return self._framed
 
 
 class Batch:
@@ -149,13 +140,17 @@ def pack(message: dialect.MAVLink_message) -> Packed:
 
 
 def frame(packed: Packed, seq: int, sysid: int, compid: int, flags: int = 0) -> bytes:
-    """The version 2 frame of a packed message.
+    """Return the version 2 frame of a packed message.
 
-    With the flag `SIGNED` a signature has to follow.
+    With the flag `SIGNED` a signature has to follow. Channels with the same streams are at the same sequence numbers:
+    one frame is made for all of them.
     """
-    id, payload = packed.id, packed.payload
-    body = _BODY.pack(len(payload), flags, 0, seq, sysid, compid, id & 0xFFFF, id >> 16) + payload
-    return b"\xfd" + body + _CHECKSUM.pack(_crc(body + _EXTRA[id]))
+    header = (seq, sysid, compid, flags)
+    if header != packed.header:
+        id, payload = packed.id, packed.payload
+        body = _BODY.pack(len(payload), flags, 0, seq, sysid, compid, id & 0xFFFF, id >> 16) + payload
+        packed.header, packed.framed = header, b"\xfd" + body + _CHECKSUM.pack(_crc(body + _EXTRA[id]))
+    return packed.framed
 
 
 def with_flags(raw: bytes, flags: int) -> bytes:

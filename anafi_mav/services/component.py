@@ -36,7 +36,7 @@ from anafi_mav.services.gateway_uris import GatewayUris
 from anafi_mav.services.memory import Memory
 from anafi_mav.services.payload_history import PayloadHistory
 from anafi_mav.services.pose import UNKNOWN_POSE, VehiclePose
-from anafi_mav.services.service import MessageHandler, Service
+from anafi_mav.services.service import MessageHandler, Service, count_refusal
 from anafi_mav.services.stream import Times
 from anafi_mav.services.system_position import PositionOf
 from anafi_mav.services.telemetry.message_service import MessageService
@@ -225,7 +225,7 @@ class Component:
 
         Nothing is sent while the link is down.
         """
-        self._system.send_as(self.compid, message, to, give_way=message.get_msgId() in self.telemetry)
+        self._system.send_as(self.compid, message, to, give_way=type(message).id in self.telemetry)
 
     def send_streams(self, messages: Sequence[Packed], to: Sequence[Channel]) -> None:
         """Send messages of streams as this component, together, to channels that have these streams.
@@ -241,7 +241,7 @@ class Component:
 
         If `build` returns None, nothing is sent.
         """
-        for flavour, channels in by_flavour(self.channels if to is None else to):
+        for flavour, channels in by_flavour(self._system.channels if to is None else to):
             message = build(flavour)
             if message is not None:
                 self.send(message, channels)
@@ -339,19 +339,6 @@ class Component:
             return effect is not Effect.KILL
         return inbound.id in COMMANDS and self.commands.action_of(inbound) is None
 
-    def input_objection(self, inbound: Inbound) -> OperatorText | None:
-        """Return the reason for which a stick, setpoint or target is refused, and count it.
-
-        None: it may be flown.
-        """
-        operators = self.vehicle.operators
-        if operators.operator in (0, inbound.sysid):
-            return None
-        reason = operators.objection(inbound.sysid, Need.FLY)
-        if reason is not None:
-            _count_refusal(inbound)
-        return reason
-
     def change_objection(self, inbound: Inbound) -> OperatorText | None:
         """Return the reason for which a change that takes effect now is refused, and count it.
 
@@ -359,13 +346,13 @@ class Component:
         """
         reason = self.vehicle.operators.objection(inbound.sysid, Need.COMMAND)
         if reason is not None:
-            _count_refusal(inbound)
+            count_refusal(inbound)
             self.drop_input(inbound.client, InputStream.CHANGE, reason)
         return reason
 
     def _refuse(self, inbound: Inbound, reason: OperatorText) -> None:
         """Answer and count a message of a station without the role that it needs; it has no effect."""
-        _count_refusal(inbound)
+        count_refusal(inbound)
         self._answer_refused(inbound, dialect.MAV_RESULT_NOT_IN_CONTROL, reason)
         self.drop_input(inbound.client, InputStream.CHANGE, reason)
 
@@ -386,12 +373,6 @@ class Component:
         if inbound.now - self._denied_at.get(channel, -math.inf) >= DENIED_EVERY:
             self._denied_at[channel] = inbound.now
             self.text(Severity.WARNING, texts.ACCESS_DENIED.fill(access=channel.options.access), channel)
-
-
-def _count_refusal(inbound: Inbound) -> None:
-    """Count a message that is refused because another station is the operator."""
-    inbound.channel.counters["refused_operator"] += 1
-    inbound.channel.counters[f"refused_operator.{inbound.message.get_type()}"] += 1
 
 
 def joined(tables: Any) -> dict[Any, Any]:

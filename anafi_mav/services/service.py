@@ -32,6 +32,7 @@ from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
 from anafi_mav.vehicle.failsafe_settings import FailsafeLimits
+from anafi_mav.vehicle.operator_control import Need
 from anafi_mav.vehicle.vehicle import Vehicle
 
 LOOK_EVERY = 0.1
@@ -119,12 +120,6 @@ class Host(Protocol):
 
     def drop_input(self, client: Hashable, stream: InputStream, reason: OperatorText) -> None:
         """Note that an input of a stream is not flown; its sender alone gets a text, if due."""
-
-    def input_objection(self, inbound: Inbound) -> OperatorText | None:
-        """Return the reason for which a stick, setpoint or target is refused, and count it.
-
-        None: it may be flown. It is refused while another station is the operator of the aircraft.
-        """
 
     def change_objection(self, inbound: Inbound) -> OperatorText | None:
         """Return the reason for which a change that takes effect now is refused, and count it.
@@ -321,3 +316,23 @@ class Service:
 
     def channel_closed(self, channel: Channel) -> None:
         """A client's channel is gone."""
+
+
+def count_refusal(inbound: Inbound) -> None:
+    """Count a message that is refused because another station is the operator."""
+    inbound.channel.counters["refused_operator"] += 1
+    inbound.channel.counters[f"refused_operator.{inbound.message.get_type()}"] += 1
+
+
+def input_objection(vehicle: Vehicle, inbound: Inbound) -> OperatorText | None:
+    """Return the reason for which a stick, setpoint or target is refused, and count it.
+
+    None: it may be flown. It is refused while another station is the operator of the aircraft.
+    """
+    operators = vehicle.operators
+    if operators.operator in (0, inbound.sysid):
+        return None
+    reason = operators.objection(inbound.sysid, Need.FLY)
+    if reason is not None:
+        count_refusal(inbound)
+    return reason

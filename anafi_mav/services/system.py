@@ -503,7 +503,7 @@ class System:
         """Have the services tick within `LOOK_EVERY`: something has happened."""
         at = self.clock.monotonic() + LOOK_EVERY
         is_sooner = at < self._watches.all_at or at < self._others.all_at
-        if self.active and is_sooner and self._bring_forward(at):
+        if is_sooner and self.active and self._bring_forward(at):
             self._set_ticker()
 
     def times(self, at: float | None = None, pose: VehiclePose = UNKNOWN_POSE) -> Times:

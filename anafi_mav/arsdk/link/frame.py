@@ -87,7 +87,8 @@ def encode_frame(version: int, type: int, id: int, seq: int, payload: bytes) -> 
     try:
         if version == 1:
             return _V1_HEADER.pack(type, id, seq, size + _V1_HEADER.size) + payload
-        return _V2_FIXED.pack(version + VERSION_OFFSET, type, id, seq) + encode_varint(size) + payload
+        length = _SHORT[size] if size < len(_SHORT) else encode_varint(size)
+        return _V2_FIXED.pack(version + VERSION_OFFSET, type, id, seq) + length + payload
     except struct.error as error:
         raise LocalProtocolError(f"frame type {type} id {id} seq {seq}: {error}") from error
 

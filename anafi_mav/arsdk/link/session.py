@@ -215,7 +215,8 @@ class Session(asyncio.DatagramProtocol):
                 read_waiting(self._endpoint, self._receive, self.error_received)
         finally:
             self._is_reading = False
-        self._call_after_read()
+        if self._after_read:
+            self._call_after_read()
 
     def _read_waiting(self) -> None:
         """Read what waits in the socket."""
@@ -224,7 +225,8 @@ class Session(asyncio.DatagramProtocol):
             read_waiting(self._endpoint, self._receive, self.error_received)
         finally:
             self._is_reading = False
-        self._call_after_read()
+        if self._after_read:
+            self._call_after_read()
 
     def _call_after_read(self) -> None:
         calls, self._after_read = self._after_read, []

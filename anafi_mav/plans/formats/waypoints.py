@@ -8,6 +8,7 @@ fence, or all rally points, is one of those: MAVProxy keeps them so. 120 in the 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from decimal import Decimal
 
 from anafi_mav import mav_enums
@@ -89,16 +90,16 @@ def text_of(header: str, items: list[Item], current: int | None = 0, unset: str 
     """
     lines = [header]
     for number, item in enumerate(items):
-        numbers = "\t".join([unset if value is None else _decimal(value) for value in item.params])
+        numbers = "\t".join(_decimals(item.params, unset))
         head = f"{number}\t{int(number == current)}\t{item.frame}\t{item.command}"
         lines.append(f"{head}\t{numbers}\t{int(item.autocontinue)}")
     return ("\n".join(lines) + "\n").encode()
 
 
-def _decimal(value: float) -> str:
-    """All digits that make the same number again, and no exponent: not every reader knows them."""
-    text = repr(float(value))
-    return format(Decimal(text), "f") if "e" in text else text
+def _decimals(values: Iterable[float | None], unset: str) -> list[str]:
+    """All digits that make the same numbers again, and no exponent: not every reader knows them."""
+    digits = [unset if value is None else repr(float(value)) for value in values]
+    return [format(Decimal(text), "f") if "e" in text else text for text in digits]
 
 
 def read(text: str, source: str) -> Plan:

@@ -26,7 +26,7 @@ INPUT_MESSAGES = frozenset(
         dialect.MAVLINK_MSG_ID_FOLLOW_TARGET,
     }
 )
-"""Their services ask `Host.input_objection`."""
+"""Their services ask `input_objection`."""
 
 GIMBAL_MESSAGES = frozenset(
     {

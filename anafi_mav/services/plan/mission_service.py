@@ -210,7 +210,7 @@ class MissionService(Service):
         else:
             settings[RECORD] = record.written
         self._unsaved = True
-        if not self._flight.flying:  # the gateway may be about to end
+        if not self._flight.machine.flying:  # the gateway may be about to end
             self._saved = -math.inf
             self.tick(self.host.clock.monotonic())
 
@@ -222,11 +222,12 @@ class MissionService(Service):
 def _fields(vehicle: Vehicle, mode: FlightMode) -> Mapping[bool, tuple[int, ...]]:
     """Return the fields of MISSION_CURRENT by `Flavour.zero_home` of its receivers."""
     machine = vehicle.mission.machine
-    there, current = machine.rest is not State.NO_MISSION, machine.progress.current
-    in_mission = mode is FlightMode.MISSION and machine.state is not State.PAUSED
+    rest, current = machine.phase.rest, machine.progress.current
+    there = rest is not State.NO_MISSION
+    in_mission = mode is FlightMode.MISSION and machine.phase.state is not State.PAUSED
     same = (
         len(machine.mission.items) if there else NO_TOTAL,
-        MAVLINK_STATES[machine.rest],
+        MAVLINK_STATES[rest],
         (IN_MISSION_MODE if in_mission else NOT_IN_MISSION_MODE) if there else 0,
         machine.mission.identity,
         vehicle.fence.items.identity,

@@ -10,7 +10,7 @@ from collections.abc import Hashable, Mapping
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.dropped_inputs import InputStream
-from anafi_mav.services.service import Host, MessageHandler, Service
+from anafi_mav.services.service import Host, MessageHandler, Service, input_objection
 from anafi_mav.services.setpoint.target_messages import sighting
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.subscriptions import ValueSubscriptions
@@ -34,7 +34,7 @@ class FollowService(Service):
     def _target(self, inbound: Inbound) -> None:
         if not self._flight.engaged:
             return  # the message names no drone: others may follow its sender
-        client, reason = inbound.client, self.host.input_objection(inbound)
+        client, reason = inbound.client, input_objection(self.host.vehicle, inbound)
         if reason is None:
             seen = sighting(inbound.message)
             reason = seen if isinstance(seen, OperatorText) else self._flight.receive(client, seen)

@@ -12,7 +12,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.dropped_inputs import InputStream
 from anafi_mav.services.flavours import flavour_of
-from anafi_mav.services.service import Host, MessageHandler, Service
+from anafi_mav.services.service import Host, MessageHandler, Service, input_objection
 from anafi_mav.services.setpoint.stick_intent import StickIntent
 from anafi_mav.services.setpoint.stick_messages import RcChannels, manual_sticks
 from anafi_mav.vehicle.manual_flight import Sticks
@@ -67,7 +67,7 @@ class ManualControlService(Service):
         """Pass sticks on; those that a person means and that are not flown are reported."""
         client = inbound.client
         is_meant = self._intent.is_meant(client, sticks, inbound.now)
-        reason = self.host.input_objection(inbound)
+        reason = input_objection(self.host.vehicle, inbound)
         if reason is None:
             reason = self._flight.receive(client, sticks, overrides=flavour_of(inbound.channel).joystick_overrides)
         if reason is None:

@@ -12,7 +12,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.dropped_inputs import InputStream
 from anafi_mav.services.flavours import flavour_of
-from anafi_mav.services.service import Host, MessageHandler, Service
+from anafi_mav.services.service import Host, MessageHandler, Service, input_objection
 from anafi_mav.services.setpoint.offboard_echo import STREAMS
 from anafi_mav.services.setpoint.setpoint_messages import attitude_setpoint, global_setpoint, local_setpoint
 from anafi_mav.services.stream import MessageStream
@@ -58,7 +58,7 @@ class OffboardService(Service):
 
     def _takes(self, read: Callable[[Any], Setpoint | OperatorText]) -> MessageHandler:
         def take(inbound: Inbound) -> None:
-            client, reason = inbound.client, self.host.input_objection(inbound)
+            client, reason = inbound.client, input_objection(self.host.vehicle, inbound)
             if reason is None:
                 setpoint = read(inbound.message)
                 if isinstance(setpoint, OperatorText):
