@@ -28,8 +28,8 @@ import socket
 import subprocess
 import time
 from asyncio import _get_running_loop
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from threading import get_ident
 from typing import Any
 
@@ -88,6 +88,36 @@ class Turns:
 
     def end(self) -> None:
         self.longest = max(self.longest, time.thread_time() - self._began)
+
+
+class Stalls:
+    """How long the machine kept this loop from running at once: what it computed itself is not in it."""
+
+    LOOK = 0.02
+    """s between two looks."""
+
+    def __init__(self) -> None:
+        self.longest = 0.0
+        """s."""
+
+    async def look(self) -> None:
+        """Measure until cancelled."""
+        while True:
+            began, worked = now(), time.thread_time()
+            await asyncio.sleep(self.LOOK)
+            late = now() - began - self.LOOK
+            self.longest = max(self.longest, late - (time.thread_time() - worked))
+
+
+@asynccontextmanager
+async def stalls() -> AsyncIterator[Stalls]:
+    """Measure within the block what another process on the machine costs where the clock runs like its own."""
+    found = Stalls()
+    task = asyncio.get_running_loop().create_task(found.look())
+    try:
+        yield found
+    finally:
+        task.cancel()
 
 
 class Barrier:

@@ -64,7 +64,8 @@ def judge(sample: str, model: str, log: Log, *, jump_beyond: int = 0) -> None:
     begun = check(log, files.load(path_of(sample)), jump_beyond)
     assert log.camera() == CAMERA.get(sample, [])
     half = (1.0 + ZOOMS[model]) / 2.0
-    assert log.zooms() == ([half, 1.0] if sample == "inspection" else [])
+    zooms = log.zooms()
+    assert zooms == ([half, 1.0] if sample == "inspection" else []), zooms
     assert tilts(log, begun) == pytest.approx(TILTS.get(sample, []), abs=AIMED)
     assert looked(log, begun) == (sample == "orbit")
     counts = photos(log, begun)

@@ -71,7 +71,7 @@ def test_channels_at_one_number_share_a_frame() -> None:
     for wire in (one, other, third, one):
         wire.channel.send_packed(packed, 1, 1)
     one.channel.send_packed(packed, 2, 1)
-    assert packed.framed(7, 1, 1) is packed.framed(7, 1, 1)
+    assert frame(packed, 7, 1, 1) is frame(packed, 7, 1, 1)
     frames = one.read()
     assert (sequence(frames, (1, 1)), sequence(frames, (2, 1))) == ([0, 1], [0])
     assert sequence(other.read(), (1, 1)) == [0]
