@@ -202,7 +202,11 @@ class Outbox:
 
     def add(self, raw: bytes) -> None:
         """Add a frame that is to leave."""
-        self.add_all((raw,))
+        if self._frames and self._size + len(raw) <= self._limit:  # it leaves with those before
+            self._frames.append(raw)
+            self._size += len(raw)
+        else:
+            self.add_all((raw,))
 
     def add_all(self, frames: Sequence[bytes]) -> None:
         """Add frames that are to leave."""

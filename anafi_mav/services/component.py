@@ -44,7 +44,7 @@ from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.failsafe_settings import FailsafeLimits
 from anafi_mav.vehicle.operator_control import Need
-from anafi_mav.vehicle.vehicle import Vehicle
+from anafi_mav.vehicle.vehicle import Vehicle, VehicleStatus
 
 logger = logging.getLogger(__name__)
 
@@ -104,8 +104,11 @@ class ComponentSystem(Protocol):
     def send_batch(self, batch: Batch, to: Sequence[Channel]) -> None:
         """Send messages of streams to some channels."""
 
-    def send_heartbeat(self) -> None:
-        """Send one more HEARTBEAT of the autopilot to all."""
+    def send_heartbeat(self, status: VehicleStatus | None = None) -> None:
+        """Send one more HEARTBEAT of the autopilot to all.
+
+        `status`: that of this moment, where it is known.
+        """
 
     def text(self, severity: Severity, text: OperatorText, to: Channel | None = None) -> None:
         """A STATUSTEXT to all channels, and a line in the log; or to one channel alone."""

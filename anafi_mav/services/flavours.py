@@ -334,9 +334,14 @@ def mode_of_standard(number: float) -> FlightMode | None:
     return _BY_STANDARD.get(number)
 
 
+_OPTIONS: tuple[tuple[str | None, Flavour], ...] = ((None, PX4), *FLAVOURS.items())
+_BY_OPTION = dict(_OPTIONS)
+"""By the option of an endpoint's URL; None: it names none."""
+
+
 def flavour_of(channel: Channel) -> Flavour:
     """Return the flavour of a channel's endpoint; PX4 when its URL names none."""
-    return FLAVOURS[channel.options.flavour or PX4.name]
+    return _BY_OPTION[channel.options.flavour]
 
 
 def by_flavour(channels: Sequence[Channel]) -> Sequence[tuple[Flavour, Sequence[Channel]]]:
@@ -344,10 +349,11 @@ def by_flavour(channels: Sequence[Channel]) -> Sequence[tuple[Flavour, Sequence[
 
     Channels of one flavour stay in the list that they are in.
     """
+    names = {_BY_OPTION[channel.options.flavour].name for channel in channels}
+    if len(names) == 1:
+        return [(FLAVOURS[names.pop()], channels)]
     groups: dict[str, tuple[Flavour, list[Channel]]] = {}
     for channel in channels:
         flavour = flavour_of(channel)
         groups.setdefault(flavour.name, (flavour, []))[1].append(channel)
-    if len(groups) == 1:
-        return [(flavour, channels)]
     return list(groups.values())

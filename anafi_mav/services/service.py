@@ -33,7 +33,7 @@ from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
 from anafi_mav.vehicle.failsafe_settings import FailsafeLimits
 from anafi_mav.vehicle.operator_control import Need
-from anafi_mav.vehicle.vehicle import Vehicle
+from anafi_mav.vehicle.vehicle import Vehicle, VehicleStatus
 
 LOOK_EVERY = 0.1
 """s between two looks of the services at what may have changed."""
@@ -95,8 +95,11 @@ class Host(Protocol):
         Nothing is sent while the link is down.
         """
 
-    def send_heartbeat(self) -> None:
-        """Send one more HEARTBEAT of the autopilot to all."""
+    def send_heartbeat(self, status: VehicleStatus | None = None) -> None:
+        """Send one more HEARTBEAT of the autopilot to all.
+
+        `status`: that of this moment, where it is known.
+        """
 
     def send_by_flavour(
         self, build: Callable[[Flavour], dialect.MAVLink_message | None], to: Sequence[Channel] | None = None

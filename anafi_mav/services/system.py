@@ -519,9 +519,12 @@ class System:
         channels = self.channels
         return [*channels, *self._unproved] if self._unproved else channels
 
-    def send_heartbeat(self) -> None:
-        """Send one more HEARTBEAT of the autopilot to all."""
-        self._send_heartbeat(self._greeted, self.vehicle.status)
+    def send_heartbeat(self, status: VehicleStatus | None = None) -> None:
+        """Send one more HEARTBEAT of the autopilot to all.
+
+        `status`: that of this moment, where it is known.
+        """
+        self._send_heartbeat(self._greeted, status or self.vehicle.status)
 
     def _send_heartbeat(self, to: Sequence[Channel], status: VehicleStatus) -> None:
         base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
@@ -671,7 +674,7 @@ class System:
         if changed:
             self._hold_mode(status, last)
             if not disarmed:
-                self._send_heartbeat(self._greeted, status)
+                self.send_heartbeat(status)
         for service in self._on_change:
             service.state_changed()
         if disarmed:

@@ -175,7 +175,9 @@ class MissionService(Service):
         it (MissionManager::_handleHeartbeat). Without one it offers to resume a mission that is complete.
         """
         vehicle = self.host.vehicle
-        mode, before = vehicle.mode, self._sent
+        current = vehicle.mission.machine.progress.current
+        status = vehicle.status if current != self._sent_item else None
+        mode, before = vehicle.mode if status is None else status.mode, self._sent
         fields = _fields(vehicle, mode)
         if fields == before:
             return
@@ -186,9 +188,8 @@ class MissionService(Service):
             return None if its == before.get(flavour.zero_home) else dialect.MAVLink_mission_current_message(*its)
 
         self.host.send_by_flavour(changed)
-        current = vehicle.mission.machine.progress.current
-        if current != self._sent_item and mode is FlightMode.MISSION:
-            self.host.send_heartbeat()
+        if status is not None and mode is FlightMode.MISSION:
+            self.host.send_heartbeat(status)
         self._sent_item = current
 
     def item_reached(self, item: int) -> None:

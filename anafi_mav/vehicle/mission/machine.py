@@ -626,14 +626,14 @@ class MissionMachine:
     @_on(E.EXECUTED)
     def executed(self, line: int) -> _Steps:
         """The drone reports that it has executed a line of its file."""
-        leg = self.progress.leg
-        late = self.state is S.PAUSED
+        leg, state = self.progress.leg, self.phase.state
+        late = state is S.PAUSED
         if late and not (self.phase.may_end_late and leg is not None and line == len(leg.origins) - 1):
             return
         yield from self._execute(line)
         if late:  # and no other mode: another flight task may be active by now
             yield from self._complete()
-        elif self.state is S.ENDING and self.progress.leg_done:
+        elif state is S.ENDING and self.progress.leg_done:
             yield from self._part_over()
 
     def _execute(self, line: int) -> _Steps:

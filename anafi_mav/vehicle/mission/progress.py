@@ -203,7 +203,8 @@ class MissionProgress:
         if line in self.skipped:
             done = tuple(item for item in done if item != leg.origins[line])
         current = leg.origins[line + 1] if line + 1 < len(leg.origins) else self.current
-        return replace(self.with_done(items, passed), line=line, current=current), done
+        before = self.with_done(items, passed) if passed else self
+        return replace(before, line=line, current=current), done
 
     def record(self, mission: int) -> MissionRecord | None:
         """Return the record for a restarted gateway; None without a file of the drone."""
