@@ -31,7 +31,7 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 from contextvars import ContextVar, Token
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import CodeType, FrameType
+from types import CodeType, FrameType, MethodType
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -50,6 +50,9 @@ LOOP = ROOT / "tests/support/virtual_time.py"
 
 DISPATCHERS = ("drone/drone.py", "services/system.py")
 """They deliver the drone's events."""
+
+DEFERRAL, DEFERRED = "after_read", "_call_after_read"
+"""Of `arsdk/link/session.py`: takes a function, and calls it when the messages that are read together are handled."""
 
 CHANGE = ("services/system.py", "_changed")
 """It delivers a change of mode, armed state or health."""
@@ -142,6 +145,8 @@ class Tracer:
         """The frame with which the present observer began."""
         self._seen: set[FrameType] = set()
         self._files: dict[CodeType, str] = {}
+        self._deferred: dict[CodeType, str] = {}
+        """What an observer has deferred -> that observer."""
 
     def start(self, now: float) -> None:
         self.iterations = [Iteration(now)]
@@ -184,6 +189,11 @@ class Tracer:
         if file and not foreign and code.co_name not in ANONYMOUS:
             if not observer and caller in DISPATCHERS and self._delivers(file):
                 observer = f"{file}:{code.co_qualname if sys.version_info >= (3, 11) else code.co_name}"
+                self._observing = frame, OBSERVER.set(observer)
+            if code.co_name == DEFERRAL and observer and isinstance(call := frame.f_locals.get("call"), MethodType):
+                self._deferred[call.__func__.__code__] = observer
+            elif not observer and self._stack and self._stack[-1][0].f_code.co_name == DEFERRED:
+                observer = self._deferred.pop(code, "")
                 self._observing = frame, OBSERVER.set(observer)
             if frame not in self._seen:
                 self._seen.add(frame)
