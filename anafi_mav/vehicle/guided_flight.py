@@ -226,7 +226,9 @@ class GuidedFlight:
         """Let the drone begin the move of the active task; no await before the moveTo."""
         vehicle, rule = self._vehicle, self._vehicle.settings.move_heading
         keeps = goto.yaw is None and rule is MoveHeading.KEEP
-        orientation, heading = oriented(rule, None if keeps else vehicle.place, goto.place, goto.yaw)
+        orientation, heading = None, None
+        if not keeps:
+            orientation, heading = oriented(rule, vehicle.place, goto.place, goto.yaw)
         await vehicle.drone.piloting.move_to(
             goto.place.latitude,
             goto.place.longitude,

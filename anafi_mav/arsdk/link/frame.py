@@ -93,6 +93,11 @@ def encode_frame(version: int, type: int, id: int, seq: int, payload: bytes) -> 
         raise LocalProtocolError(f"frame type {type} id {id} seq {seq}: {error}") from error
 
 
+def frame_type(version: int) -> slice:
+    """Return where a frame has its type."""
+    return slice(0, 1) if version == 1 else slice(1, 2)
+
+
 def sequence_number(version: int) -> slice:
     """Return where a frame has its sequence number."""
     return slice(2, 3) if version == 1 else slice(3, 5)

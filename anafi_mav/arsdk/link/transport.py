@@ -39,6 +39,7 @@ from anafi_mav.arsdk.link.frame import (
     Waiting,
     decode_frames,
     encode_frame,
+    frame_type,
     longest_command,
     pack,
     with_length,
@@ -144,6 +145,7 @@ class LinkDown(msgspec.Struct, frozen=True):
 Event: TypeAlias = ReceivedMessages | Delivered | Undelivered | Garbage | Silent | Speaks | LinkDown
 
 _ACK, _NOACK, _WITHACK = int(FrameType.ACK), int(FrameType.NOACK), int(FrameType.WITHACK)
+_NEVER_ACKNOWLEDGED = (bytes((FrameType.NOACK,)), bytes((FrameType.LOWLAT,)))
 
 _NOACK_ID = {Role.CONTROLLER: 10, Role.DEVICE: 127}
 _ACK_ID = {Role.CONTROLLER: 11, Role.DEVICE: 126}
@@ -221,6 +223,7 @@ class Transport:
         self._last_seq = dict.fromkeys(self._received_ids, self._seq_mask)
         self._unpacker = Unpacker(version)
         self._known = _known_frames[role, version]
+        self._type_place = frame_type(version)
         self._longest = (longest_command(version, False), longest_command(version, True))
         """Bytes of a command in the unacknowledged queue, and in an acknowledged one."""
         self._noack: deque[tuple[int, bytes]] = deque()
@@ -254,7 +257,7 @@ class Transport:
         if self._down:
             return []
         events = self._take_pending()
-        known = self._known.read(data)
+        known = self._known.read(data) if data[self._type_place] in _NEVER_ACKNOWLEDGED else None
         if known is not None:
             self._hear(now, events)
             id, seq, values = known
