@@ -334,14 +334,9 @@ def mode_of_standard(number: float) -> FlightMode | None:
     return _BY_STANDARD.get(number)
 
 
-_OPTIONS: tuple[tuple[str | None, Flavour], ...] = ((None, PX4), *FLAVOURS.items())
-_BY_OPTION = dict(_OPTIONS)
-"""By the option of an endpoint's URL; None: it names none."""
-
-
 def flavour_of(channel: Channel) -> Flavour:
     """Return the flavour of a channel's endpoint; PX4 when its URL names none."""
-    return _BY_OPTION[channel.options.flavour]
+    return FLAVOURS[channel.options.flavour or PX4.name]
 
 
 def by_flavour(channels: Sequence[Channel]) -> Sequence[tuple[Flavour, Sequence[Channel]]]:
@@ -349,7 +344,7 @@ def by_flavour(channels: Sequence[Channel]) -> Sequence[tuple[Flavour, Sequence[
 
     Channels of one flavour stay in the list that they are in.
     """
-    names = {_BY_OPTION[channel.options.flavour].name for channel in channels}
+    names = {channel.options.flavour or PX4.name for channel in channels}
     if len(names) == 1:
         return [(FLAVOURS[names.pop()], channels)]
     groups: dict[str, tuple[Flavour, list[Channel]]] = {}
