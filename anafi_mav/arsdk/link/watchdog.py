@@ -33,8 +33,8 @@ KICK = 0.2
 STALL = 0.5
 """Share of the limit after which the loop makes sure of the token before it sends anything."""
 
-END_LIMIT = 3.0
-"""s that the child gets to end once its pipe is closed: it may be sending for two."""
+END_LIMIT = watchdog_child.TRY_FOR + 1.0
+"""s that the child gets to end once its pipe is closed: it may be sending."""
 
 _TOKEN = b"T"
 
