@@ -58,11 +58,13 @@ async def take_off(client: Client, height: float) -> None:
 async def fly_to(client: Client, place: tuple[float, float], height: float) -> None:
     ack = await client.command(REPOSITION, -1, 1, 0, frame=6, x=place[0], y=place[1], z=height)
     assert ack.result == ACCEPTED
-    await client.wait(
-        "GLOBAL_POSITION_INT",
-        lambda m: geo.distance(*place, m.lat / 1e7, m.lon / 1e7) < 0.5 and abs(m.relative_alt / 1000 - height) < 0.3,
-        timeout=20.0,
-    )
+
+    def is_there(m: Any) -> bool:
+        """At the place and at rest: a busy machine lets it fly on before the next command."""
+        near = geo.distance(*place, m.lat / 1e7, m.lon / 1e7) < 0.5 and abs(m.relative_alt / 1000 - height) < 0.3
+        return near and max(abs(m.vx), abs(m.vy), abs(m.vz)) < 20  # cm/s
+
+    await client.wait("GLOBAL_POSITION_INT", is_there, timeout=20.0)
 
 
 async def land(client: Client) -> None:
