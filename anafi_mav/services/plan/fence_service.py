@@ -120,10 +120,10 @@ class FenceService(Service):
 
     def _sight(self, now: float) -> Sight:
         vehicle, drone = self.host.vehicle, self.host.drone
-        state, place, home = drone.piloting.state, vehicle.place, vehicle.home
+        state, place, home, mode = drone.piloting.state, vehicle.place, vehicle.home, vehicle.mode
         velocity = (0.0, 0.0) if state.velocity is None else (state.velocity.north, state.velocity.east)
         # A plan and an orbit were judged before; they turn.
-        own_way = vehicle.mode in (FlightMode.MISSION, FlightMode.ORBIT) or self._ends_inside
+        own_way = mode in (FlightMode.MISSION, FlightMode.ORBIT) or self._ends_inside
         return Sight(
             place,
             now - self._located,
@@ -132,7 +132,7 @@ class FenceService(Service):
             None if state.max_altitude is None else state.max_altitude.current,
             home,
             airborne=not vehicle.on_ground and vehicle.flying_state is not None,
-            flying=vehicle.in_air and vehicle.mode is not FlightMode.RETURN,
+            flying=vehicle.in_air and mode is not FlightMode.RETURN,
             steering=not own_way and state.plan != PlayingState.PLAYING,
             orders=vehicle.control.epoch,
         )
