@@ -33,6 +33,7 @@ sys.dont_write_bytecode = False
 os.environ["SSL_CERT_FILE"] = os.devnull
 
 pytest_plugins = [
+    "support.slots",
     "support.heap",
     "support.order",
     "support.collection",
