@@ -11,7 +11,9 @@ from support.scripted_device import ScriptedDevice
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
-from anafi_mav.drone import Drone, PilotingCommand
+from anafi_mav.drone import Drone, PilotingCommand, sent_commands
+from anafi_mav.drone.piloting import landing
+from anafi_mav.drone.sent_commands import Expiry, Slot
 from anafi_mav.errors import AnafiMavError, CommandRejected
 
 
@@ -98,6 +100,37 @@ async def test_landing_becoming_forced_is_left_alone(drone: Drone, device: Scrip
     with pytest.raises(CommandRejected):
         await ending
     await device.quiet(ardrone3.PCMD)
+
+
+@pytest.mark.parametrize(
+    ("flying", "reason"),
+    [
+        (FlyingState.LANDED, "already landed"),
+        (FlyingState.EMERGENCY_LANDING, "forced landing"),
+        (FlyingState.EMERGENCY, "motors cut"),
+    ],
+)
+async def test_end_of_a_landing_that_is_over_or_forced_is_refused(
+    drone: Drone, device: ScriptedDevice, flying: FlyingState, reason: str
+) -> None:
+    """A caller that received no refusal would report a landing as ended, and fly on."""
+    await reported(drone, device, flying)
+    with pytest.raises(CommandRejected, match=reason):
+        await drone.piloting.end_landing(take_off=True)
+    await device.quiet(ardrone3.PCMD)
+    assert gaz(device) == device.got(ardrone3.TakeOff) == []
+
+
+@pytest.mark.parametrize("modern", [False, True])
+async def test_end_of_a_landing_of_a_drone_that_hovers_sends_nothing(
+    drone: Drone, device: ScriptedDevice, modern: bool
+) -> None:
+    """SmartTakeOffLand would begin a landing here."""
+    drone.piloting.is_modern = lambda: modern
+    await reported(drone, device, FlyingState.HOVERING)
+    await drone.piloting.end_landing(timeout=0.5, take_off=True)
+    await device.quiet()
+    assert gaz(device) == device.got(ardrone3.TakeOff) == device.got(ardrone3.SmartTakeOffLand) == []
 
 
 async def test_landing_ended_and_forced_together_is_refused(drone: Drone, device: ScriptedDevice) -> None:
@@ -205,6 +238,45 @@ async def test_takeoff_command_against_a_withdrawn_landing_is_withdrawn(
     await device.until(ardrone3.Landing)
 
 
+async def test_toggle_that_the_drone_has_not_received_is_withdrawn_before_the_gaz(
+    drone: Drone, device: ScriptedDevice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SmartTakeOffLand lands a drone whose landing the gaz has ended: it must not arrive after it."""
+    monkeypatch.setattr(landing, "SMART_WAIT", 0.3)  # its true length without a packet would end the link
+    drone.piloting.is_modern = lambda: True
+    await reported(drone, device, FlyingState.LANDING)
+    device.session.mute = True
+    ending = await begun(drone.piloting.end_landing(take_off=True))
+    await asyncio.sleep(0.4)
+    device.session.mute = False
+    await device.until(ardrone3.PCMD, 10)
+    assert UP in gaz(device)
+    assert device.got(ardrone3.SmartTakeOffLand) == []
+    await reported(drone, device, FlyingState.HOVERING)
+    await ending
+    await device.quiet(ardrone3.SmartTakeOffLand)
+    assert device.got(ardrone3.SmartTakeOffLand) == []
+
+
+async def test_motors_of_another_controller_start_after_a_cancelled_end_of_a_landing(
+    drone: Drone, device: ScriptedDevice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The TakeOff against the landing has expired by then: it does not explain motors that start at any later time."""
+    expiry = {**sent_commands.EXPIRY, Slot.LANDING_END: Expiry(0.1)}  # STAYS_DOWN in less time
+    monkeypatch.setattr(sent_commands, "EXPIRY", expiry)
+    await reported(drone, device, FlyingState.LANDING)
+    ending = await begun(drone.piloting.end_landing(take_off=True))
+    await device.until(ardrone3.TakeOff)
+    ending.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await ending
+    await asyncio.sleep(0.2)
+    await reported(drone, device, FlyingState.LANDED)
+    await reported(drone, device, FlyingState.MOTOR_RAMPING)
+    await device.quiet(ardrone3.Landing)
+    assert device.got(ardrone3.Landing) == device.got(ardrone3.UserTakeOff) == []
+
+
 async def test_requested_takeoff_after_a_lost_race_is_not_stopped(drone: Drone, device: ScriptedDevice) -> None:
     await reported(drone, device, FlyingState.LANDING)
     ending = await begun(drone.piloting.end_landing(take_off=True))
@@ -274,6 +346,18 @@ async def test_withdrawn_land_that_begins_is_settled(drone: Drone, device: Scrip
         await landing
     device.script[ardrone3.CancelMoveTo] = lambda _: [state(FlyingState.LANDING)]
     assert await drone.piloting.settle_landing()
+
+
+async def test_withdrawn_land_that_has_begun_is_settled_at_once(drone: Drone, device: ScriptedDevice) -> None:
+    await reported(drone, device, FlyingState.HOVERING)
+    landing = await begun(drone.piloting.land())
+    await device.until(ardrone3.Landing, 1)
+    landing.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await landing
+    await reported(drone, device, FlyingState.LANDING)
+    assert await drone.piloting.settle_landing()
+    assert device.got(ardrone3.CancelMoveTo) == []
 
 
 # Propellers on the ground.
