@@ -199,6 +199,27 @@ async def test_hand_launch_replaced_by_a_failed_take_off_is_cancelled(device: Sc
     assert (await device.until(ardrone3.UserTakeOff, 2)).state == 0
 
 
+async def test_hand_launch_whose_motors_stop_again_is_cancelled(device: ScriptedDevice, drone: Drone) -> None:
+    """The drone may try once more: motors in a hand must not start after the refusal."""
+    device.script[ardrone3.UserTakeOff] = lambda m: [
+        ardrone3.FlyingStateChanged(s) for s in ((FlyingState.MOTOR_RAMPING, FlyingState.LANDED) if m.state else ())
+    ]
+    with pytest.raises(CommandRejected, match="the motors stopped again"):
+        await drone.piloting.hand_launch()
+    assert (await device.until(ardrone3.UserTakeOff, 2)).state == 0
+
+
+async def test_hand_launch_is_refused_while_a_take_off_is_awaited(device: ScriptedDevice, drone: Drone) -> None:
+    """The cancellation of the hand launch would end the take-off."""
+    launching = asyncio.ensure_future(drone.piloting.take_off())
+    await device.until(ardrone3.TakeOff)
+    with pytest.raises(CommandRejected, match="about to take off"):
+        await drone.piloting.hand_launch(timeout=0.3)
+    device.say(*(ardrone3.FlyingStateChanged(s) for s in (FlyingState.MOTOR_RAMPING, FlyingState.TAKINGOFF)))
+    await launching
+    assert device.got(ardrone3.UserTakeOff) == []
+
+
 async def test_timed_out_hand_launch_is_cancelled(device: ScriptedDevice, drone: Drone) -> None:
     with pytest.raises(CommandTimeout):
         await drone.piloting.hand_launch(timeout=0.3)
