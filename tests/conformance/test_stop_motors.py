@@ -27,6 +27,7 @@ from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.sim import SimulatedDrone
 from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.sim.world.quirks import Quirk
+from anafi_mav.vehicle.takeoff import LOW
 
 FORCE = 21196
 PAUSE = dialect.MAV_CMD_DO_PAUSE_CONTINUE
@@ -89,6 +90,17 @@ async def test_disarm_just_above_the_ground_lands_the_drone() -> None:
         assert (await w.client.command(*DISARM, FORCE, timeout=30.0)).result == ACCEPTED
         assert flown(w)[-2:] == ["landing", "landed"]
         assert heard(w, "Emergency") == []
+
+
+@pytest.mark.parametrize(("force", "result"), [(0, REJECTED), (FORCE, DENIED)])
+async def test_disarm_above_half_a_metre_during_the_takeoff_is_refused(force: int, result: int) -> None:
+    async with world(speed=0.3) as w:
+        await ramping(w)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["up"] > LOW + 0.15, 20.0)
+        assert w.drone.flying_state.name == "TAKINGOFF"
+        assert (await w.client.command(*DISARM, force)).result == result
+        assert heard(w, "Emergency", "Landing", "UserTakeOff") == []
+        await w.at_height(5.0)
 
 
 @pytest.mark.parametrize(("force", "result"), [(0, REJECTED), (FORCE, DENIED)])
