@@ -109,3 +109,18 @@ async def test_return_that_begins_during_the_lift_is_not_disturbed_by_the_climb(
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 15.0)
         await asyncio.sleep(1.0)  # in which the climb would begin
         assert heard(w, "moveBy") == []
+
+
+async def test_return_that_begins_during_the_lift_is_not_disturbed_by_setpoints() -> None:
+    """Offboard was chosen in the lift and follows the take-off: its setpoints would end the return."""
+    async with world(speed=1.0) as w, streaming(w.client, EAST):
+        assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=10.0)).result == ACCEPTED
+        mark = w.client.mark()
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        assert (await w.client.command(SET_MODE, *PX4_OFFBOARD)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "motor_ramping", 10.0)
+        w.drone.inject(rth.State(rth.RthState.IN_PROGRESS, rth.StateReason.USER_REQUEST))
+        await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Climb"), since=mark, timeout=15.0)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 15.0)
+        await asyncio.sleep(2.0)
+        assert heard(w, "PCMD", "moveBy", "CancelMoveTo", "abort") == []

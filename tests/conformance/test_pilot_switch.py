@@ -12,7 +12,7 @@ from support.flavours import both
 from support.mav import Client
 from support.missions import put, takeoff, way
 from support.params import fetch, read, send_set, value_of, write
-from support.setpoints import VELOCITY_ONLY, heard, local, motion, said, streaming
+from support.setpoints import VELOCITY_ONLY, attitude, heard, local, motion, said, streaming, texts
 from support.world import HOLD, World, world
 
 from anafi_mav.arsdk.messages import ardrone3
@@ -175,6 +175,20 @@ async def test_takeoff_by_setpoints_ends_when_pilot_gets_aircraft() -> None:
             await switch(w, PILOT)
             await asyncio.sleep(5.0)
         assert w.drone.pose.up == pytest.approx(0.0, abs=0.01)
+
+
+async def test_climbing_setpoint_on_the_ground_is_refused_while_pilot_has_aircraft() -> None:
+    """At once: no client is warned of a take-off that is not going to be."""
+    async with world(speed=1.0, skycontroller=3, flavour="ardupilot") as w:
+        await switch(w, PILOT)
+        assert (await w.client.command(SET_MODE, 1, 4)).result == ACCEPTED
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        mark = w.client.mark()
+        async with streaming(w.client, attitude(thrust=0.7)):
+            await said(w.client, f"Setpoint refused: {REFUSED}", mark)
+            await asyncio.sleep(1.5)
+        assert [text for text in texts(w.client, mark) if text.startswith("Takeoff by setpoints")] == []
+        assert heard(w, "TakeOff") == []
 
 
 async def test_drone_that_rises_does_not_climb_for_program() -> None:

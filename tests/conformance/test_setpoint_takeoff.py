@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fault_scenarios import another_controller, home_being_undone
 from support.flavours import both
 from support.mav import NAN, Client
 from support.setpoints import (
@@ -23,6 +24,7 @@ from support.setpoints import (
     attitude,
     heard,
     local,
+    motion,
     said,
     streaming,
     texts,
@@ -30,7 +32,7 @@ from support.setpoints import (
 from support.world import ARMED, HOLD, HOME, OFFBOARD, World, world
 
 from anafi_mav import geo
-from anafi_mav.arsdk.messages import rth
+from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.drone import events
 from anafi_mav.sim.skycontroller import TAKEOFF_LAND
 from anafi_mav.sim.world.faults import Impairment
@@ -279,8 +281,9 @@ async def test_prearm_problem_keeps_setpoints_on_the_ground() -> None:
             w.drone.faults.magneto_required = True
             await said(w.client, "Magnetometer calibration required", mark)
             program.setpoint = attitude(thrust=0.7)
-            await said(w.client, "Setpoint refused: ", mark)
+            await said(w.client, "Setpoint refused: magneto calibration", mark)
             await asyncio.sleep(1.3)
+        assert [text for text in texts(w.client, mark) if text.startswith("Takeoff by setpoints")] == []
         assert heard(w, "TakeOff") == []
 
 
@@ -298,6 +301,25 @@ async def test_setpoints_do_not_take_off_a_vehicle_that_is_disarmed_meanwhile() 
             await said(w.client, "Disarmed: no takeoff", 0)
             await asyncio.sleep(6.0)  # the home is undone within this time
         assert heard(w, "TakeOff") == []
+
+
+async def test_setpoints_do_not_fly_the_takeoff_of_another_controller_that_precedes_theirs() -> None:
+    """Their second is over, but a home is still being undone when the drone leaves the ground."""
+    async with world(speed=4.0) as w:
+        program, mark = Program(IDLE), w.client.mark()
+        async with streaming(w.client, program):
+            await ready(w.client, "px4")
+            await home_being_undone(w)
+            program.setpoint = attitude(pitch=-0.1, thrust=0.7)
+            await said(w.client, "Takeoff by setpoints of system 255", mark)
+            await asyncio.sleep(1.3)
+            another_controller(w, ardrone3.TakeOff())
+            await said(w.client, "Takeoff by setpoints failed", mark)
+            await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 10.0)
+            began = asyncio.get_running_loop().time()
+            await asyncio.sleep(3.0)
+        assert motion(w, began) == []
+        assert w.drone.pose.up == pytest.approx(1.0, abs=0.2)
 
 
 # What waits for an accepted take-off.
