@@ -12,18 +12,21 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.fault_scenarios import (
     ACCEPTED,
     ARM,
+    CANCELLED,
     DENIED,
     LAND_CMD,
     REJECTED,
     SET_MODE,
     TAKEOFF_CMD,
     heard,
+    until,
     watched,
 )
 from support.mav import NAN, Client
 from support.world import ARMED, World, world
 
 from anafi_mav.arsdk.messages import ardrone3
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.sim import SimulatedDrone
 from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.sim.world.quirks import Quirk
@@ -80,6 +83,24 @@ async def test_disarm_with_ignored_landing_is_accepted_after_landing() -> None:
         assert heard(w, "Emergency") == []
         progress = [m for _, m in w.client.since(mark, "COMMAND_ACK") if m.result == dialect.MAV_RESULT_IN_PROGRESS]
         assert progress != []
+
+
+async def test_disarm_before_a_late_takeoff_is_not_accepted_by_a_repeated_landed() -> None:
+    """The drone reports LANDED once more before it has received the TakeOff, and the Landing behind it."""
+    async with world(speed=1.0) as w:
+        w.drone.faults.quirks = frozenset({Quirk.RAMPING_IGNORES_LANDING})
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        w.drone.faults.up = Impairment(delay=1.0)
+        mark = w.client.mark()
+        w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
+        await watched(0.3)
+        w.client.send_command(*DISARM)
+        await watched(0.2)
+        w.drone.inject(ardrone3.FlyingStateChanged(FlyingState.LANDED))
+        assert await until(w.client, mark, 2) == [(TAKEOFF_CMD, CANCELLED), (ARM, REJECTED)]
+        await state(w, "landed", 20.0)
+        assert w.drone.pose.up == pytest.approx(0.0, abs=0.01)
+        await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED)
 
 
 async def test_disarm_just_above_the_ground_lands_the_drone() -> None:

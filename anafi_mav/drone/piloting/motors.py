@@ -286,13 +286,14 @@ class Motors:
     async def _catch_take_off(self, timeout: float) -> None:
         """Return when the drone is off the ground, or when it certainly stays there.
 
-        That is known once it has received a Landing, behind any take-off of ours, and then reports nothing. Raises
-        `CommandTimeout` while it is not known; the Landing is not withdrawn.
+        That is known once it has received a Landing, behind any take-off of ours, and then reports nothing. LANDED
+        that is reported while a take-off may still begin is older than it. Raises `CommandTimeout` while it is not
+        known; the Landing is not withdrawn.
         """
         self._end_hand_launch()
         answer = self._commander.expect(
             (ardrone3.FlyingStateChanged,),
-            lambda message: None if message.state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF) else True,
+            lambda message: None if message.state in TURNING or self.about_to_fly else True,
         )
         try:
             delivery = self._commander.deliver(ardrone3.Landing())
