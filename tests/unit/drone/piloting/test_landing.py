@@ -13,8 +13,9 @@ from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.drone import Drone, PilotingCommand, sent_commands
 from anafi_mav.drone.piloting import landing
+from anafi_mav.drone.piloting.motors import FORCED_AFTER
 from anafi_mav.drone.sent_commands import Expiry, Slot
-from anafi_mav.errors import AnafiMavError, CommandRejected
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout
 
 
 def state(flying: FlyingState) -> Message:
@@ -319,6 +320,23 @@ async def test_landing_is_not_repeated_after_a_newer_command(drone: Drone, devic
     await device.quiet(ardrone3.Landing)
 
 
+async def test_landing_that_a_newer_command_replaces_does_not_arrive_later(
+    drone: Drone, device: ScriptedDevice
+) -> None:
+    """The drone received nothing meanwhile: it would land during the newer command."""
+    await reported(drone, device, FlyingState.HOVERING)
+    device.session.mute = True
+    landing = await begun(drone.piloting.land())
+    await asyncio.sleep(0.05)
+    landing.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await landing
+    device.session.mute = False
+    for _ in range(2):  # longer than an acknowledgement is waited for
+        await device.quiet(ardrone3.Landing)
+    assert device.got(ardrone3.Landing) == []
+
+
 async def test_land_after_gaz_is_sent_although_landing_is_reported(drone: Drone, device: ScriptedDevice) -> None:
     """The gaz may have ended the landing, which is reported late: LANDING proves nothing, so Landing is sent again."""
     await reported(drone, device, FlyingState.LANDING)
@@ -335,6 +353,22 @@ async def test_land_after_gaz_is_sent_although_landing_is_reported(drone: Drone,
     await reported(drone, device, FlyingState.LANDING)
     await landing
     await device.quiet(ardrone3.PCMD)
+
+
+async def test_repeated_landed_does_not_rule_out_a_take_off_before_the_landing(
+    drone: Drone, device: ScriptedDevice
+) -> None:
+    """It may be older than the TakeOff: the drone may still rise."""
+    launching = await begun(drone.piloting.take_off())
+    await device.until(ardrone3.TakeOff)
+    launching.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await launching
+    landing = await begun(drone.piloting.land())
+    await device.until(ardrone3.Landing)
+    await reported(drone, device, FlyingState.LANDED)
+    await landing
+    assert drone.piloting.about_to_fly
 
 
 async def test_withdrawn_land_that_begins_is_settled(drone: Drone, device: ScriptedDevice) -> None:
@@ -394,6 +428,51 @@ async def test_forced_stop_never_cuts_motors_in_the_air(drone: Drone, device: Sc
     await reported(drone, device, FlyingState.LANDING)
     await reported(drone, device, FlyingState.LANDED)
     await stopping
+
+
+async def test_motor_cut_that_the_drone_has_not_received_is_withdrawn_in_the_air(
+    drone: Drone, device: ScriptedDevice
+) -> None:
+    """It would be repeated until it arrives, and the drone would fall."""
+    await reported(drone, device, FlyingState.MOTOR_RAMPING)
+    stopping = await begun(drone.piloting.stop_motors(force=True))
+    await device.until(ardrone3.Landing)
+    device.session.air = lambda data, inward, hand_on: None if inward else hand_on(data)
+    await asyncio.sleep(FORCED_AFTER + 0.2)
+    await reported(drone, device, FlyingState.TAKINGOFF)
+    device.session.air = lambda data, inward, hand_on: hand_on(data)
+    await device.until(ardrone3.Landing, 2)
+    for _ in range(3):
+        await device.quiet(ardrone3.Emergency)
+    assert device.got(ardrone3.Emergency) == []
+    await reported(drone, device, FlyingState.LANDED)
+    await stopping
+
+
+# The motor cut.
+
+
+async def test_motor_cut_without_an_answer_is_not_confirmed_while_a_take_off_is_awaited(
+    drone: Drone, device: ScriptedDevice
+) -> None:
+    """The drone stands for us, and may have started its motors already."""
+    launching = await begun(drone.piloting.take_off())
+    await device.until(ardrone3.TakeOff)
+    with pytest.raises(CommandTimeout):
+        await drone.piloting.emergency()
+    with pytest.raises(CommandRejected, match="the motors are cut"):
+        await launching
+    assert len(device.got(ardrone3.Emergency)) == 1
+
+
+async def test_confirmed_motor_cut_rules_out_the_take_off_before_it(drone: Drone, device: ScriptedDevice) -> None:
+    device.script[ardrone3.Emergency] = lambda _: [state(FlyingState.LANDED)]
+    launching = await begun(drone.piloting.take_off())
+    await device.until(ardrone3.TakeOff)
+    await drone.piloting.emergency()
+    with pytest.raises(CommandRejected, match="the motors are cut"):
+        await launching
+    assert not drone.piloting.about_to_fly
 
 
 # What newer commands have replaced.
