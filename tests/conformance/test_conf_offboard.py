@@ -796,3 +796,21 @@ async def test_height_is_held_against_a_climb_that_leads_away() -> None:
             began = now()
             await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > began + 30.0, 40.0)
             assert w.drone.pose.up == pytest.approx(8.0 + fastest, abs=0.5)  # the height loop has 1 /s
+
+
+async def test_velocity_levels_the_sticks_at_once_when_the_drone_no_longer_reports_its_own() -> None:
+    """Without it the loop has no sticks for the setpoint: those of before would tilt the drone until they expire."""
+    async with world(speed=1.0) as w:
+        await w.take_off(5.0)
+        async with streaming(w.client, local(VELOCITY_ONLY, v=(2.0, 0.0, 0.0))):
+            await engage(w.client, "px4")
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 2.0, 10.0)
+            mark = w.client.mark()
+            report, unknown = w.drone.firmware.motion_report, ardrone3.SpeedChanged(NAN, NAN, NAN)
+            w.drone.firmware.motion_report = lambda: [  # type: ignore[method-assign]
+                unknown if isinstance(message, ardrone3.SpeedChanged) else message for message in report()
+            ]
+            await said(w.client, "velocity unknown", mark)
+            began = now()
+            await asyncio.sleep(1.0)
+        assert [e for e in heard(w, "PCMD", since=began + 0.05) if e.args["pitch"]] == []

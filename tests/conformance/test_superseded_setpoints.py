@@ -3,10 +3,22 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 from typing import Any
 
 import pytest
-from support.fault_scenarios import ACCEPTED, ARM, LAND_CMD, RTL, SET_MODE, deaf, goto, watched
+from support.fault_scenarios import (
+    ACCEPTED,
+    ARM,
+    LAND_CMD,
+    PX4_HOLD,
+    RTL,
+    SET_MODE,
+    deaf,
+    goto,
+    home_being_undone,
+    watched,
+)
 from support.flavours import both
 from support.missions import ROUND, put
 from support.setpoints import (
@@ -16,6 +28,7 @@ from support.setpoints import (
     VELOCITY_ONLY,
     arrived,
     earth,
+    engage,
     heard,
     local,
     motion,
@@ -207,3 +220,34 @@ async def test_heartbeat_stays_armed_before_a_mission_lifts_off() -> None:
         beats = [beat for _, beat in w.client.since(mark, "HEARTBEAT")]
         first = next(number for number, beat in enumerate(beats) if beat.base_mode & ARMED)
         assert all(beat.base_mode & ARMED for beat in beats[first:])
+
+
+@pytest.mark.parametrize(
+    "setpoint",
+    [earth(POSITION_ONLY, 6, 20.0, 0.0, 8.0), local(VELOCITY_ONLY, v=(0.0, 2.0, 0.0))],
+    ids=["position", "velocity"],
+)
+async def test_guided_setpoint_that_has_waited_too_long_is_dropped(setpoint: Any) -> None:
+    """It waits until a home is undone; its sender may be silent since."""
+    async with world(speed=1.0, flavour="ardupilot") as w:
+        await w.take_off(8.0)
+        await home_being_undone(w)
+        mark, began = w.client.mark(), now()
+        w.client.send(setpoint)
+        await said(w.client, "waited too long", mark)
+        await watched(2.0)
+        assert motion(w, began) == []
+
+
+async def test_newest_position_of_a_stream_is_not_flown_after_a_hold() -> None:
+    """A place that follows another one at once waits until the drone may receive it: a Hold ends that wait."""
+    async with world(speed=1.0) as w:
+        await w.take_off(8.0)
+        north = itertools.count(20.0, 0.5)
+        async with streaming(w.client, lambda: local(POSITION_ONLY, at=(next(north), 0.0, -8.0))):
+            await engage(w.client, "px4")
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 3.0, 15.0)
+            assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+            began = now()
+            await watched(3.0)
+        assert motion(w, began) == []
