@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import another_controller, home_being_undone
+from support.fault_scenarios import another_controller, deaf, home_being_undone
 from support.flavours import both
 from support.mav import NAN, Client
 from support.setpoints import (
@@ -303,6 +303,21 @@ async def test_setpoints_do_not_take_off_a_vehicle_that_is_disarmed_meanwhile() 
         assert heard(w, "TakeOff") == []
 
 
+async def test_climbing_setpoints_do_not_replace_a_takeoff_that_the_drone_has_not_received() -> None:
+    async with world(speed=1.0, flavour="ardupilot") as w:
+        await ready(w.client, "ardupilot")
+        mark = w.client.mark()
+        deaf(w, 2.5)
+        w.client.send_command(TAKEOFF, x=0.0, y=0.0, z=5.0)
+        await asyncio.sleep(0.2)
+        async with streaming(w.client, attitude(thrust=0.7)):
+            await said(w.client, "Setpoint refused: drone is about to take off", mark)
+            await asyncio.sleep(1.5)
+        await w.at_height(5.0)
+        assert [text for text in texts(w.client, mark) if text.startswith("Takeoff by setpoints")] == []
+        assert len(heard(w, "TakeOff")) == 1
+
+
 async def test_setpoints_do_not_fly_the_takeoff_of_another_controller_that_precedes_theirs() -> None:
     """Their second is over, but a home is still being undone when the drone leaves the ground."""
     async with world(speed=4.0) as w:
@@ -520,6 +535,18 @@ async def test_offboard_silent_during_takeoff_leaves_the_climb_alone() -> None:
         await said(w.client, "Setpoints stopped: takeoff continues", mark)
         await w.at_height(4.0)
         assert [e for e in heard(w, "PCMD") if e.args["pitch"]] == []
+
+
+async def test_offboard_silent_during_the_climb_leaves_it_alone() -> None:
+    """The move to the height is the take-off's: no hover of the setpoints ends it."""
+    async with world(speed=1.0) as w:
+        await climbing(w, 9.0)
+        mark = w.client.mark()
+        async with streaming(w.client, local(VELOCITY_ONLY, v=(2.0, 0.0, 0.0))):
+            assert (await w.client.command(SET_MODE, 1, 6, 0)).result == ACCEPTED
+        await said(w.client, "Setpoints stopped: takeoff continues", mark)
+        await w.at_height(9.0)
+        assert len(heard(w, "moveBy")) == 1
 
 
 async def test_guided_stream_during_takeoff_flies_after_climb_without_warning() -> None:
