@@ -409,6 +409,24 @@ async def test_stop_motors_sends_both_and_returns_when_landed(drone: Drone, devi
     assert device.got(ardrone3.Emergency) == []
 
 
+async def test_stop_motors_withdraws_a_take_off_that_the_drone_has_not_received(
+    drone: Drone, device: ScriptedDevice
+) -> None:
+    await reported(drone, device, FlyingState.MOTOR_RAMPING)
+    device.session.air = lambda data, inward, hand_on: None if inward else hand_on(data)
+    launching = await begun(drone.piloting.take_off())
+    await asyncio.sleep(0.05)
+    stopping = await begun(drone.piloting.stop_motors())
+    device.session.air = lambda data, inward, hand_on: hand_on(data)
+    with pytest.raises(CommandRejected, match="the motors are to stop"):
+        await launching
+    await device.until(ardrone3.Landing)
+    await device.quiet(ardrone3.TakeOff)
+    assert device.got(ardrone3.TakeOff) == []
+    await reported(drone, device, FlyingState.LANDED)
+    await stopping
+
+
 async def test_forced_motor_stop_cuts_motors_still_ramping(drone: Drone, device: ScriptedDevice) -> None:
     device.script[ardrone3.Emergency] = lambda _: [state(FlyingState.EMERGENCY)]
     await reported(drone, device, FlyingState.MOTOR_RAMPING)
