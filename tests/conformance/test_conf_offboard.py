@@ -814,3 +814,16 @@ async def test_velocity_levels_the_sticks_at_once_when_the_drone_no_longer_repor
             began = now()
             await asyncio.sleep(1.0)
         assert [e for e in heard(w, "PCMD", since=began + 0.05) if e.args["pitch"]] == []
+
+
+async def test_offboard_chosen_by_another_streaming_client_flies_its_setpoints() -> None:
+    """An acceptance that left the setpoints of the client before in force would be untrue."""
+    async with world(speed=1.0, clients=2) as w:
+        await w.take_off(5.0)
+        first, second = w.clients
+        async with streaming(first, STEERS):
+            await engage(first, "px4")
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 1.0, 10.0)
+            async with streaming(second, local(VELOCITY_ONLY, v=(0.0, 2.0, 0.0))):
+                assert (await second.command(SET_MODE, 1, 6, 0)).result == dialect.MAV_RESULT_ACCEPTED
+                await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["ve"] > 1.0 > e.args["vn"], 10.0)
