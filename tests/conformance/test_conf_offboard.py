@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fault_scenarios import watched
 from support.flavours import both
 from support.setpoints import (
     NO_ACCELERATION,
@@ -195,7 +196,7 @@ async def test_setpoint_is_flown_on_arrival(flavour: str) -> None:
                 )
                 delays.append(answer.t - began)
             began = now()
-            await asyncio.sleep(1.0)
+            await watched(1.0)
             assert 17 <= len(heard(w, "PCMD", since=began)) <= 30  # 20 a second, and one with each setpoint that moves
         assert sorted(delays)[2] < 0.025
 
@@ -812,7 +813,7 @@ async def test_velocity_levels_the_sticks_at_once_when_the_drone_no_longer_repor
             ]
             await said(w.client, "velocity unknown", mark)
             began = now()
-            await asyncio.sleep(1.0)
+            await watched(1.0)
         assert [e for e in heard(w, "PCMD", since=began + 0.05) if e.args["pitch"]] == []
 
 

@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 
 import pytest
-from support.fault_scenarios import ACCEPTED, ARM, PX4_OFFBOARD, SET_MODE, TAKEOFF_CMD, goto
+from support.fault_scenarios import ACCEPTED, ARM, PX4_OFFBOARD, SET_MODE, TAKEOFF_CMD, goto, watched
 from support.setpoints import COPTER_GUIDED, POSITION_ONLY, VELOCITY_ONLY, earth, heard, local, streaming
 from support.world import HOLD, HOME, world
 
@@ -122,5 +122,5 @@ async def test_return_that_begins_during_the_lift_is_not_disturbed_by_setpoints(
         w.drone.inject(rth.State(rth.RthState.IN_PROGRESS, rth.StateReason.USER_REQUEST))
         await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Climb"), since=mark, timeout=15.0)
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 15.0)
-        await asyncio.sleep(2.0)
+        await watched(2.0)
         assert heard(w, "PCMD", "moveBy", "CancelMoveTo", "abort") == []

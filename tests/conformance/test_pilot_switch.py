@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import ACCEPTED, REJECTED, Impairment, goto
+from support.fault_scenarios import ACCEPTED, REJECTED, Impairment, goto, watched
 from support.flavours import both
 from support.mav import Client
 from support.missions import put, takeoff, way
@@ -186,7 +186,7 @@ async def test_climbing_setpoint_on_the_ground_is_refused_while_pilot_has_aircra
         mark = w.client.mark()
         async with streaming(w.client, attitude(thrust=0.7)):
             await said(w.client, f"Setpoint refused: {REFUSED}", mark)
-            await asyncio.sleep(1.5)
+            await watched(1.5)
         assert [text for text in texts(w.client, mark) if text.startswith("Takeoff by setpoints")] == []
         assert heard(w, "TakeOff") == []
 

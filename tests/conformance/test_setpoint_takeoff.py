@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import another_controller, deaf, home_being_undone
+from support.fault_scenarios import another_controller, being_tried, deaf, home_being_undone, watched
 from support.flavours import both
 from support.mav import NAN, Client
 from support.setpoints import (
@@ -309,10 +309,10 @@ async def test_climbing_setpoints_do_not_replace_a_takeoff_that_the_drone_has_no
         mark = w.client.mark()
         deaf(w, 2.5)
         w.client.send_command(TAKEOFF, x=0.0, y=0.0, z=5.0)
-        await asyncio.sleep(0.2)
+        await being_tried(w.client, mark, TAKEOFF)
         async with streaming(w.client, attitude(thrust=0.7)):
             await said(w.client, "Setpoint refused: drone is about to take off", mark)
-            await asyncio.sleep(1.5)
+            await watched(1.5)
         await w.at_height(5.0)
         assert [text for text in texts(w.client, mark) if text.startswith("Takeoff by setpoints")] == []
         assert len(heard(w, "TakeOff")) == 1
@@ -327,12 +327,12 @@ async def test_setpoints_do_not_fly_the_takeoff_of_another_controller_that_prece
             await home_being_undone(w)
             program.setpoint = attitude(pitch=-0.1, thrust=0.7)
             await said(w.client, "Takeoff by setpoints of system 255", mark)
-            await asyncio.sleep(1.3)
+            await watched(1.3)
             another_controller(w, ardrone3.TakeOff())
             await said(w.client, "Takeoff by setpoints failed", mark)
             await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 10.0)
             began = asyncio.get_running_loop().time()
-            await asyncio.sleep(3.0)
+            await watched(3.0)
         assert motion(w, began) == []
         assert w.drone.pose.up == pytest.approx(1.0, abs=0.2)
 

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Callable
 
 import pytest
 from support.scripted_device import ScriptedDevice
 
+from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.drone import Drone, PilotingCommand, sent_commands
 from anafi_mav.drone.piloting import landing
-from anafi_mav.drone.piloting.motors import FORCED_AFTER
 from anafi_mav.drone.sent_commands import Expiry, Slot
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout
 
@@ -27,6 +27,34 @@ async def reported(drone: Drone, device: ScriptedDevice, flying: FlyingState) ->
     await asyncio.sleep(0)
     device.say(state(flying))
     await heard
+
+
+async def given(drone: Drone, kind: type[Message]) -> None:
+    """Wait until a command of this kind is on its way, whether the drone receives it or not."""
+    sent = asyncio.Event()
+    drone.on_command = lambda message: sent.set() if isinstance(message, kind) else None
+    await sent.wait()
+    drone.on_command = None
+
+
+def deaf(device: ScriptedDevice, command: Message) -> asyncio.Event:
+    """Let the drone receive nothing from now on; return the event that this command is lost."""
+    lost, content = asyncio.Event(), wire.encode(command)
+
+    def air(data: bytes, inward: bool, hand_on: Callable[[bytes], None]) -> None:
+        if not inward:
+            hand_on(data)
+        elif content in data:
+            lost.set()
+
+    device.session.air = air
+    return lost
+
+
+async def cancelled(work: asyncio.Future[None]) -> None:
+    work.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await work
 
 
 def gaz(device: ScriptedDevice) -> list[tuple[int, int, int, int, int]]:
@@ -149,9 +177,7 @@ async def test_cancelled_end_of_a_landing_centres_the_sticks(drone: Drone, devic
     await reported(drone, device, FlyingState.LANDING)
     ending = await begun(drone.piloting.end_landing())
     await device.until(ardrone3.PCMD, 2)
-    ending.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await ending
+    await cancelled(ending)
     count = gaz(device).count(UP)
     await device.until(ardrone3.PCMD, count + 5)
     assert gaz(device)[-5:] == [LEVEL] * 5
@@ -227,9 +253,7 @@ async def test_takeoff_command_against_a_withdrawn_landing_is_withdrawn(
     device.session.mute = True
     ending = await begun(drone.piloting.end_landing(take_off=True))
     await asyncio.sleep(0.05)
-    ending.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await ending
+    await cancelled(ending)
     device.session.mute = False
     await reported(drone, device, FlyingState.LANDED)
     for _ in range(2):  # longer than an acknowledgement is waited for
@@ -248,7 +272,7 @@ async def test_toggle_that_the_drone_has_not_received_is_withdrawn_before_the_ga
     await reported(drone, device, FlyingState.LANDING)
     device.session.mute = True
     ending = await begun(drone.piloting.end_landing(take_off=True))
-    await asyncio.sleep(0.4)
+    await given(drone, ardrone3.PCMD)
     device.session.mute = False
     await device.until(ardrone3.PCMD, 10)
     assert UP in gaz(device)
@@ -268,10 +292,8 @@ async def test_motors_of_another_controller_start_after_a_cancelled_end_of_a_lan
     await reported(drone, device, FlyingState.LANDING)
     ending = await begun(drone.piloting.end_landing(take_off=True))
     await device.until(ardrone3.TakeOff)
-    ending.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await ending
-    await asyncio.sleep(0.2)
+    await cancelled(ending)
+    await device.quiet(ardrone3.TakeOff)  # longer than it counts
     await reported(drone, device, FlyingState.LANDED)
     await reported(drone, device, FlyingState.MOTOR_RAMPING)
     await device.quiet(ardrone3.Landing)
@@ -313,9 +335,7 @@ async def test_landing_is_not_repeated_after_a_newer_command(drone: Drone, devic
     await reported(drone, device, FlyingState.MOTOR_RAMPING)
     landing = await begun(drone.piloting.land())
     await device.until(ardrone3.Landing, 1)
-    landing.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await landing
+    await cancelled(landing)
     await reported(drone, device, FlyingState.TAKINGOFF)
     await device.quiet(ardrone3.Landing)
 
@@ -325,13 +345,11 @@ async def test_landing_that_a_newer_command_replaces_does_not_arrive_later(
 ) -> None:
     """The drone received nothing meanwhile: it would land during the newer command."""
     await reported(drone, device, FlyingState.HOVERING)
-    device.session.mute = True
+    lost = deaf(device, ardrone3.Landing())
     landing = await begun(drone.piloting.land())
-    await asyncio.sleep(0.05)
-    landing.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await landing
-    device.session.mute = False
+    await lost.wait()
+    await cancelled(landing)
+    device.session.air = None
     for _ in range(2):  # longer than an acknowledgement is waited for
         await device.quiet(ardrone3.Landing)
     assert device.got(ardrone3.Landing) == []
@@ -342,9 +360,7 @@ async def test_land_after_gaz_is_sent_although_landing_is_reported(drone: Drone,
     await reported(drone, device, FlyingState.LANDING)
     ending = await begun(drone.piloting.end_landing())
     await device.until(ardrone3.PCMD, 2)
-    ending.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await ending
+    await cancelled(ending)
     landing = await begun(drone.piloting.land())
     await device.until(ardrone3.Landing, 1)
     await reported(drone, device, FlyingState.FLYING)
@@ -355,29 +371,25 @@ async def test_land_after_gaz_is_sent_although_landing_is_reported(drone: Drone,
     await device.quiet(ardrone3.PCMD)
 
 
-async def test_repeated_landed_does_not_rule_out_a_take_off_before_the_landing(
-    drone: Drone, device: ScriptedDevice
-) -> None:
-    """It may be older than the TakeOff: the drone may still rise."""
+async def test_repeated_landed_does_not_end_a_landing_behind_a_takeoff(drone: Drone, device: ScriptedDevice) -> None:
+    """It may be older than the TakeOff: the drone may still rise until it reports nothing."""
     launching = await begun(drone.piloting.take_off())
     await device.until(ardrone3.TakeOff)
-    launching.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await launching
+    await cancelled(launching)
     landing = await begun(drone.piloting.land())
     await device.until(ardrone3.Landing)
     await reported(drone, device, FlyingState.LANDED)
-    await landing
     assert drone.piloting.about_to_fly
+    assert not landing.done()
+    await landing
+    assert not drone.piloting.about_to_fly
 
 
 async def test_withdrawn_land_that_begins_is_settled(drone: Drone, device: ScriptedDevice) -> None:
     await reported(drone, device, FlyingState.HOVERING)
     landing = await begun(drone.piloting.land())
     await device.until(ardrone3.Landing, 1)
-    landing.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await landing
+    await cancelled(landing)
     device.script[ardrone3.CancelMoveTo] = lambda _: [state(FlyingState.LANDING)]
     assert await drone.piloting.settle_landing()
 
@@ -386,9 +398,7 @@ async def test_withdrawn_land_that_has_begun_is_settled_at_once(drone: Drone, de
     await reported(drone, device, FlyingState.HOVERING)
     landing = await begun(drone.piloting.land())
     await device.until(ardrone3.Landing, 1)
-    landing.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await landing
+    await cancelled(landing)
     await reported(drone, device, FlyingState.LANDING)
     assert await drone.piloting.settle_landing()
     assert device.got(ardrone3.CancelMoveTo) == []
@@ -413,11 +423,11 @@ async def test_stop_motors_withdraws_a_take_off_that_the_drone_has_not_received(
     drone: Drone, device: ScriptedDevice
 ) -> None:
     await reported(drone, device, FlyingState.MOTOR_RAMPING)
-    device.session.air = lambda data, inward, hand_on: None if inward else hand_on(data)
+    lost = deaf(device, ardrone3.TakeOff())
     launching = await begun(drone.piloting.take_off())
-    await asyncio.sleep(0.05)
+    await lost.wait()
     stopping = await begun(drone.piloting.stop_motors())
-    device.session.air = lambda data, inward, hand_on: hand_on(data)
+    device.session.air = None
     with pytest.raises(CommandRejected, match="the motors are to stop"):
         await launching
     await device.until(ardrone3.Landing)
@@ -455,10 +465,10 @@ async def test_motor_cut_that_the_drone_has_not_received_is_withdrawn_in_the_air
     await reported(drone, device, FlyingState.MOTOR_RAMPING)
     stopping = await begun(drone.piloting.stop_motors(force=True))
     await device.until(ardrone3.Landing)
-    device.session.air = lambda data, inward, hand_on: None if inward else hand_on(data)
-    await asyncio.sleep(FORCED_AFTER + 0.2)
+    lost = deaf(device, ardrone3.Emergency())
+    await lost.wait()
     await reported(drone, device, FlyingState.TAKINGOFF)
-    device.session.air = lambda data, inward, hand_on: hand_on(data)
+    device.session.air = None
     await device.until(ardrone3.Landing, 2)
     for _ in range(3):
         await device.quiet(ardrone3.Emergency)
