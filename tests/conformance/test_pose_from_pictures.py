@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as stock
+from support import clock
 from support.fault_scenarios import goto
 from support.mav import CAMERA, NAN, Client
 from support.poses import pose_at
@@ -35,6 +36,9 @@ REPOSITION, RELATIVE = stock.MAV_CMD_DO_REPOSITION, stock.MAV_FRAME_GLOBAL_RELAT
 POSE = ["ATTITUDE", "ATTITUDE_QUATERNION", "GLOBAL_POSITION_INT", "LOCAL_POSITION_NED", "VFR_HUD"]
 BY_MICROSECONDS = ["ALTITUDE", "ODOMETRY"]
 EPOCH = 1_767_268_800.25
+QUICK = 0.005
+"""s that the machine may keep these tests waiting while each picture is judged; else they are judged by the median."""
+
 LATENCY = 0.1
 """s of a picture's age: what an ANAFI's exposure, encoder and radio take, roughly."""
 
@@ -103,7 +107,9 @@ async def test_pose_at_30_hz_is_the_truth_of_its_time(model: str, flavour: str, 
         # Its climb begins with a jerk, of which the log's ten poses a second are no truth.
         await w.client.wait("LOCAL_POSITION_NED", lambda m: m.vz < -1.5, timeout=10.0)
         mark = w.client.mark()
-        await asyncio.sleep(4.0)
+        async with clock.stalls() as stalls:
+            await asyncio.sleep(4.0)
+        is_quick = stalls.longest < QUICK
         assert video.state.playing
         seen = {name: w.client.since(mark, name) for name in [*POSE, *BY_MICROSECONDS, "ANAFI_PICTURE"]}
         for name, messages in seen.items():
@@ -136,7 +142,7 @@ async def test_pose_at_30_hz_is_the_truth_of_its_time(model: str, flavour: str, 
             assert m.bottom_clearance == pytest.approx(truth(w, m.time_usec / 1e6)["up"], abs=0.1)
         ages = [m.age for _, m in seen["ANAFI_PICTURE"]]
         assert min(ages) > LATENCY * 1e3 - 20
-        assert statistics.median(ages) < LATENCY * 1e3 + 20  # some are late on a busy machine
+        assert (max if is_quick else statistics.median)(ages) < LATENCY * 1e3 + 20
         beside: list[float] = []
         for (_, a), (_, b) in itertools.pairwise(seen["ANAFI_PICTURE"]):
             assert b.time_boot_ms > a.time_boot_ms
@@ -144,7 +150,7 @@ async def test_pose_at_30_hz_is_the_truth_of_its_time(model: str, flavour: str, 
             assert ticks / 90 == pytest.approx(b.time_boot_ms - a.time_boot_ms, abs=1.1)
             beside.append(abs(b.drone_time_us - a.drone_time_us - ticks / 90 * 1e3))
             assert b.clock == dialect.ANAFI_PICTURE_CLOCK_REPORT
-        assert statistics.median(beside) < 10_000  # us; a busy machine stamps some late
+        assert (max if is_quick else statistics.median)(beside) <= 10_000  # us
         for name in seen:
             await w.client.command(SET, IDS[name], 0)
         while video.state.playing:

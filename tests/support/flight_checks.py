@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 
 from anafi_mav import geo, mav_enums
+from anafi_mav.drone.settings import REPEAT
 from anafi_mav.plans.plan import GLOBAL, Item, Plan
 from support.missions import apart
 from support.world import HOME
@@ -46,6 +47,9 @@ TAKEN = 1
 
 ZOOM_ORDERS = ("set_zoom_target", "SetZoomTarget")
 """To the older cameras and to the Ai's."""
+
+REPEATED = 0.9 * REPEAT
+"""s after which the same zoom is no second one: the first was not answered."""
 
 FOLLOWED = 2.5
 """deg that it may be beside a region of interest that it passes, up and down and to the side."""
@@ -131,13 +135,14 @@ class Log:
         return [name for name in names if not name.startswith("set_")]
 
     def zooms(self) -> list[float]:
-        """What the camera was asked to zoom to, 1 is not at all; what is repeated without an answer once."""
+        """What the camera was asked to zoom to, 1 is not at all; what is repeated for want of an answer once."""
         orders = [
-            entry["args"]
+            (entry["t"], entry["args"]["target"])
             for entry in self.entries
             if entry["kind"] == "command" and entry["name"].rpartition(".")[2] in ZOOM_ORDERS
         ]
-        return [target for target, _ in itertools.groupby(order["target"] for order in orders)]
+        pairs = itertools.pairwise([(-math.inf, math.nan), *orders])
+        return [target for (then, last), (t, target) in pairs if target != last or t - then <= REPEATED]
 
 
 def check(log: Log, plan: Plan, jump_beyond: int = 0) -> list[tuple[float, Item]]:
@@ -155,9 +160,9 @@ def check(log: Log, plan: Plan, jump_beyond: int = 0) -> list[tuple[float, Item]
         began, name = lines[position]
         assert name == "waypoint", (number, lines[position:])
         position += 1
-        end = lines[position][0] + 0.2
-        behind = next((t for t, _ in track if t > end), end)  # a busy machine writes the next pose later
-        flown = [at for t, at in track if began <= t <= behind]
+        end = lines[position][0]
+        behind = next((t for t, _ in track if t > end), end)  # later than usual on a busy machine
+        flown = [at for t, at in track if began <= t <= max(end + 0.2, behind)]
         closest = min(itertools.starmap(partial(apart, where), itertools.pairwise(flown)))
         assert closest < WITHIN, (number, closest)
 
