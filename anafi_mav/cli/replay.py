@@ -135,7 +135,7 @@ async def play(
 
     Raises `AnafiMavError` as `run` does.
     """
-    node = Node(flavours=tuple(FLAVOURS))
+    node = Node(flavours=tuple(FLAVOURS), forwards=False)
     await node.start(endpoints)
     try:
         return await _send(node, tlogs, traces, speed, start)
@@ -170,7 +170,8 @@ async def _send(node: Node, tlogs: Sequence[Path], traces: Sequence[Path], speed
                 elif frame is not None:
                     raw = frame.version_2()
                     for channel in node.channels:
-                        channel.forward(raw)
+                        if channel.has_system(frame.sysid) and channel.can_stream(frame.id):
+                            channel.forward(raw)
                     count += 1
     finally:
         reader.shutdown()

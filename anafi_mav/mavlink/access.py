@@ -137,6 +137,17 @@ MAINTENANCE_COMMANDS = frozenset(
 )
 """Those after STORAGE_FORMAT are for systems behind other endpoints."""
 
+WITH_SECRETS = frozenset(
+    {
+        dialect.MAVLINK_MSG_ID_SETUP_SIGNING,
+        dialect.MAVLINK_MSG_ID_AUTH_KEY,
+        dialect.MAVLINK_MSG_ID_WIFI_CONFIG_AP,
+        dialect.MAVLINK_MSG_ID_AIRLINK_AUTH,
+        dialect.MAVLINK_MSG_ID_CHANGE_OPERATOR_CONTROL,
+    }
+)
+"""Messages with a key or password, which no log and no recording may hold."""
+
 COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT)
 
 STOPPING = (*COMMANDS, dialect.MAVLINK_MSG_ID_SET_MODE)

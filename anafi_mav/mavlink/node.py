@@ -20,7 +20,7 @@ from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.endpoint_options import EndpointConfig
 from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.access import STOPPING, Access, concerns_link, needed_access, needed_by_others
+from anafi_mav.mavlink.access import STOPPING, WITH_SECRETS, Access, concerns_link, needed_access, needed_by_others
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, reason
 from anafi_mav.mavlink.channel import Channel, total
 from anafi_mav.mavlink.endpoint import EndpointFactory, make_endpoint, parse_endpoint
@@ -102,12 +102,13 @@ class Node:
         keys: KeyRing | None = None,
         on_setup_signing: Receiver | None = None,
         factories: Mapping[str, EndpointFactory] | None = None,
+        forwards: bool = True,
     ) -> None:
         """`flavours` are those that the URL of an endpoint may name.
 
         `keys`: the signing keys; None: no endpoint signs. `on_setup_signing` receives SETUP_SIGNING in place of the
         host that it is for: the key in it belongs to the endpoint. None: it is dropped. `factories` make the endpoints
-        of schemes that this room has none for.
+        of schemes that this room has none for. Without `forwards` nothing passes from one client to another.
         """
         self.on_channel = on_channel
         """Called with True when a channel opened, or its peer has proved its address, and with False when it closed."""
@@ -121,6 +122,7 @@ class Node:
         self._telemetry: set[int] = set()
         self._router: Router[Channel, Receiver] = Router()
         self._delivers = True
+        self._forwards = forwards
         self._flavours = flavours
         self._keys = keys
         self._on_setup_signing = on_setup_signing
@@ -312,13 +314,21 @@ class Node:
         for received in frames:
             if self.tap is not None:
                 self._guarded(self.tap.received, received)
-            permitted = may_forward = True
-            is_false = False
-            if not channel.is_unrestricted:
+            permitted, may_forward = True, self._forwards
+            is_false = is_hidden = False
+            if reached is not None or not channel.is_unrestricted:
                 permitted = channel.access is Access.ALL or self._permits(channel, received)
                 is_false = channel.access is Access.OBSERVE and self._has_name_of_other(channel, received)
-                may_forward = permitted and self._may_forward(channel, received, is_false=is_false)
-            route = self._router.route(channel, received, now, reached, may_forward=may_forward, may_learn=not is_false)
+                # A system of ours that the channel does not reach is not behind it: commands to it are answered here.
+                is_hidden = (
+                    reached is not None and received.sysid not in reached and self._router.is_ours(received.sysid)
+                )
+                may_forward = (
+                    may_forward and permitted and self._may_forward(channel, received, reached, is_false=is_false)
+                )
+            route = self._router.route(
+                channel, received, now, reached, may_forward=may_forward, may_learn=not (is_false or is_hidden)
+            )
             if route.is_refused:
                 channel.counters["refused_systems"] += 1
             if route.forward:
@@ -336,7 +346,8 @@ class Node:
                 if self._on_setup_signing is not None:
                     self._guarded(self._on_setup_signing, inbound)
                 continue
-            message_logger.debug("%s: %s", channel.name, message)
+            shown = message.get_type() if id in WITH_SECRETS else message
+            message_logger.debug("%s: %s", channel.name, shown)
             for host in route.hosts:
                 self._guarded(host, inbound)
 
@@ -369,12 +380,15 @@ class Node:
             other.access > channel.access for other in self._router.heard_on(received.sysid)
         )
 
-    def _may_forward(self, channel: Channel, received: ReceivedFrame, *, is_false: bool) -> bool:
+    def _may_forward(
+        self, channel: Channel, received: ReceivedFrame, reached: Collection[int] | None, *, is_false: bool
+    ) -> bool:
         """Return True if a permitted frame may reach other channels; otherwise it is counted.
 
-        `is_false`: it is an observer's, in the name of another sender.
+        `reached`: the only systems that it may reach; None: all. `is_false`: it is an observer's, in the name of
+        another sender.
         """
-        if channel.system_ids is not None and not self._stays_within(channel.system_ids, received):
+        if reached is not None and not self._stays_within(reached, received):
             channel.counters["filtered_frames"] += 1
             return False
         if channel.access is Access.OBSERVE and (is_false or not _is_harmless(received.message)):
@@ -387,7 +401,7 @@ class Node:
         return True
 
     def _stays_within(self, systems: Collection[int], received: ReceivedFrame) -> bool:
-        """Return True if a frame reaches these systems alone: the channel's option `systems`.
+        """Return True if a frame reaches these systems alone: `systems`, or a key's.
 
         The router decides about frames for one system. To all go a station's heartbeat, and what these systems send
         to no target: a command to system 0 would be one to the systems behind other endpoints. COMMAND_ACK of older

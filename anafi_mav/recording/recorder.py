@@ -1,8 +1,8 @@
 """Records both sides of a gateway, for `anafi-mav replay` and for a report of a bug.
 
 Telemetry is recorded as a client of its own receives it, at the default rates and once, however many clients there
-are. Answers to single clients and the frames of clients are recorded beside it. SETUP_SIGNING, which carries a key, is
-never recorded.
+are. Answers to single clients and the frames of clients are recorded beside it. Messages with a key or password
+(`WITH_SECRETS`) are never recorded.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 from anafi_mav.clock import Clock
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import Message
-from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.access import WITH_SECRETS
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.frames import MAGIC_1, Packed, ReceivedFrame, with_flags
 from anafi_mav.mavlink.node import Node
@@ -71,7 +71,7 @@ class Recorder:
 
         Many signatures would help to find the key (MAVLink message_signing.md §logging).
         """
-        if frame.id != dialect.MAVLINK_MSG_ID_SETUP_SIGNING:
+        if frame.id not in WITH_SECRETS:
             self._write(frame.raw if frame.raw[0] == MAGIC_1 else with_flags(frame.raw, 0))
 
     def _now(self) -> float:

@@ -17,6 +17,12 @@ from anafi_mav.cli.replay import files_of, read_tlogs, read_traces
 from anafi_mav.config import RecordingConfig
 
 KEY = bytes(range(32))
+PASSWORD = b"open sesame"
+SECRETS = (
+    dialect.MAVLink_auth_key_message(PASSWORD),
+    dialect.MAVLink_wifi_config_ap_message(b"field", PASSWORD),
+    dialect.MAVLink_change_operator_control_message(1, 0, 0, PASSWORD),
+)
 
 
 async def flown(folder: Path) -> Path:
@@ -24,6 +30,8 @@ async def flown(folder: Path) -> Path:
     async with world(speed=8.0, recording=RecordingConfig(folder=str(folder))) as w:
         await w.take_off(5.0)
         w.client.send(dialect.MAVLink_setup_signing_message(1, 1, KEY, 1))
+        for secret in SECRETS:
+            w.client.send(secret)
         assert (await w.client.command(dialect.MAV_CMD_NAV_LAND)).result == dialect.MAV_RESULT_ACCEPTED
         await w.client.heartbeat(lambda beat: beat.custom_mode != LAND, timeout=30.0)
         (line,) = (line for line in w.gateway.lines() if line.startswith("recording "))
@@ -33,7 +41,9 @@ async def flown(folder: Path) -> Path:
 async def test_recording_has_both_wires_on_one_clock_and_no_key(tmp_path: Path) -> None:
     session = await flown(tmp_path)
     tlogs, traces = files_of(session)
-    assert KEY not in b"".join(path.read_bytes() for path in tlogs)
+    recorded = b"".join(path.read_bytes() for path in tlogs)
+    assert KEY not in recorded
+    assert PASSWORD not in recorded
     log = mavutil.mavlink_connection(str(tlogs[0]))
     messages = []
     while (message := log.recv_match()) is not None:
@@ -58,10 +68,12 @@ async def test_recording_has_both_wires_on_one_clock_and_no_key(tmp_path: Path) 
 
 async def test_replay_shows_a_station_the_vehicle_alone(tmp_path: Path) -> None:
     session = await flown(tmp_path)
-    station = await UdpClient(255).open("127.0.0.1")
+    station, limited, other = [await UdpClient(255).open("127.0.0.1") for _ in range(3)]
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "anafi_mav", "replay", str(session), "--speed", "20", "--trace"),
         *("--endpoint", f"udpout://127.0.0.1:{station.port}"),
+        *("--endpoint", f"udpout://127.0.0.1:{limited.port}?systems=1&block_messages=ATTITUDE"),
+        *("--endpoint", f"udpout://127.0.0.1:{other.port}?systems=7"),
         stdout=asyncio.subprocess.PIPE,
     )
     try:
@@ -71,13 +83,17 @@ async def test_replay_shows_a_station_the_vehicle_alone(tmp_path: Path) -> None:
         modes = [m.custom_mode for _, m in station.since(0, "HEARTBEAT")]
         assert modes.index(HOLD) < modes.index(LAND)
         assert {m.get_srcSystem() for _, m in station.received} == {1}
+        await limited.heartbeat(lambda beat: beat.custom_mode == LAND, since=0)
+        assert "ATTITUDE" not in {message.get_type() for _, message in limited.received}
+        assert other.mark() == 0
         assert b"alpha command ardrone3.Piloting.Landing {}" in out
         assert out.decode().splitlines()[-1].endswith("frames played")
     finally:
         if process.returncode is None:
             process.kill()
             await process.wait()
-        await station.close()
+        for client in (station, limited, other):
+            await client.close()
 
 
 async def test_replay_of_a_file_of_other_bytes_can_be_ended(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 from anafi_mav.endpoint_options import EndpointOptions
@@ -27,8 +28,8 @@ OPTIONS = {
 class Party:
     """A node with observer, flyer, a client of some systems, a pilot and the channel of a foreign drone."""
 
-    def __init__(self) -> None:
-        self.node = Node()
+    def __init__(self, *, forwards: bool = True) -> None:
+        self.node = Node(forwards=forwards)
         self.node.add_host(OURS, 1, lambda inbound: None)
         self.written: dict[str, list[bytes]] = {name: [] for name in OPTIONS}
         self.channels = {
@@ -37,9 +38,12 @@ class Party:
         for channel in self.channels.values():
             self.node.opened(channel)
 
-    def send(self, name: str, message: Any, source: tuple[int, int], seq: int = 0) -> None:
+    def send(
+        self, name: str, message: Any, source: tuple[int, int], seq: int = 0, reached: Collection[int] | None = None
+    ) -> None:
+        """`reached`: the systems of the key under which a frame arrives; None: it arrives under none."""
         channel = self.channels[name]
-        self.node.received(channel, channel.receive(frame(pack(message), seq, *source)))
+        self.node.received(channel, channel.receive(frame(pack(message), seq, *source)), reached)
 
     def got(self, name: str) -> list[tuple[str, int, int]]:
         """Kind, system and component of what a client has been sent since the last call."""
