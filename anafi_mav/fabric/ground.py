@@ -191,7 +191,7 @@ class FabricGround:
             if received.id == dialect.MAVLINK_MSG_ID_SETUP_SIGNING and not received.raw[2] & SIGNED:
                 # A gateway takes it from signed links only. All that may read them on the network have the key.
                 self.counters["refused_keys"] += 1
-                logger.warning("%s: key of SETUP_SIGNING not published: use anafi-mav keygen", channel.name)
+                logger.warning("%s: key of SETUP_SIGNING not published: use anafi-mav keygen", channel.endpoint)
                 continue
             target = targets(received.message)[0]
             systems = reachable if target == 0 else reachable & {target}

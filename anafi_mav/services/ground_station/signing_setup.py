@@ -65,7 +65,7 @@ class SigningSetup:
         elif len(self._waiting) < MAX_WAITING:
             self._waiting.append(inbound)
         else:
-            logger.warning("%s: Signing refused: too many keys wait", inbound.channel.name)
+            logger.warning("%s: Signing refused: too many keys wait", inbound.channel.endpoint)
 
     async def settle(self) -> None:
         """Wait until each message has its answer."""
@@ -98,7 +98,9 @@ class SigningSetup:
         channel, answering = inbound.channel, self._answering(inbound)
         if reason is not None:
             text = texts.REFUSED.fill(what=texts.SIGNING, reason=reason)
-            logger.warning("%s: %s", channel.name, text)
+            # By the endpoint, not by the client: one line in five seconds, from however many addresses.
+            logger.warning("%s: %s", channel.endpoint, text)
+            logger.debug("%s: %s", channel.name, text)
             if answering is not None:
                 answering.text(Severity.ERROR, text, channel)
             return

@@ -135,6 +135,21 @@ async def test_observer_changes_no_key(tmp_path: Path) -> None:
     assert bench.drones[1].texts == [refusal]
 
 
+async def test_refusals_of_an_endpoint_are_one_line_of_the_log(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A client has another port, and with that another name, whenever it connects."""
+    bench = Bench(tmp_path / "keys", SECRET, is_local=False)
+    for channel in bench.channels[:2]:
+        channel.endpoint = "tcpin://192.0.2.1:5760"
+        message = dialect.MAVLink_setup_signing_message(2, 1, list(OTHER), 0)
+        bench.setup.receive(Inbound(message, message.get_msgId(), channel, 255, 190, 0.0, False))
+    await bench.setup.settle()
+    warnings = [record.getMessage() for record in caplog.records if record.levelname == "WARNING"]
+    assert len(warnings) == 2
+    assert len(set(warnings)) == 1
+
+
 @pytest.mark.parametrize("active", [True, False])
 async def test_key_is_not_changed_while_any_drone_is_armed(tmp_path: Path, active: bool) -> None:
     bench = Bench(tmp_path / "keys", SECRET, is_local=True)
