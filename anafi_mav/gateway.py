@@ -441,7 +441,7 @@ class Gateway:
                 return None
             recorder = Recorder(self._node, self._clock, folder, recording.max_megabytes * 1_000_000)
             recorder.start()
-        except (OSError, RuntimeError) as error:  # RuntimeError: no such home
+        except (OSError, RuntimeError, ValueError) as error:  # no such home; no path
             problem = f"expected a folder that can be written: {getattr(error, 'strerror', None) or error}"
             raise ConfigError("recording.folder", problem) from error
         return recorder
@@ -450,6 +450,7 @@ class Gateway:
         """Lock the state folder: two gateways would take each other's drones and overwrite plans."""
         self._state = state_folder(self.config.state)
         if self._state is None:
+            self._state_problem = "this user has no home: name a folder by the key state"
             return
         lock = StateLock(self._state)
         try:

@@ -28,6 +28,7 @@ import msgspec
 from msgspec import Meta
 
 from anafi_mav.disk_writer import DiskWriter
+from anafi_mav.errors import ConfigError
 
 logger = logging.getLogger(__name__)
 
@@ -54,11 +55,19 @@ _HELD = (errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK)
 
 
 def state_folder(configured: str | None) -> Path | None:
-    """Return the state folder, or None when the user has no home (XDG Base Directory)."""
+    """Return the state folder, or None when the user has no home (XDG).
+
+    Raises `ConfigError` for a configured one that cannot be a folder.
+    """
     given = os.environ.get("XDG_STATE_HOME", "")
-    try:
-        if configured is not None:
+    if configured is not None:
+        if "\0" in configured:
+            raise ConfigError("state", f"expected the path of a folder, got {configured!r}")
+        try:
             return Path(configured).expanduser()
+        except RuntimeError as error:
+            raise ConfigError("state", f"expected the path of a folder, got {configured!r}: {error}") from error
+    try:
         return (Path(given) if Path(given).is_absolute() else Path.home() / ".local" / "state") / "anafi-mav"
     except RuntimeError as error:
         logger.warning("nothing will outlive the gateway: %s", error)

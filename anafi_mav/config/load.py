@@ -17,7 +17,16 @@ from typing import Any
 import msgspec
 
 from anafi_mav import documents, models
-from anafi_mav.config.schema import MAVSDK_SYSID, Config, DroneConfig, HttpConfig, SimConfig, VideoConfig, alternatives
+from anafi_mav.config.schema import (
+    MAVSDK_SYSID,
+    MAX_SYSID,
+    Config,
+    DroneConfig,
+    HttpConfig,
+    SimConfig,
+    VideoConfig,
+    alternatives,
+)
 from anafi_mav.errors import ConfigError
 
 _HOST_NAME = re.compile(r"(?!-)[A-Za-z0-9-]{1,63}(?<!-)(\.(?!-)[A-Za-z0-9-]{1,63}(?<!-))*\.?")
@@ -203,6 +212,8 @@ def _contradictions(config: Config) -> Iterator[tuple[str, str]]:
     yield from _twice("a sysid", {f"{key_path}.sysid": drone.sysid for key_path, drone in drones.items()})
     if config.sysids is not None:
         low, high = map(int, config.sysids.split("-"))
+        if not 1 <= low <= high <= MAX_SYSID:
+            yield "sysids", f"expected a range like 1-80 from 1 to {MAX_SYSID}, got {_shown(config.sysids)}"
         for key_path, drone in drones.items():
             if not low <= drone.sysid <= high:
                 yield f"{key_path}.sysid", f"expected one of sysids, {config.sysids}, got {drone.sysid}"

@@ -20,6 +20,9 @@ from anafi_mav.endpoint_options import MAX_URL, EndpointConfig
 MAX_ENDPOINTS = 32
 """Each endpoint is a socket and gets every message: more than this is a mistake, not a fleet."""
 
+MAX_SYSID = 250
+"""Largest system ID of a drone: stations and tools have those above."""
+
 MAX_DRONES = 250
 """As many as there are system ids."""
 
@@ -201,10 +204,10 @@ class DroneConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         int,
         Meta(
             ge=1,
-            le=250,
+            le=MAX_SYSID,
             description="MAVLink system id, different for each drone. 245 is allowed with a warning: it is the default "
             "system id of MAVSDK.",
-            extra=expected("a whole number from 1 to 250"),
+            extra=expected(f"a whole number from 1 to {MAX_SYSID}"),
         ),
     ]
     serial: Annotated[

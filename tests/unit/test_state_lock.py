@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import state_in_use
-from anafi_mav.state_lock import FILE, HeldDrone, Holder, StateLock, read_holder
+from anafi_mav.state_lock import FILE, HeldDrone, Holder, StateLock, read_holder, state_folder
 
 ALPHA = HeldDrone("alpha", "192.168.42.1", "wlan1", "PI040416DA9H839157")
 
@@ -132,3 +133,9 @@ def test_holder_finds_a_drone_by_address_interface_or_serial() -> None:
     assert holder.find("10.0.0.1", "eth0") == charlie
     assert holder.find("192.168.53.1", serial=ALPHA.serial) == ALPHA
     assert holder.find("192.168.53.1", serial="") is None
+
+
+@pytest.mark.parametrize("folder", ["~nobody-has-this-name/state", "state\0"])
+def test_state_folder_that_is_none_is_named_with_its_key(folder: str) -> None:
+    with pytest.raises(ConfigError, match=r"^state: expected the path of a folder, got "):
+        state_folder(folder)

@@ -264,6 +264,8 @@ MISTAKES = {
     one("sysid: 1, serial: PI-04, address: h"): "drones[0].serial: expected 5 to 32 letters and digits, got 'PI-04'",
     one("sysid: 1, serial: PI040416AA0A000001, sim: {}"): "drones[0].serial: expected none for a simulated drone, whose serial number follows from its address",
     "sysids: 80": "sysids: expected a range like 1-80, got 80",
+    "sysids: 0-300": "sysids: expected a range like 1-80 from 1 to 250, got '0-300'",
+    "sysids: 9-1\n" + one("sysid: 1, sim: {}"): "sysids: expected a range like 1-80 from 1 to 250, got '9-1'",
     two("name: a, sysid: 1, sim: {}", "name: a, sysid: 2, sim: {}"): "drones[1].name: expected a name of its own, 'a' is already at drones[0].name",
     two("name: a, sysid: 1, address: h", "name: b, sysid: 2, address: h"): "drones[1].address: expected an address and discovery_port of its own, 'h:44445' is already at drones[0].address",
     two("name: a, sysid: 1, address: h, interface: w", "name: b, sysid: 2, address: h, interface: w"): "drones[1].address: expected an address and discovery_port of its own, 'h:44445 on w' is already at drones[0].address",
