@@ -99,6 +99,18 @@ async def test_refused_request_of_an_observer_is_answered() -> None:
         assert (await pilot.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == ACCEPTED
 
 
+async def test_checks_of_an_observer_do_not_flood_the_others() -> None:
+    """A report of the checks is for all, and the log of events holds 128 of them."""
+    async with world(options=["access=observe"]) as w:
+        observer = await w.connect(250, port=OPTIONS_PORT)
+        mark = w.client.mark()
+        for _ in range(30):
+            assert (await observer.command(own.MAV_CMD_RUN_PREARM_CHECKS)).result == ACCEPTED
+        seconds = w.client.received[-1][0] - w.client.received[mark - 1][0]
+        assert len(w.client.since(mark, "EVENT")) <= 4 + 2 * seconds  # of a report: arming checks and their groups
+        assert w.client.since(mark, "STATUSTEXT") == []
+
+
 async def test_download_of_an_observer_does_not_keep_a_pilot_from_an_upload() -> None:
     points = [rally(HOME[:2], 20.0), rally((HOME[0] + 0.001, HOME[1]), 25.0)]
     async with world(options=["access=observe"]) as w:

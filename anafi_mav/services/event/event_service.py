@@ -6,12 +6,14 @@ event is not repeated there, except for the checks, which are requested.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from anafi_mav import texts
 from anafi_mav.clock import NEVER
 from anafi_mav.drone import events as parrot
 from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.access import Access
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
 from anafi_mav.services.component_metadata import to_json
@@ -38,6 +40,9 @@ LOOK_EVERY = 0.9
 
 For example a changed fence, or a place on the wrong side of it.
 """
+
+OBSERVED_EVERY = 1.0
+"""s, at least, between two reports that observers request: all clients receive them."""
 
 PAUSE = 0.3
 """s between two reports, so that values that change together are reported together."""
@@ -68,6 +73,8 @@ class EventService(Service):
         self._report: HealthReport | None = None
         self._stale = False
         self._next_report = 0.0
+        self._observed_at = -math.inf
+        """When an observer last got a report."""
         self._armed: bool | None = None
         self._landed: Landed | None = None
         self._reset_until: float | None = None
@@ -157,8 +164,13 @@ class EventService(Service):
         vehicle = self.host.vehicle
         if vehicle.armed:
             return dialect.MAV_RESULT_TEMPORARILY_REJECTED
+        observes = inbound.channel.access is Access.OBSERVE
         for problem in vehicle.prearm_problems():
-            self.host.text(Severity.WARNING, texts.PREARM.fill(reason=problem))
+            self.host.text(Severity.WARNING, texts.PREARM.fill(reason=problem), inbound.channel if observes else None)
+        if observes and inbound.now - self._observed_at < OBSERVED_EVERY:
+            return dialect.MAV_RESULT_ACCEPTED
+        if observes:
+            self._observed_at = inbound.now
         self._tell(report(vehicle))
         return dialect.MAV_RESULT_ACCEPTED
 
