@@ -455,6 +455,13 @@ async def test_gimbal_of_another_station_is_decided_by_its_manager() -> None:
         assert await result(student, dialect.MAV_CMD_DO_SET_ROI_LOCATION, **roi) == NOT_IN_CONTROL
         await said(student, f"ROI refused: {REFUSED}")
         assert motion(w, began) == []
+        assert await result(student, dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, 0, 0, NAN, NAN) == ACCEPTED
+        assert await result(teacher, dialect.MAV_CMD_DO_SET_ROI_LOCATION, **roi) == ACCEPTED
+        mark = len(w.drone.log)
+        for command in (dialect.MAV_CMD_DO_SET_ROI_NONE, dialect.MAV_CMD_DO_SET_ROI):
+            assert await result(student, command) == NOT_IN_CONTROL
+        assert "ardrone3.Piloting.StopPilotedPOI" not in {entry.name for entry in list(w.drone.log)[mark:]}
+        assert await result(teacher, dialect.MAV_CMD_DO_SET_ROI_NONE) == ACCEPTED
 
 
 async def test_components_of_the_drones_own_system_are_not_refused() -> None:

@@ -33,10 +33,11 @@ from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.refusal import Refused, Unsupported, reason_of
+from anafi_mav.vehicle.base.refusal import NotInControl, Refused, Unsupported, reason_of
 from anafi_mav.vehicle.base.right import Extent
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import ValueInterest, ValueSubscriptions
+from anafi_mav.vehicle.operator_control import Need
 from anafi_mav.vehicle.vehicle import Vehicle
 
 HOVERING = (FlightMode.HOLD, FlightMode.GUIDED, FlightMode.POSITION)
@@ -375,7 +376,14 @@ class GimbalService(Service):
     async def _look_anywhere(self, command: Command) -> None:
         """Run MAV_CMD_DO_SET_ROI_NONE: param1 gimbal device."""
         _check_device(command.params[0], texts.ROI)
-        self._require_control(command.client)
+        await self._end_region(command)
+
+    async def _end_region(self, command: Command) -> None:
+        """End a region of interest, a flight task that needs a role, too."""
+        system = self._require_control(command.client)[0]
+        reason = self.host.vehicle.operators.objection(system, Need.COMMAND) if self._roi.is_active else None
+        if reason is not None:
+            raise NotInControl(texts.ROI, reason)
         await self._roi.stop()
 
     async def _legacy_roi(self, command: Command) -> None:
@@ -389,8 +397,7 @@ class GimbalService(Service):
         if not is_none and kind != dialect.MAV_ROI_LOCATION:
             raise Refused(texts.ROI, texts.ROI_KINDS, lasting=True)
         if (is_none and command.place() is None) or (command.x == 0.0 and command.y == 0.0):
-            self._require_control(command.client)
-            await self._roi.stop()
+            await self._end_region(command)
         else:
             await self._look_at_place(command)
 
