@@ -9,8 +9,10 @@ import logging
 import secrets
 from collections import Counter
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from anafi_mav.documents import open_file
 from anafi_mav.fabric.arrivals import Arrival, ArrivalQueue, FabricSample, LinkChange, SampleQueue
 from anafi_mav.fabric.keys import SESSION_BYTES, FabricKeys, session_text
 from anafi_mav.fabric.settings import session_settings
@@ -35,6 +37,14 @@ OPEN_LIMIT = 5.0
 
 CLOSE_LIMIT = 3.0
 """s to close a session. It is left alone after that."""
+
+
+def check_readable(path: str) -> None:
+    """Raise `OSError` for a file that cannot be read, which zenoh does not say."""
+    try:
+        open_file(Path(path)).close()
+    except (OSError, ValueError) as error:
+        raise OSError(f"{path}: {getattr(error, 'strerror', None) or error}") from error
 
 
 class FabricConnection:
@@ -77,6 +87,9 @@ class FabricConnection:
         except ImportError as error:
             raise OSError(MISSING) from error
         options = self._url.options
+        for file in (options.ca, options.certificate, options.private_key):
+            if file is not None:
+                check_readable(file)
         if options.link == "udp":
             logger.warning("%s: udp repeats nothing that is lost: drones and stations may be seen late", self._url.text)
         self._zenoh = module.ZenohSession(

@@ -6,6 +6,7 @@ import asyncio
 import socket
 import sys
 from collections import Counter
+from pathlib import Path
 
 import pytest
 
@@ -32,6 +33,19 @@ async def test_connection_at_a_taken_address_is_refused() -> None:
         with pytest.raises(OSError, match="Address already in use"):
             await connection.open()
         await connection.close()
+
+
+@pytest.mark.parametrize("option", ["ca", "certificate", "private_key"])
+async def test_unreadable_file_of_a_link_is_named(tmp_path: Path, option: str) -> None:
+    files = {name: tmp_path / name for name in ("ca", "certificate", "private_key")}
+    for name, file in files.items():
+        if name != option:
+            file.write_text("PEM")
+    options = "&".join(f"{name}={file}" for name, file in files.items())
+    connection = FabricConnection(parse_endpoint(f"zenoh://127.0.0.1:7447?link=tls&{options}"), Counter(), print)
+    with pytest.raises(OSError, match=f"{files[option]}: No such file or directory"):
+        await connection.open()
+    await connection.close()
 
 
 async def test_report_that_fails_does_not_lose_the_others() -> None:
