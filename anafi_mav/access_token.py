@@ -21,6 +21,9 @@ logger = logging.getLogger(__name__)
 
 FILE = "web.token"
 
+VARIABLE = "ANAFI_MAV_TOKEN"
+"""Variable of the environment with the token of another gateway: arguments are readable by all users of a computer."""
+
 MAX_BYTES = 256
 """Of the file: more is no token."""
 

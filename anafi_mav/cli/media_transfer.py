@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from typing import Any
 
+from anafi_mav import access_token
 from anafi_mav.cli import consent, options
 from anafi_mav.cli.media import GATEWAY
 from anafi_mav.cli.plan_options import sysid_of
@@ -16,6 +18,8 @@ from anafi_mav.drone.payload.media_copy import copy, iso_time
 from anafi_mav.drone.payload.media_index import by_day
 from anafi_mav.drone.rest import Rest
 from anafi_mav.errors import AnafiMavError, CommandRejected, ConfigError, LinkLost, RemoteProtocolError
+from anafi_mav.relay.uri_host import is_loopback
+from anafi_mav.state_lock import state_folder
 
 MAX_PORT = 65535
 
@@ -133,16 +137,17 @@ def _place(file: Resource) -> str:
 async def _client(arguments: argparse.Namespace) -> AsyncIterator[MediaClient]:
     sysid = sysid_of(arguments)
     host, port = _gateway_of(arguments.gateway or GATEWAY)
-    rest = Rest(host, port, prefix=f"/drone/{await _connected(host, port, sysid)}")
+    token = _token_for(host)
+    rest = Rest(host, port, prefix=f"/drone/{await _connected(host, port, sysid, token)}", token=token)
     try:
         yield MediaClient(rest)
     finally:
         await rest.close()
 
 
-async def _connected(host: str, port: int, sysid: int | None) -> int:
+async def _connected(host: str, port: int, sysid: int | None, token: str) -> int:
     """Return the system id of a gateway's drone; None: of its only connected one."""
-    rest = Rest(host, port)
+    rest = Rest(host, port, token=token)
     try:
         listed = await rest.json("GET", "/drones")
     except LinkLost as error:
@@ -155,6 +160,18 @@ async def _connected(host: str, port: int, sysid: int | None) -> int:
         known = ", ".join(str(sysid) for sysid in found) or "none"
         raise ConfigError("--sysid", f"expected the system id of a connected drone (connected: {known})")
     return found[0] if sysid is None else sysid
+
+
+def _token_for(host: str) -> str:
+    """Return the token of the gateway there; empty where none is known.
+
+    That of this computer's gateway goes to this computer only.
+    """
+    given = os.environ.get(access_token.VARIABLE, "")
+    if given or not is_loopback(host):
+        return given
+    own = access_token.read_token(state_folder(None))
+    return "" if own is None else own.text
 
 
 def _gateway_of(text: str) -> tuple[str, int]:

@@ -18,6 +18,7 @@ from urllib.parse import urlsplit
 import aiohttp
 import msgspec
 
+from anafi_mav import access_token
 from anafi_mav.access_token import AccessToken, read_token
 from anafi_mav.cli import interrupts, log
 from anafi_mav.cli.terminal import TableRows, is_live, live_tables, say, say_json, say_table
@@ -33,9 +34,6 @@ EVERY = 1.0
 
 LIMIT = 5.0
 """s for an answer."""
-
-TOKEN_VARIABLE = "ANAFI_MAV_TOKEN"
-"""Variable of the environment with the token of another gateway: arguments are readable by all users of a computer."""
 
 MAX_REFUSED = 10
 """Refused commands that are shown."""
@@ -56,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--token",
         metavar="TEXT",
-        help=f"token of that gateway, if it is another computer's; better in {TOKEN_VARIABLE}",
+        help=f"token of that gateway, if it is another computer's; better in {access_token.VARIABLE}",
     )
     parser.add_argument("--json", action="store_true", help="print the record once, as JSON")
     parser.add_argument(
@@ -92,7 +90,9 @@ def find(state: str | None, url: str | None, token: str | None = None) -> AskedG
             raise ConfigError("--url", f"expected a URL like http://192.168.1.7:8088/, got {url!r}")
         url = url.rstrip("/") + "/"
         if given is None and not is_loopback(host) and (holder is None or holder.web != url):
-            raise ConfigError("--url", f"{host} is another computer: expected its token in {TOKEN_VARIABLE} or --token")
+            raise ConfigError(
+                "--url", f"{host} is another computer: expected its token in {access_token.VARIABLE} or --token"
+            )
         return AskedGateway(url, given or read_token(folder))
     if holder is None:
         raise ConfigError("--state", f"expected the folder of a running gateway; no gateway holds {folder}")
@@ -154,7 +154,7 @@ async def _show(arguments: argparse.Namespace, source: AskedGateway) -> None:
 
 def _asked(arguments: argparse.Namespace) -> AskedGateway:
     """Return the gateway that the arguments name. Raises `ConfigError`."""
-    return find(arguments.state, arguments.url, arguments.token or os.environ.get(TOKEN_VARIABLE))
+    return find(arguments.state, arguments.url, arguments.token or os.environ.get(access_token.VARIABLE))
 
 
 async def follow(

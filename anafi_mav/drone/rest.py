@@ -64,10 +64,15 @@ class Rest:
         local_address: str | None = None,
         interface: str | None = None,
         prefix: str = "",
+        token: str = "",
     ) -> None:
-        """`prefix` of all paths, as "/drone/1" at a gateway that serves several drones."""
+        """`prefix` of all paths, as "/drone/1" at a gateway of several drones.
+
+        `token`: of a gateway that is open to the network.
+        """
         self.address = address
         self._prefix = prefix
+        self._headers = {"Authorization": f"Bearer {token}"} if token else None
         self.port = port
         self._local_address = local_address
         self._interface = interface
@@ -187,7 +192,8 @@ class Rest:
             if self._local_address is not None and not self._local:
                 options["local_addr"] = (self._local_address, 0)
             timeout = aiohttp.ClientTimeout(total=None, sock_connect=ANSWER_TIMEOUT, sock_read=ANSWER_TIMEOUT)
-            self._client = aiohttp.ClientSession(connector=aiohttp.TCPConnector(**options), timeout=timeout)
+            connector = aiohttp.TCPConnector(**options)
+            self._client = aiohttp.ClientSession(connector=connector, timeout=timeout, headers=self._headers)
         return self._client
 
     def _make_socket(self, address: Any) -> socket.socket:

@@ -19,6 +19,7 @@ from support.media import DAY, add_photo, add_video
 from support.product import program
 from support.world import World, world
 
+from anafi_mav.access_token import AccessToken, load_token
 from anafi_mav.arsdk.messages.mediastore import MediastoreState
 from anafi_mav.cli.media import add_arguments
 from anafi_mav.cli.media_transfer import delete_media, download_media, list_media
@@ -173,6 +174,24 @@ async def test_media_command_lists_downloads_and_deletes(folder: Path, capsys: p
             await delete_media(arguments(w, "delete", "--yes"))
         assert await delete_media(arguments(w, "delete", "--yes", DAY)) == 0
         assert await Ftp(w.client, component=100).names("/media") == ["D2026-11-22"]
+
+
+async def test_media_command_uses_the_token_of_this_computers_gateway(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    async with world(web=True) as w:
+        assert w.gateway.web is not None
+        add_photo(w.drone)
+        monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+        w.gateway.web.token = load_token(tmp_path / "anafi-mav")
+        await list_media(arguments(w, "list"))
+        assert "1 files" in capsys.readouterr().out
+        w.gateway.web.token = AccessToken("t" * 43)
+        with pytest.raises(AnafiMavError, match="401"):
+            await list_media(arguments(w, "list"))
+        monkeypatch.setenv("ANAFI_MAV_TOKEN", "t" * 43)
+        await list_media(arguments(w, "list"))
+        assert "1 files" in capsys.readouterr().out
 
 
 async def test_download_of_a_busy_file_fails_and_goes_on(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,8 +11,8 @@ import pytest
 from aiohttp import web
 from support.product import program
 
-from anafi_mav.access_token import AccessToken, load_token
-from anafi_mav.cli.status import TOKEN_VARIABLE, AskedGateway, fetch, find
+from anafi_mav.access_token import VARIABLE, AccessToken, load_token
+from anafi_mav.cli.status import AskedGateway, fetch, find
 from anafi_mav.errors import AnafiMavError, ConfigError
 from anafi_mav.state_lock import StateLock
 from anafi_mav.web.server import HttpServer
@@ -36,9 +36,7 @@ def token_for(folder: Path, url: str, token: str | None = None) -> str | None:
     "url", [ELSEWHERE, "https://drones.example/", "http://127.0.0.1.example:8088", "http://[fe80::1]/"]
 )
 def test_token_of_this_computer_goes_to_no_other(tmp_path: Path, own: str, url: str) -> None:
-    with pytest.raises(
-        ConfigError, match=f"another computer: expected its token in {TOKEN_VARIABLE} or --token"
-    ) as error:
+    with pytest.raises(ConfigError, match=f"another computer: expected its token in {VARIABLE} or --token") as error:
         find(str(tmp_path), url)
     assert own not in str(error.value)
     assert token_for(tmp_path, url, GIVEN) == GIVEN
@@ -91,7 +89,7 @@ async def asked() -> AsyncIterator[tuple[HttpServer, list[str | None]]]:
 async def test_token_of_the_environment_is_sent(asked: tuple[HttpServer, list[str | None]]) -> None:
     server, seen = asked
     words = (sys.executable, "-m", "anafi_mav", "status", "--url", server.describe())
-    async with program(*words, env={TOKEN_VARIABLE: GIVEN}) as held:
+    async with program(*words, env={VARIABLE: GIVEN}) as held:
         await held.end()
         assert GIVEN not in str(held)
     assert seen == [f"Bearer {GIVEN}"]
