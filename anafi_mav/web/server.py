@@ -326,14 +326,14 @@ class HttpServer:
         host = request.headers.get("Host", "")
         if not self._is_own(host):
             self.refused["host"] += 1
-            raise web.HTTPForbidden(text=f"{host[:100]!r} is no name of this gateway; use its address\n")
+            raise self._forbidden(f"{host[:100]!r} is no name of this gateway; use its address\n")
         origin = request.headers.get("Origin")
         if origin is not None and _place_of(origin) != host.lower():
             self.refused["origin"] += 1
-            raise web.HTTPForbidden(text="a page of another server may not use this one\n")
+            raise self._forbidden("a page of another server may not use this one\n")
         if request.headers.get("Sec-Fetch-Site") in FOREIGN_SITES and not self._is_link_to_page(request):
             self.refused["site"] += 1
-            raise web.HTTPForbidden(text="a page of another server may not use this one\n")
+            raise self._forbidden("a page of another server may not use this one\n")
         if self.token is not None:
             self._admit(request, self.token)
         if "\0" in request.path or ".." in request.path.replace("\\", "/").split("/"):
@@ -347,6 +347,11 @@ class HttpServer:
                 # A body that is not in its encoding, or a client that has left: no error of ours.
                 raise _ending(web.HTTPBadRequest(text="the body cannot be read\n")) from error
         return await handler(request)
+
+    def _forbidden(self, reason: str) -> web.HTTPException:
+        """Return a refusal; where a token is needed, it ends the connection."""
+        refusal = web.HTTPForbidden(text=reason)
+        return refusal if self.token is None else _ending(refusal)
 
     def _admit(self, request: web.Request, token: AccessToken) -> None:
         """Raise an answer, unless cookie or Authorization header have the token.

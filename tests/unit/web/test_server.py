@@ -14,6 +14,7 @@ import pytest
 from aiohttp import web
 from support.world import loopback
 
+from anafi_mav.access_token import AccessToken
 from anafi_mav.errors import ConfigError, LocalProtocolError
 from anafi_mav.web import server as server_module
 from anafi_mav.web.server import FIRST_REQUEST_LIMIT, MAX_BODY, MAX_CONNECTIONS, HttpServer
@@ -97,6 +98,16 @@ async def test_request_of_a_foreign_page_is_refused() -> None:
         assert (await get(server, Origin=f"http://{own}"))[0] == 200
         for origin in ("http://evil.example", "null", f"http://127.0.0.1:{server.port + 1}", "http://["):
             assert (await get(server, Origin=origin))[0] == 403, origin
+
+
+async def test_refused_request_without_the_token_ends_its_connection() -> None:
+    """It would else keep its place among the connections by another request now and then."""
+    async with serving() as server:
+        server.token = AccessToken("t" * 43)
+        for line in ("Host: evil.example", "Host: localhost\r\nOrigin: null", "Host: localhost"):
+            answer = await raw(server, f"GET / HTTP/1.1\r\n{line}\r\n\r\n".encode())
+            assert answer.startswith((b"HTTP/1.1 403 ", b"HTTP/1.1 401 ")), line
+            assert b"\r\nConnection: close\r\n" in answer, line
 
 
 def fetched(site: str, mode: str, dest: str) -> dict[str, str]:
