@@ -42,33 +42,38 @@ def _forward(
 
 
 def run(work: Coroutine[Any, Any, ResultT]) -> ResultT:
-    """Run a coroutine as asyncio.run does; SIGINT cancels it.
+    """Run a coroutine as asyncio.run does; SIGINT and SIGTERM cancel it.
 
-    Raises KeyboardInterrupt then, once it has ended.
+    Once it has ended, raises KeyboardInterrupt then, or SystemExit with the status that shells have for SIGTERM.
     """
-    interrupted = False
+    interrupted: signal.Signals | None = None
 
     async def guarded() -> ResultT:
         task = asyncio.current_task()
         assert task is not None
 
-        def interrupt(_: signal.Signals) -> None:
+        def interrupt(number: signal.Signals) -> None:
             nonlocal interrupted
-            interrupted = True
+            interrupted = number
             task.cancel()
 
+        loop = asyncio.get_running_loop()
+        if terminated is signal.SIG_DFL:
+            signal.signal(signal.SIGTERM, functools.partial(_forward, loop, interrupt))
         if before is not signal.SIG_IGN:
             # Not the loop's own way: as it closes it sets Python's handler, which raises wherever the program then is.
-            loop = asyncio.get_running_loop()
             signal.signal(signal.SIGINT, functools.partial(_forward, loop, interrupt))
         return await work
 
-    before = signal.getsignal(signal.SIGINT)
+    before, terminated = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
     try:
         return asyncio.run(guarded())
     except asyncio.CancelledError:
+        if interrupted == signal.SIGTERM:
+            raise SystemExit(128 + signal.SIGTERM) from None
         if interrupted:
             raise KeyboardInterrupt from None
         raise
     finally:
         signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGTERM, terminated)

@@ -13,6 +13,7 @@ import sys
 import time
 from pathlib import Path
 
+from anafi_mav.cli import interrupts
 from anafi_mav.cli.terminal import complain, say
 from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink.key_ring import (
@@ -60,6 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Raises `ConfigError`."""
+    interrupts.raise_on_interrupt()  # a terminal that hides what is typed has to show it again
     name: str = arguments.name
     if NAME.fullmatch(name) is None:
         raise ConfigError("NAME", f"expected {NAME_EXPECTED}, got {name!r}")
@@ -151,9 +153,15 @@ def _secret(arguments: argparse.Namespace) -> bytes:
 
 
 def _ask(what: str) -> str:
-    if not sys.stdin.isatty():
-        return sys.stdin.readline().strip()
-    typed = getpass.getpass(f"{what}: ").strip()
-    if getpass.getpass("the same again: ").strip() != typed:
+    try:
+        if not sys.stdin.isatty():
+            return sys.stdin.readline().strip()
+        typed = getpass.getpass(f"{what}: ").strip()
+        again = getpass.getpass("the same again: ").strip()
+    except (EOFError, UnicodeError):
+        raise ConfigError(
+            "NAME", f"expected the {what.partition(',')[0]} as a line of text; nothing was changed"
+        ) from None
+    if again != typed:
         raise ConfigError("NAME", "the two inputs differ; nothing was changed")
     return typed

@@ -110,18 +110,20 @@ async def silent_device() -> AsyncIterator[tuple[str, asyncio.Event]]:
         server.close()
 
 
-async def interrupted(p: Process) -> int:
-    p.process.send_signal(signal.SIGINT)
+async def interrupted(p: Process, number: int = signal.SIGINT) -> int:
+    p.process.send_signal(number)
     return await p.end(10.0)
 
 
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 @pytest.mark.parametrize("words", [["info", "ADDRESS", "--take"], ["doctor", "ADDRESS"], ["discover", "ADDRESS"]])
-async def test_ctrl_c_while_awaiting_a_drone_ends_the_command(words: list[str]) -> None:
+async def test_signal_while_awaiting_a_drone_ends_the_command(words: list[str], number: int, status: int) -> None:
+    """As it ends by itself: with SIGTERM, too, `status` gives the terminal back."""
     async with silent_device() as (address, accepted):
         words = [address if word == "ADDRESS" else word for word in words]
         async with program(sys.executable, "-m", "anafi_mav", *words) as p:
             await asyncio.wait_for(accepted.wait(), 30.0)
-            assert await interrupted(p) == 130
+            assert await interrupted(p, number) == status
             assert (p.lines, p.complaints) == ([], [])
 
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import io
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -118,3 +121,37 @@ def test_key_of_a_running_gateway_is_not_changed(state: Path, capsys: pytest.Cap
 def test_name_that_is_no_file_name_is_refused(state: Path) -> None:
     assert main(["keygen", "../field", "--state", str(state)]) == MISUSED
     assert not state.exists()
+
+
+def test_passphrase_that_is_no_text_is_refused(
+    state: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"gr\xfc\xdfe aus\n"), encoding="utf-8"))
+    assert keygen(state, "--passphrase") == MISUSED
+    assert "expected the passphrase as a line of text; nothing was changed" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="it needs a pseudo-terminal")
+@pytest.mark.parametrize(("typed", "status"), [(b"\x03", 130), (b"\x04", MISUSED)], ids=["Ctrl-C", "Ctrl-D"])
+def test_prompt_that_is_left_shows_again_what_is_typed(state: Path, typed: bytes, status: int) -> None:
+    import fcntl
+    import termios
+
+    outer, inner = os.openpty()
+
+    def take_terminal() -> None:
+        os.setsid()
+        fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+
+    words = [sys.executable, "-m", "anafi_mav", "keygen", "field", "--passphrase", "--state", str(state)]
+    with subprocess.Popen(words, stdin=inner, stdout=inner, stderr=inner, preexec_fn=take_terminal) as process:
+        said = b""
+        while not said.endswith(b": "):  # getpass hides what is typed before it asks
+            said += os.read(outer, 1)
+        assert not termios.tcgetattr(inner)[3] & termios.ECHO
+        os.write(outer, typed)
+        assert process.wait() == status
+        assert termios.tcgetattr(inner)[3] & termios.ECHO
+    os.close(inner)
+    os.close(outer)
+    assert not (state / "keys").exists()
