@@ -549,7 +549,11 @@ class SimulatedDrone:
         return message.NAME in self.faults.unreported
 
     def _emit(self, message: Message) -> None:
-        if not self._unreported(message):
+        if self._unreported(message):
+            return
+        if late := self.faults.late.get(message.NAME, 0.0):
+            asyncio.get_running_loop().call_later(late, self._report, message, self._send)
+        else:
             self._report(message, self._send)
 
     def _report(self, message: Message, send: Callable[[Message], object]) -> None:

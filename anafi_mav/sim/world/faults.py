@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
@@ -75,6 +75,8 @@ class Faults:
     unreported: frozenset[str] = frozenset()
     """Names of events that this firmware does not send, at once, telemetry included: what is not written down another
     one may not tell."""
+    late: Mapping[str, float] = field(default_factory=dict)
+    """s by which events of these names are sent later, telemetry not included; the order of one kind stays."""
 
     def __setattr__(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
