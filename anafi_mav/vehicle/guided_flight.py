@@ -288,8 +288,8 @@ class GuidedFlight:
                 raise
             raise Unfinished(rules.what, reason) from error
         is_short = abs(flown.down - down) > SHORT_CLIMB or abs(units.wrap_pi(flown.turn - turn)) > SHORT_TURN
-        if is_short and (reason := vehicle.lacking(rules.needs)) is not None:
-            raise Unfinished(rules.what, reason)
+        if is_short:
+            raise Unfinished(rules.what, vehicle.lacking(rules.needs) or texts.MOVE_FAILED)
 
     async def _resting_heading(self) -> float:
         """Return the heading (rad) once the drone turns no further, or after `REST_WAIT`.

@@ -81,7 +81,7 @@ class GuidedMoves:
             timeout = MOVE_BY_MARGIN + (math.hypot(front, right, down) + abs(turn)) / MOVE_BY_SLOWEST
             if turn_rate_dps is not None:
                 timeout += abs(turn) / (turn_rate_dps * RAD_PER_DEG)
-        move = Move(self._commander.expect((), _decided_elsewhere))
+        move = Move(self._commander.expect((), _decided_elsewhere), offset=Displacement(front, right, down, turn))
         self._sticks.let_go()
         self._commander.abort_pending("a move was asked for")
         self._moves.by.append(move)

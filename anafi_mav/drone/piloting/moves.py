@@ -53,6 +53,8 @@ Twice the tolerance of `_same`.
 """
 _NO_MOVE = 1e-3
 """m or rad below which a moveBy went nowhere."""
+_SHORT = 1.0, 0.2
+"""m and rad by which the end of a moveBy may differ from what was commanded."""
 
 
 class MoveEnd(enum.Enum):
@@ -85,15 +87,18 @@ class Displacement(msgspec.Struct, frozen=True):
 class Move:
     """A move under way.
 
-    `target` is set for a moveTo only; its altitude is above the take-off point.
+    `target` is set for a moveTo only; its altitude is above the take-off point. `offset` is set for a moveBy only.
     """
 
-    __slots__ = ("answer", "echo", "ended", "running", "target")
+    __slots__ = ("answer", "echo", "ended", "offset", "running", "target")
 
-    def __init__(self, answer: Expectation[Any], target: Position | None = None) -> None:
+    def __init__(
+        self, answer: Expectation[Any], target: Position | None = None, offset: Displacement | None = None
+    ) -> None:
         self.answer = answer
         """The wait of the verb that started it."""
         self.target = target
+        self.offset = offset
         self.echo: Position | None = None
         """The target as the drone reports it, where that differs from `target`."""
         self.running = False
@@ -153,6 +158,31 @@ _MOVE_BY_REFUSALS = {
     MoveByError.NOT_AVAILABLE: "a relative move is not available now",
     MoveByError.INTERRUPTED: "the move was interrupted",
 }
+
+
+def _axes(message: ardrone3.MoveByEnd, offset: Displacement) -> list[tuple[float, float, float]]:
+    """Return the flown, the commanded and the tolerated value of each axis."""
+    (length, angle), turn = _SHORT, math.remainder(message.dPsi - offset.turn, 2.0 * math.pi) + offset.turn
+    return [
+        (message.dX, offset.front, length),
+        (message.dY, offset.right, length),
+        (message.dZ, offset.down, length),
+        (turn, offset.turn, angle),
+    ]
+
+
+def _is_short(message: ardrone3.MoveByEnd, offset: Displacement | None) -> bool:
+    """Return True when this end of a moveBy is not where it was to lead."""
+    return offset is not None and any(abs(flown - asked) > about for flown, asked, about in _axes(message, offset))
+
+
+def _leads_elsewhere(message: ardrone3.MoveByEnd, offset: Displacement | None) -> bool:
+    """Return True when this end of a moveBy is not on the way to where it was to lead."""
+    return offset is not None and any(
+        not min(0.0, asked) - about <= flown <= max(0.0, asked) + about
+        for flown, asked, about in _axes(message, offset)
+    )
+
 
 _RETURN_ENDS = {StateReason.FINISHED: MoveEnd.DONE, StateReason.STOPPED: MoveEnd.CANCELED}
 
@@ -360,6 +390,9 @@ class Moves:
         if not self.by or self._is_stray(message, now):
             return
         move = self.by.popleft()
+        if not self.by and (message.error == MoveByError.INTERRUPTED or _is_short(message, move.offset)):
+            # Nothing of ours has interrupted it: it may be the late end of an earlier one, and this one is flown on.
+            self.inherited = True
         if message.error == MoveByError.OK:
             move.end(MoveEnd.DONE)
             move.answer.succeed(Displacement(message.dX, message.dY, message.dZ, message.dPsi))
@@ -376,8 +409,10 @@ class Moves:
             return False
         if message.error == MoveByError.INTERRUPTED:
             return len(self.by) == 1  # of two, the newer has interrupted the older
+        if message.error != MoveByError.OK:
+            return False
         went_nowhere = max(abs(message.dX), abs(message.dY), abs(message.dZ), abs(message.dPsi)) < _NO_MOVE
-        return message.error == MoveByError.OK and went_nowhere
+        return went_nowhere or _leads_elsewhere(message, self.by[0].offset)
 
     def on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
         """Motors that stand end every move."""
