@@ -25,7 +25,7 @@ from msgspec.structs import replace
 
 from anafi_mav import texts
 from anafi_mav.drone import Drone
-from anafi_mav.errors import AnafiMavError, CommandRejected
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.control_machine import (
     ADOPTED,
@@ -42,6 +42,7 @@ from anafi_mav.vehicle.base.flight_task import (
     FlightAction,
     FlightActions,
     FlightTask,
+    Hover,
     Needs,
     TaskRules,
     lasting_needs,
@@ -301,6 +302,8 @@ class Control:
                 self.handle(Event.FINISH, Input(task=grant.attempt.task, number=number))
             if before is not None and self.is_free and before.is_flown(piloting):
                 self.adopt(before, keeps_below=True)
+            elif isinstance(error, CommandTimeout) and not rules.is_flight and not rules.keeps_below and self.is_free:
+                self.adopt(Hover())  # the drone may have obeyed: no older stream flies it on
             if isinstance(error, CommandRejected):
                 reason = self._aircraft.lacking(rules.needs) or texts.from_below(error.reason)
                 raise Refused(rules.what, reason) from error
