@@ -250,9 +250,14 @@ class SentCommands:
             one.apply(Event.WITHDRAWN, now)
         return undo
 
+    def newest(self, slot: Slot) -> SentCommand | None:
+        """Return the newest command of a slot, whatever has become of it."""
+        commands = self._slots[slot]
+        return commands[-1] if commands else None
+
     def is_newest(self, sent: SentCommand) -> bool:
         """Return True while no newer command of its slot was sent."""
-        return self._slots[sent.slot][-1] is sent
+        return self.newest(sent.slot) is sent
 
     def is_executed(self, slot: Slot) -> bool:
         """Return True when the reported effect of a command of this slot has not ended."""

@@ -37,6 +37,9 @@ STOP_MOTORS_TIMEOUT = 15.0
 FORCED_AFTER = 0.3
 """s that motors may go on ramping up after a forced disarm before they are cut."""
 
+STANDS_BELOW = 0.3
+"""m above the ground below which motors that are said to ramp up may be cut."""
+
 EMERGENCY_TIMEOUT = 30.0
 """s that cutting the motors is tried for while the link seems to live but delivers nothing."""
 
@@ -94,8 +97,8 @@ class Motors:
 
         That is known once the drone has received a later command, and then reports nothing.
         """
-        flies = self._flight.state.flying in TAKEN_OFF
-        if loop_time() >= self._may_land_until or not flies:
+        may_land = self._flight.state.flying in TAKEN_OFF | TURNING  # motors that ramp up stop
+        if loop_time() >= self._may_land_until or not may_land:
             return self._flight.state.flying == FlyingState.LANDING
         answer = self._commander.expect(
             (ardrone3.FlyingStateChanged,), lambda message: True if message.state in _LANDING else None
@@ -188,6 +191,8 @@ class Motors:
         self._commander.require_link()
         self._commander.abort_pending("the drone is to land")
         if self._lands and not self.about_to_fly:
+            # What is reported may be old: another controller's take-off, or its end of a landing, is not reported yet.
+            self._commander.deliver(ardrone3.Landing())
             return
         # Level at once, then nothing, from here on and not from the drone's answer on: a positive gaz would cancel
         # the landing.
@@ -270,13 +275,23 @@ class Motors:
             self._commander.send_stop(ardrone3.Landing())
             if force:
                 await asyncio.wait({answer.future}, timeout=FORCED_AFTER)
-                if self._flight.state.flying == FlyingState.MOTOR_RAMPING:
+                if self._flight.state.flying == FlyingState.MOTOR_RAMPING and not self._is_high:
                     cut = self._commander.deliver(ardrone3.Emergency())
             await answer.wait()
             self._sent.rule_out()
         finally:
             self._sticks.landings_asked -= 1
             answer.close()
+
+    @property
+    def _is_high(self) -> bool:
+        """True for a measured height at which no drone stands.
+
+        It is fresh while the flying state may be late. A drone that a hand holds for its launch has any height.
+        """
+        height, launch = self._flight.state.height, self._sent.newest(Slot.LAUNCH)
+        is_held = launch is not None and launch.undo is not None
+        return height is not None and height >= STANDS_BELOW and not is_held
 
     def _end_hand_launch(self) -> None:
         """A drone that idles in a hand has no use for a Landing: it waits to be thrown, or for this."""
