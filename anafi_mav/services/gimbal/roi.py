@@ -163,7 +163,15 @@ class RegionOfInterest(PlainTask):
             grant.begin()
             if goto is not None:  # the mode shown stays the same
                 self._host.text(Severity.NOTICE, texts.TASK_ENDED.fill(what=texts.GOTO, reason=texts.REGION_INSTEAD))
-            await self._start(region, where, ato)
+            failure: BaseException | None = None
+            try:
+                await self._start(region, where, ato)
+            except BaseException as error:
+                if self._region is None or self._region is region:
+                    raise
+                failure = error
+        if failure is not None:  # outside: a newer region has the task, which must not end with this one
+            raise failure
 
     def _require_prepared(self, region: Region) -> None:
         if self._prepared is not region:

@@ -1,0 +1,208 @@
+"""Reports of the drone that arrive late, or never: no answer is untrue, and nothing older than a stop flies on.
+
+What a drone does is its own log's word.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fault_scenarios import (
+    ACCEPTED,
+    ARM,
+    FAILED,
+    LAND_CMD,
+    PX4_HOLD,
+    PX4_OFFBOARD,
+    RTL,
+    SET_MODE,
+    TAKEOFF_CMD,
+    another_controller,
+    heard,
+    on_command,
+    results,
+    until,
+    watched,
+)
+from support.setpoints import POSITION_ONLY, VELOCITY_ONLY, local, streaming
+from support.world import World, world
+
+from anafi_mav.arsdk.messages import ardrone3, rth
+from anafi_mav.sim.world.faults import Impairment
+
+ROI, YAW, ALTITUDE = (
+    dialect.MAV_CMD_DO_SET_ROI_LOCATION,
+    dialect.MAV_CMD_CONDITION_YAW,
+    dialect.MAV_CMD_DO_CHANGE_ALTITUDE,
+)
+BRAKE = (1, 17)
+FORCED = 21196
+FLYING, MOVED_BY, MOVED_TO = (
+    ardrone3.FlyingStateChanged.NAME,
+    ardrone3.MoveByEnd.NAME,
+    ardrone3.MoveToChanged.NAME,
+)
+FAR = local(POSITION_ONLY, at=(80.0, 0.0, -21.0))
+AHEAD = local(POSITION_ONLY, frame=dialect.MAV_FRAME_BODY_OFFSET_NED, at=(60.0, 0.0, 0.0))
+
+
+def now() -> float:
+    return asyncio.get_running_loop().time()
+
+
+def flown(w: World) -> list[str]:
+    """The flying states of the drone itself, in order."""
+    return [entry.args["to"] for entry in w.drone.log if entry.name == "flying"]
+
+
+async def flies(w: World, state: str, since: float = -math.inf) -> None:
+    await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == state, 20.0, since=since)
+
+
+def away(w: World) -> float:
+    """m from home."""
+    return math.hypot(w.drone.pose.north, w.drone.pose.east)
+
+
+async def turned_with_a_late_end(w: World, late: float) -> None:
+    """Let the drone turn by 20 degrees; it reports the end of that only later."""
+    w.drone.faults.late = {MOVED_BY: late}
+    began = now()
+    w.client.send_command(YAW, 20, 30, 1, 1)
+    await flies(w, "flying", began)
+    await flies(w, "hovering", now())
+
+
+async def test_late_end_of_a_turn_is_not_the_end_of_the_next_move() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off(5.0)
+        async with streaming(w.client, AHEAD):
+            await turned_with_a_late_end(w, 0.9)
+            assert (await w.client.command(SET_MODE, *PX4_OFFBOARD)).result == ACCEPTED
+            await w.drone.wait_log(lambda e: e.kind == "pose" and away(w) > 3.0, 20.0)
+        await watched(1.0)  # a silence of 0.5 s ends setpoints
+        stopped = away(w)
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        await watched(3.0)
+        assert away(w) < stopped + 4.0  # the way in which it brakes
+
+
+async def test_hold_ends_a_climb_that_a_late_end_of_a_turn_precedes() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off(5.0)
+        w.drone.faults.gps = False
+        await w.client.wait("GPS_RAW_INT", lambda m: m.fix_type < 3)
+        await turned_with_a_late_end(w, 0.8)
+        mark = w.client.mark()
+        w.client.send_command(ALTITUDE, 40.0, 6)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["up"] > 8.0, 20.0)
+        assert (ALTITUDE, ACCEPTED) not in results(w.client, mark)
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        up = w.drone.pose.up
+        await watched(4.0)
+        assert w.drone.pose.up < up + 2.0
+
+
+@pytest.mark.parametrize("command", [(SET_MODE, *BRAKE), (dialect.MAV_CMD_DO_PAUSE_CONTINUE, 0), (RTL,)])
+async def test_unconfirmed_stop_does_not_return_the_drone_to_an_older_stream(command: tuple[float, ...]) -> None:
+    async with world(speed=1.0, flavour="ardupilot") as w:
+        companion = await w.connect(sysid=240)
+        await w.take_off(21.0)
+        async with streaming(companion, FAR):
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 5.0, 20.0)
+            w.drone.faults.unreported = frozenset({MOVED_TO, rth.State.NAME})
+            ack = await w.client.command(*command, timeout=10.0)
+            moves = len(heard(w, "moveTo"))
+            await watched(5.0)
+        assert ack.result == FAILED
+        assert len(heard(w, "moveTo")) == moves
+
+
+async def test_landing_that_is_reported_late_is_not_ended_by_an_older_stream() -> None:
+    async with world(speed=1.0, flavour="ardupilot") as w:
+        companion = await w.connect(sysid=240)
+        await w.take_off(20.0)
+        async with streaming(companion, local(VELOCITY_ONLY, v=(1.0, 0.0, -0.5))):
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 2.0, 20.0)
+            w.drone.faults.late = {FLYING: 6.0}
+            before = len(flown(w))
+            w.client.send_command(LAND_CMD)
+            await flies(w, "landed", now())
+        assert flown(w)[before:] == ["landing", "landed"]
+
+
+@pytest.mark.parametrize("command", [(LAND_CMD,), (ARM, 0)])
+async def test_stop_ends_a_takeoff_of_another_controller_that_is_not_reported_yet(command: tuple[int, ...]) -> None:
+    async with world(speed=1.0) as w:
+        w.drone.faults.late = {FLYING: 1.5}
+        another_controller(w, ardrone3.TakeOff())
+        await flies(w, "takingoff")
+        ack = await w.client.command(*command)
+        assert ack.result == ACCEPTED
+        await flies(w, "landed", now())
+
+
+async def test_land_is_sent_while_the_end_of_a_landing_is_not_reported_yet() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off(8.0)
+        assert (await w.client.command(LAND_CMD)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.land)
+        w.drone.faults.late = {FLYING: 1.0}
+        began = now()
+        another_controller(w, ardrone3.PCMD(0, 0, 0, 0, 100, 0))
+        await flies(w, "flying", began)
+        assert (await w.client.command(LAND_CMD)).result == ACCEPTED
+        await flies(w, "landed", began)
+
+
+@pytest.mark.parametrize("delay", [0.2, 0.6])
+async def test_takeoff_that_a_landing_has_prevented_is_not_accepted(delay: float) -> None:
+    """Both are sent while the motors ramp up, the take-off before the landing is confirmed."""
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
+        await w.client.wait("EXTENDED_SYS_STATE", lambda m: m.landed_state == dialect.MAV_LANDED_STATE_TAKEOFF)
+        w.drone.faults.up = w.drone.faults.down = Impairment(delay=delay)
+        mark = w.client.mark()
+        w.client.send_command(LAND_CMD)
+        await w.client.wait("COMMAND_ACK", lambda ack: ack.command == TAKEOFF_CMD, since=mark)  # it is cancelled
+        ack = await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=4.0, timeout=15.0)
+        await watched(5.0)
+        assert (ack.result == ACCEPTED) == (w.drone.pose.up > 0.5)
+
+
+async def test_forced_disarm_cuts_no_motors_in_the_air() -> None:
+    """By the fresh height: the flying state that is reported is two seconds old. `allow_kill` is off."""
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        w.drone.faults.late = {FLYING: 2.0}
+        w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
+        ramping = dialect.MAV_LANDED_STATE_TAKEOFF
+        await w.client.wait("EXTENDED_SYS_STATE", lambda m: m.landed_state == ramping, timeout=10.0)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["up"] > 0.5, 10.0)
+        await w.client.command(ARM, 0, FORCED, timeout=20.0)
+        assert heard(w, "Emergency") == []
+        await flies(w, "landed")
+
+
+@pytest.mark.parametrize("is_same", [True, False])
+async def test_second_region_of_interest_within_a_round_trip_replaces_the_first(is_same: bool) -> None:
+    async with world(speed=1.0) as w:
+        other = w.client if is_same else await w.connect(sysid=240)
+        await w.take_off(8.0)
+        w.drone.faults.up = w.drone.faults.down = Impairment(delay=0.2)
+        began = on_command(w, ardrone3.StartPilotedPOIV2.NAME, lambda: None)
+        w.client.send_command(ROI, 0, 0, 0, 0, frame=6, x=48.8795, y=2.3677, z=0.0)
+        await asyncio.sleep(0.1)
+        mark = other.mark()
+        other.send_command(ROI, 0, 0, 0, 0, frame=6, x=48.8789, y=2.3690, z=0.0)
+        await began
+        while (ROI, ACCEPTED) not in (found := results(other, mark)):
+            assert len(found) < 2, found
+            await until(other, mark, len(found) + 1)
+        await watched(1.0)
+        assert w.drone.firmware.poi.status.name == "RUNNING"
+        assert heard(w, "StopPilotedPOI") == []
