@@ -117,6 +117,7 @@ class FlightPlanWriter:
         self.photographed = 0
         """Lines that take photos; their duration is not documented."""
         self._amsl = start.takeoff_amsl
+        self._is_assumed = start.is_assumed
         self._stopped = False
         """No photo has been taken since they were stopped."""
         self._mode_wanted: int | None = None
@@ -269,6 +270,10 @@ class FlightPlanWriter:
             problem = "height above mean sea level, but that of the take-off point is unknown"
             raise UnknownHeight("mission", problem, self.item)
         return value - self._amsl
+
+    def is_judgeable(self, item: Item) -> bool:
+        """Return False for a height above sea level when the take-off point's is assumed."""
+        return not (self._is_assumed and item.frame in (GLOBAL, GLOBAL_INT))
 
     def names_place(self, item: Item) -> bool:
         """Return True when the item has a position.

@@ -61,6 +61,8 @@ class Start:
     """m: the height of the take-off point above mean sea level. Without it items in such frames cannot be flown."""
     heading: float = 0.0
     """deg from north: version 1 has a heading in each way point, and keeps this one where nothing says another."""
+    is_assumed: bool = False
+    """True when `takeoff_amsl` stands for one that is unknown: heights above sea level are not judged by it."""
 
 
 @dataclass(frozen=True)

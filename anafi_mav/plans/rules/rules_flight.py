@@ -61,7 +61,7 @@ def _take_off(writer: FlightPlanWriter, item: Item) -> None:
     away = writer.names_place(item)
     if height is None:
         writer.say("no height: the drone climbs to its default height")
-    elif height < 0.0:
+    elif height < 0.0 and writer.is_judgeable(item):
         writer.refuse(f"invalid take-off height of {height:g} m above take-off", 7)
     else:
         up = replace(writer.place, height=max(height, writer.place.height))

@@ -103,7 +103,7 @@ def examine(items: Sequence[Item], version: Version) -> TranslationReport:
         return TranslationReport(tuple(faults), (), ())
     place = next((item.params for item in items if TABLE[item.command].place and item.params[4]), None)
     latitude, longitude = (0.0, 0.0) if place is None else (place[4] or 0.0, place[5] or 0.0)
-    start = Start(latitude, longitude, 0.0, flying=_way_up(items, 0) is None, takeoff_amsl=0.0)
+    start = Start(latitude, longitude, 0.0, flying=_way_up(items, 0) is None, takeoff_amsl=0.0, is_assumed=True)
     try:
         flight = _fly(items, version, start, Cursor(0, (), ItemSettings()))
     except TranslationRefused as error:  # by what came before it on the way, which is not what stands before it
@@ -151,7 +151,7 @@ def _judged(items: Sequence[Item], version: Version) -> tuple[list[TranslationFa
 
     Returns at most one fault of each item, and the parts that are left out.
     """
-    writer = FlightPlanWriter(version, Start(0.0, 0.0, 0.0, flying=True, takeoff_amsl=0.0), items)
+    writer = FlightPlanWriter(version, Start(0.0, 0.0, 0.0, flying=True, takeoff_amsl=0.0, is_assumed=True), items)
     writer.muted = True
     faults = []
     for writer.item, item in enumerate(items):
@@ -301,14 +301,23 @@ def _stepped(items: Sequence[Item], flown: set[int], flight: TranslatedMission) 
 
 
 def _cursor(items: Sequence[Item], version: Version, start: Start, first: int, jumps: Mapping[int, int]) -> Cursor:
-    """Return the cursor at an item, with the settings of all items before it in the list."""
+    """Return the cursor at an item, with the settings of all items before it.
+
+    In a later turn of a loop these are also the items behind it, up to the jump.
+    """
     if not 0 <= first < len(items):
         raise PlanError("mission", f"the mission has {len(items)} items", first)
     writer = FlightPlanWriter(version, start, items)
     writer.muted = True
-    for writer.item, item in enumerate(items[:first]):
-        if item.command != DO_JUMP:
-            _write(writer, item)
+    before = [*range(first)]
+    back = [
+        n for n, often in jumps.items() if often and first <= n < len(items) and (items[n].params[0] or 0.0) <= first
+    ]
+    if back:
+        before = [*range(max(back)), *range(int(items[max(back)].params[0] or 0.0), first)]
+    for writer.item in before:
+        if items[writer.item].command != DO_JUMP:
+            _write(writer, items[writer.item])
     return Cursor(first, tuple(sorted(jumps.items())), writer.settings, restarts=True)
 
 

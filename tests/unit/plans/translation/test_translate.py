@@ -701,3 +701,32 @@ def test_missions_of_the_property_test_mostly_fly() -> None:
     """Else it would show nothing."""
     flown = [seed for seed in range(300) if not examine(mission(seed), 1).faults]
     assert len(flown) > 30
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_takeoff_above_sea_level_is_judged_by_the_takeoff_point(version: Version) -> None:
+    """1 m below sea level is 5 m above a polder 6 m below it."""
+    items = [replace(take_off(-1.0), frame=GLOBAL), waypoint(1, 0, 10.0)]
+    assert examine(items, version).faults == ()
+    polder = replace(GROUND, takeoff_amsl=-6.0)
+    assert any(line.split()[1] == "16" and line.endswith(" 5.0") for line in lines(translate(items, version, polder)))
+    with pytest.raises(PlanError, match="invalid take-off height of -36 m"):
+        translate(items, version, GROUND)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_later_turn_of_a_loop_begins_with_what_the_turn_before_has_set(version: Version) -> None:
+    items = [
+        take_off(10.0),
+        waypoint(1, 0, 10.0),
+        waypoint(2, 0, 10.0),
+        action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 3.0, -1.0),
+        action(mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 5.0, 0.0, 1.0),
+        waypoint(2, 2, 10.0),
+        action(DO_JUMP, 1.0, 2.0),
+        action(mav_enums.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 0.0),
+    ]
+    stays: list[str] = {1: [], 2: ["16"]}[version]  # an Ai would set everything above its first way point
+    kinds = [line.split()[1] for line in lines(translate(items, version, AIR, 1, {6: 1}))]
+    assert kinds[: len(stays) + 5] == [*stays, "178", "2001", "50001", "2000", "16"]
+    assert lines(translate(items, version, AIR, 1))[0].split()[1] == "16"
