@@ -371,6 +371,8 @@ class FenceWatch:
             self._above_floor = False
         elif sight.ato is not None and sight.ato >= self.floor:
             self._above_floor = True
+        elif not sight.flying:
+            self._above_floor = False  # a landing or return has led below it: nothing to act against where that ends
         self.blind = bool(zones.zones) and sight.airborne and (sight.place is None or sight.age > STALE)
         for breach, side in self._sides.items():
             event, verdict = self._judge(breach, zones, sight)
