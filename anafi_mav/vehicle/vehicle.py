@@ -41,7 +41,7 @@ from anafi_mav.vehicle.aborted_return import AbortedReturn
 from anafi_mav.vehicle.base.aircraft import Aircraft, CommandedSpeeds
 from anafi_mav.vehicle.base.bounds import check_height
 from anafi_mav.vehicle.base.control_machine import DroneAct, State
-from anafi_mav.vehicle.base.flight_task import LAND, MOTOR_CUT, FlightTask, Hover, TaskRules, end_of_descent
+from anafi_mav.vehicle.base.flight_task import LAND, MOTOR_CUT, FlightTask, Hover, Needs, TaskRules, end_of_descent
 from anafi_mav.vehicle.base.flying import AIRBORNE, LANDING, ON_GROUND, TAKING_OFF
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.height import ESTIMATE_ERROR, TakeoffRecord
@@ -533,6 +533,9 @@ class Vehicle(Aircraft):
                 await self.offboard.engage(by)
             case FlightMode.MISSION:
                 if self.mission.there and not self.mission.flying:
+                    if self.descends:
+                        self.control.check(self.mission, by, end_of_descent(self.mission.rules))
+                        await self.mission.require_flyable()  # a mission that is refused ends nothing
                     await self._free(self.mission, by)
                 await self.mission.engage(by)
             case FlightMode.TERMINATED:
@@ -630,6 +633,9 @@ class Vehicle(Aircraft):
         """
         self.control.require_allowed(task, by)
         if self.descends:
+            needs = task.rules.needs & ~(Needs.NO_DESCENT | Needs.IN_AIR)  # these are what the stop is for
+            if (reason := self.lacking(needs)) is not None:
+                raise Refused(task.rules.what, reason)
             async with self.control.acquire(Hover(), by=by, rules=end_of_descent(task.rules)):
                 pass
 

@@ -295,6 +295,20 @@ async def test_conf_076_floor_counts_in_a_flight_that_began_without_a_link_once_
         assert [text for text in texts(w.client, mark) if "below floor" in text] == []
 
 
+async def test_conf_076_floor_does_not_count_where_a_return_ends_below_it() -> None:
+    async with world(speed=4.0) as w:
+        await put(w, "ANF_FENCE_FLOOR", 15.0, 9)
+        await put(w, "GF_ACTION", NUMBER["px4"]["land"])
+        await put(w, "ANF_RTL_END", 1)
+        await w.take_off(20.0)
+        mark = w.client.mark()
+        assert (await w.client.command(dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH)).result == ACCEPTED
+        await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Return ended"), since=mark, timeout=60.0)
+        assert w.drone.pose.up < 15.0
+        await watched(5.0)
+        assert w.drone.pose.up > 5.0
+
+
 async def test_conf_076_return_that_the_drone_cannot_fly_becomes_a_hold() -> None:
     """The goto that leads out of the fence is not flown on."""
     async with world(speed=1.0) as w:

@@ -65,6 +65,8 @@ class FenceService(Service):
         """When the drone last reported its position."""
         self._looked = self._mirrored = -math.inf
         self._breach_ms = 0
+        self._judged: tuple[int, int] | None = None
+        """The flight, by its `orders`, and the fence by which its whole way was judged."""
         self._announced: tuple[Any, ...] | None = None
         """Content of the newest FENCE_STATUS."""
 
@@ -122,8 +124,9 @@ class FenceService(Service):
         vehicle, drone = self.host.vehicle, self.host.drone
         state, place, home, mode = drone.piloting.state, vehicle.place, vehicle.home, vehicle.mode
         velocity = (0.0, 0.0) if state.velocity is None else (state.velocity.north, state.velocity.east)
-        # A plan and an orbit were judged before; they turn.
-        own_way = mode in (FlightMode.MISSION, FlightMode.ORBIT) or self._ends_inside
+        # A plan and an orbit turn before a fence that was there when they began.
+        turns = mode in (FlightMode.MISSION, FlightMode.ORBIT) and self._has_judged_way()
+        own_way = turns or self._ends_inside
         return Sight(
             place,
             now - self._located,
@@ -133,9 +136,22 @@ class FenceService(Service):
             home,
             airborne=not vehicle.on_ground and vehicle.flying_state is not None,
             flying=vehicle.in_air and mode is not FlightMode.RETURN,
-            steering=not own_way and state.plan != PlayingState.PLAYING,
+            steering=not own_way and (state.plan != PlayingState.PLAYING or vehicle.mission.flying),
             orders=vehicle.control.epoch,
         )
+
+    def _has_judged_way(self) -> bool:
+        """Return True while the way of the flown plan or orbit is known to be inside the fence.
+
+        That of a plan is judged again by a newer fence, that of an orbit is not.
+        """
+        vehicle, watch = self.host.vehicle, self._watch
+        flight, fence = vehicle.control.epoch, hash((watch.items.identity, watch.types))
+        if self._judged is None or self._judged[0] != flight:
+            self._judged = flight, fence
+        if self._judged[1] != fence and vehicle.mission.flying and vehicle.mission.leads_inside():
+            self._judged = flight, fence
+        return self._judged[1] == fence
 
     @property
     def _ends_inside(self) -> bool:

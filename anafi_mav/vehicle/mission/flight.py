@@ -29,6 +29,7 @@ from anafi_mav.vehicle.base.refusal import DroneRefused, Refused, reason_of, tex
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueInterest, ValueSubscriptions
+from anafi_mav.vehicle.fence.fence_watch import OutsideFence
 from anafi_mav.vehicle.mission.course import Course
 from anafi_mav.vehicle.mission.effects import (
     Acquire,
@@ -50,7 +51,7 @@ from anafi_mav.vehicle.mission.effects import (
     Work,
 )
 from anafi_mav.vehicle.mission.machine import PROOF, MissionMachine, State
-from anafi_mav.vehicle.mission.path import FilesOnDrone, check_path, lay_out
+from anafi_mav.vehicle.mission.path import FilesOnDrone, check_path, lay_out, way_points
 from anafi_mav.vehicle.mission.payload_state import payload_after
 from anafi_mav.vehicle.mission.record import MissionRecord
 from anafi_mav.vehicle.mission.steps import fly_step
@@ -58,6 +59,8 @@ from anafi_mav.vehicle.mission.store_wait import StoreWait
 from anafi_mav.vehicle.mission.texts import FIRST_LABEL, beginning, refusal
 
 _LANDING = (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING)
+_BEGINS = (State.PREPARING, State.TAKING_OVER, State.STARTING)
+"""A start is under way, and the drone has not confirmed it."""
 
 
 class MissionOutlet(Protocol):
@@ -92,6 +95,8 @@ class MissionFlight(PlainTask):
         self._outlet: MissionOutlet | None = None
         self._background: asyncio.Task[None] | None = None
         """Runs the machine's work when no command of a client does."""
+        self._begun: asyncio.Event | None = None
+        """Set when the start under way has ended; None while no command waits for that."""
 
     def attach(self, outlet: MissionOutlet) -> None:
         """Report to clients and memory from now on."""
@@ -123,6 +128,8 @@ class MissionFlight(PlainTask):
         machine, vehicle = self.machine, self._vehicle
         if not self.there:
             raise Refused(texts.MISSION, texts.NO_MISSION)
+        if item is None:
+            await self._start_over()
         if machine.flying and item is None:
             return  # it is flown, and is not interrupted
         attempt = machine.attempt(item)
@@ -144,6 +151,28 @@ class MissionFlight(PlainTask):
         if vehicle.is_armed_by(by.client):  # since it requested this
             self.armed(by.client)
 
+    async def require_flyable(self) -> None:
+        """Raise `Refused` for a mission that cannot be flown from here.
+
+        Asked before a landing or return is ended for it.
+        """
+        await self.storing.over()
+        if (reason := self._vehicle.lacking(self.rules.needs)) is not None:
+            raise Refused(texts.MISSION, reason)
+        attempt = self.machine.attempt()
+        course = await self._laid_out(attempt.mission.items, attempt.item, attempt)
+        await check_path(self._vehicle, course.parts, warns=False)
+
+    async def _start_over(self) -> None:
+        """Return when no start is under way.
+
+        A second one would stop a drone that is about to take off.
+        ArduCopter's operators choose Auto, arm, and then send MISSION_START.
+        """
+        while self.machine.state in _BEGINS:
+            self._begun = self._begun or asyncio.Event()
+            await self._begun.wait()
+
     async def choose(self, by: Right, item: int) -> None:
         """Make an item the current one; a mission that is flown, or about to be, continues there.
 
@@ -154,7 +183,9 @@ class MissionFlight(PlainTask):
             raise Refused(texts.CURRENT_ITEM, texts.NO_MISSION)
         if not 0 <= item < len(self.machine.mission.items):
             raise Refused(texts.CURRENT_ITEM, texts.NO_SUCH_ITEM.fill(number=item + FIRST_LABEL), lasting=True)
-        if self.machine.is_at(item):
+        begun = self.machine.phase.attempt if self.machine.state in _BEGINS else None
+        begins_there = begun is not None and begun.item == item and not begun.jumps
+        if self.machine.is_at(item) or begins_there:
             self.outlet.mission_changed()  # the answer to a message
             return
         if self.machine.flying or self.machine.state in (State.PREPARING, State.TAKING_OVER, State.STARTING):
@@ -206,7 +237,21 @@ class MissionFlight(PlainTask):
         drone, machine = self._vehicle.drone, self.machine
         by_plan = drone.home.state.reason == events.ReturnReason.FLIGHTPLAN
         same = drone.flight_plan.state.uid == machine.progress.uid
-        return machine.ending or (by_plan and same and machine.returned)
+        return machine.returning or (by_plan and same and machine.returned)
+
+    def leads_inside(self) -> bool:
+        """Return True if the rest of the way that is laid out is inside the fence."""
+        vehicle, progress = self._vehicle, self.machine.progress
+        where, line = vehicle.place, progress.line
+        try:
+            for part in progress.course.parts:
+                for point in way_points(part, line) if isinstance(part, FlightPlanFile) else ():
+                    vehicle.fence.check_place(point.place, vehicle.home, where)
+                    where = point.place
+                line = -1
+        except OutsideFence:
+            return False
+        return True
 
     # Effects.
 
@@ -247,6 +292,9 @@ class MissionFlight(PlainTask):
             self._alarm.cancel()
         elif deadline != self._alarm.at:
             self._alarm.set(deadline)
+        if self._begun is not None and self.machine.state not in _BEGINS:
+            self._begun.set()
+            self._begun = None
         if self._outlet is not None:
             self._outlet.mission_changed()
         return work
@@ -306,7 +354,13 @@ class MissionFlight(PlainTask):
                 if attempt.unattended:
                     await self.storing.over()
                 held = machine.holds(attempt)  # not if a new mission was stored meanwhile, which has its own attempt
-                effects = machine.prepared(attempt, await self._prepare(attempt)) if held else []
+                if held:
+                    prepared = await self._prepare(attempt)
+                    if by is not None:  # the drone may have begun to take off meanwhile: a refusal disturbs nothing
+                        self._require_freedom(attempt, ends_return=self.returns)
+                    effects = machine.prepared(attempt, prepared)
+                else:
+                    effects = []
             case Acquire():
                 effects = await self._acquire(work, by)
             case StartFile():
@@ -463,8 +517,12 @@ class MissionFlight(PlainTask):
 
     def on_vehicle(self) -> None:
         """Landing, return or flying state have changed."""
-        if self.machine.state is State.ENDING:
-            self._handle(self.machine.reported(self._report()))
+        machine = self.machine
+        if machine.state is State.ENDING or (machine.state is State.FLYING_FILE and machine.progress.leg_done):
+            self._handle(machine.reported(self._report()))
+        elif machine.state is State.FLYING_FILE and machine.ending and self._vehicle.on_ground:
+            # It has landed at its last line, and reports neither that nor the end of its plan.
+            self._handle(machine.halted(stopped=True, report=self._report(), now=self._now))
 
     def _on_alarm(self) -> None:
         self._handle(self.machine.timeout(self._report()))
@@ -500,6 +558,9 @@ class MissionFlight(PlainTask):
         """The drone may fly on with the file that it has. What the gateway flies itself ends here."""
         self.machine.link_down()
         self._alarm.cancel()
+        if self._begun is not None:
+            self._begun.set()
+            self._begun = None
 
     def link_up(self, record: MissionRecord | None) -> None:
         """The drone is connected again, or to a new gateway: look if it flies our mission."""

@@ -186,6 +186,7 @@ TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
         E.HALTED: (*_NEXT, S.ENDING),
         E.EXECUTED: (S.FLYING_FILE,),
         E.SKIPPED: (S.FLYING_FILE,),
+        E.REPORTED: (S.FLYING_FILE, S.COMPLETE),
         E.CONTROL_LOST: (S.PAUSED,),
         E.LINK_DOWN: (S.PAUSED,),
     },
@@ -216,6 +217,7 @@ TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
         E.ENGAGED: (S.AWAIT_ARM,),
         E.RESUMED: (S.FLYING_FILE,),
         E.OTHER_PLAYING: (S.PAUSED,),
+        E.HALTED: (S.PAUSED,),
         E.EXECUTED: (S.PAUSED, S.COMPLETE),
         E.LINK_DOWN: (S.PAUSED,),
         E.LINK_UP: (S.FLYING_FILE, S.PAUSED, S.COMPLETE),
@@ -270,6 +272,8 @@ class MissionPhase:
     """The plan that another controller lets the drone fly."""
     may_end_late: bool = False
     """PAUSED: the drone stopped its plan. Its report of the last line still completes the mission."""
+    stops: bool = False
+    """PAUSED: the drone has been commanded to pause its file, and has not reported that. Lines count until then."""
 
 
 P = ParamSpec("P")
@@ -340,11 +344,23 @@ class MissionMachine:
 
     @property
     def ending(self) -> bool:
-        """The drone flies to the item that lands or returns: that it does so is no surprise."""
+        """The drone is at the line that lands or returns, or has executed it.
+
+        Not on the way to the place of a landing: a landing or return that begins there is not the plan's.
+        """
+        return self.flying and self._ends_with(*ENDINGS)
+
+    @property
+    def returning(self) -> bool:
+        """The same, and that line is a return."""
+        return self.flying and self._ends_with(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)
+
+    def _ends_with(self, *commands: int) -> bool:
+        """The file's last line is the present one, or is executed, and is of one of these commands."""
         progress, leg = self.progress, self.progress.leg
-        if not self.flying or leg is None or progress.leg_done:
+        if leg is None or not (progress.leg_done or progress.at_last_line):
             return False
-        return self.mission.items[leg.origins[progress.line + 1]].command in ENDINGS
+        return self.mission.items[leg.origins[-1]].command in commands
 
     @property
     def returned(self) -> bool:
@@ -403,7 +419,7 @@ class MissionMachine:
             return
         if flew:
             yield paused
-        elif attempt is not None and attempt.unattended:
+        elif phase.state is S.AWAIT_ARM or (attempt is not None and attempt.unattended):
             yield SendText(Severity.WARNING, texts.MISSION_NOT_STARTED.fill(reason=why))
         self._be(rest)
         if flew or phase.state is S.STARTING:
@@ -602,16 +618,18 @@ class MissionMachine:
             yield from self._stop(texts.MISSION_OTHER_PLAN)
         else:
             yield SendText(Severity.NOTICE, texts.OTHER_PLAN)
-        self.phase = replace(self.phase, may_end_late=False, plays=uid)
+        self.phase = replace(self.phase, may_end_late=False, stops=False, plays=uid)
 
     def halted(self, *, stopped: bool, report: DroneReport, now: float) -> list[Effect]:
         """The drone reports its plan as paused, or as `stopped`."""
-        self.phase = replace(self.phase, plays=None)
+        self.phase = replace(self.phase, plays=None, stops=False)
         return self._halted(stopped=stopped, report=report, now=now)
 
     @_on(E.HALTED)
     def _halted(self, *, stopped: bool, report: DroneReport, now: float) -> _Steps:
         progress = self.progress
+        if self.phase.state is S.PAUSED:
+            return  # by a client's command, which the drone has carried out now
         if progress.leg_done:
             yield from self._part_over()
         elif stopped and self.ending and progress.at_last_line:
@@ -628,7 +646,11 @@ class MissionMachine:
         """The drone reports that it has executed a line of its file."""
         leg, state = self.progress.leg, self.phase.state
         late = state is S.PAUSED
-        if late and not (self.phase.may_end_late and leg is not None and line == len(leg.origins) - 1):
+        is_last = leg is not None and line == len(leg.origins) - 1
+        if late and self.phase.stops and not is_last:
+            yield from self._execute(line)  # before the drone has heard of the pause
+            return
+        if late and not (self.phase.may_end_late and is_last):
             return
         yield from self._execute(line)
         if late:  # and no other mode: another flight task may be active by now
@@ -652,6 +674,12 @@ class MissionMachine:
     def reported(self, report: DroneReport, kind: type[Message] | None = None) -> _Steps:
         """The drone has reported a landing, a return, an alert, or (`kind`) a part of its position."""
         phase = self.phase
+        if (
+            phase.state is S.FLYING_FILE
+        ):  # its last line is executed, and the drone has not reported its plan as stopped
+            if kind is None and self.progress.leg_done and self.ending and report.lands_or_returns:
+                yield from self._part_over()
+            return
         if kind is None:
             yield from self._look(report)
             return
@@ -667,6 +695,8 @@ class MissionMachine:
         """
         state, flew = self.state, self.flying
         yield from self._end()
+        if state is S.FLYING_FILE:
+            self.phase = replace(self.phase, stops=True)
         if flew or state is S.STARTING:
             yield Suspend(starting=state is S.STARTING)
 

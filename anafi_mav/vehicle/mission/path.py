@@ -56,13 +56,14 @@ def _start(vehicle: Aircraft) -> Start:
     state, place, amsl = vehicle.drone.piloting.state, vehicle.place, vehicle.height.ato(0.0)
     if place is None:
         raise Refused(texts.MISSION, texts.NO_FIX)
-    if vehicle.in_air and state.altitude is None:
+    flies = vehicle.in_air or vehicle.descent is not None  # a landing is ended before a mission begins
+    if flies and state.altitude is None:
         raise Refused(texts.MISSION, texts.HEIGHT_UNKNOWN)
     return Start(
         place.latitude,
         place.longitude,
-        (state.altitude or 0.0) if vehicle.in_air else 0.0,
-        flying=vehicle.in_air,
+        (state.altitude or 0.0) if flies else 0.0,
+        flying=flies,
         takeoff_amsl=None if amsl is None else -amsl,
         heading=0.0 if state.attitude is None else state.attitude.yaw * DEG_PER_RAD % 360.0,
     )
@@ -121,7 +122,9 @@ def way_points(leg: FlightPlanFile, after: int = -1) -> Iterator[WayPoint]:
             yield WayPoint(item, place, float(columns[_HEIGHT]), radius if radius > 0.0 else ACCEPTANCE)
 
 
-async def check_path(vehicle: Aircraft, parts: Sequence[FlightPlanFile | GatewayStep], after: int) -> None:
+async def check_path(
+    vehicle: Aircraft, parts: Sequence[FlightPlanFile | GatewayStep], after: int = -1, *, warns: bool = True
+) -> None:
     """Raise `Refused` if a way point, or the straight way to it, is where the drone may not be.
 
     `after` is the line of the first file after which it is flown. A text warns of the lowest way point below the height
@@ -138,7 +141,7 @@ async def check_path(vehicle: Aircraft, parts: Sequence[FlightPlanFile | Gateway
                 if seen % BREATH == 0:
                     await asyncio.sleep(0)
         after = -1
-    if lowest is not None and lowest.ato < LOWEST:
+    if warns and lowest is not None and lowest.ato < LOWEST:
         item = lowest.item + FIRST_LABEL
         vehicle.text(Severity.WARNING, texts.MISSION_LOW.fill(item=item, height=lowest.ato))
 

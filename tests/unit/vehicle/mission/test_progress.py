@@ -121,8 +121,15 @@ def paused(*lines: int) -> MissionMachine:
     return machine
 
 
+def test_line_executed_before_the_drone_has_heard_of_the_pause_counts() -> None:
+    machine = paused(1)
+    assert Reached(1) in machine.executed(2)
+    assert machine.state is State.PAUSED
+
+
 def test_paused_mission_completes_no_item() -> None:
     machine = paused(1)
+    machine.halted(stopped=False, report=DroneReport(), now=0.0)
     assert machine.executed(2) == []
     assert (machine.state, machine.progress.current) == (State.PAUSED, 1)
     machine.playing("name", None)
@@ -135,7 +142,7 @@ def test_last_line_marks_the_plans_own_end() -> None:
         seen.append((machine.ending, machine.progress.at_last_line))
         machine.executed(line)
     assert seen == [(False, False)] * 5 + [(True, True)]
-    assert not machine.ending, "done"
+    assert machine.ending, "the drone lands by the line that it has executed"
 
 
 def test_choosing_an_item() -> None:

@@ -1,0 +1,226 @@
+"""Missions whose drone reports late or in part, and commands that cross them.
+
+A mission ends as it has been flown, a second start disturbs no first one, and a refused start ends no landing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fault_scenarios import LAND_CMD, PX4_HOLD, PX4_OFFBOARD, SET_MODE, another_controller, watched
+from support.fault_scenarios import RTL as RTL_CMD
+from support.missions import (
+    ACTIVE,
+    COMPLETE,
+    CORNERS,
+    LAND,
+    MISSION_MODE,
+    PAUSED,
+    PLACE,
+    RTL,
+    put,
+    reached,
+    said,
+    start,
+    state,
+    takeoff,
+    way,
+    whole,
+)
+from support.plans import FENCE, Item, around, polygon, square, upload
+from support.setpoints import VELOCITY_ONLY, local, streaming
+from support.world import ARMED, HOME, World, world
+
+from anafi_mav.arsdk.messages import ardrone3, common, piloting_style
+from anafi_mav.drone.automatic.flight_plan import FlightPlan
+from anafi_mav.mavlink import dialect as newer
+from anafi_mav.sim.world.faults import Impairment
+
+ACCEPTED, IN_PROGRESS = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_IN_PROGRESS
+ARM, START = dialect.MAV_CMD_COMPONENT_ARM_DISARM, dialect.MAV_CMD_MISSION_START
+PLAYING = common.MavlinkFilePlayingStateChanged.NAME
+EXECUTED = common.MissionItemExecuted.NAME
+PX4_MISSION = (1, 4, 4)
+WAIT = Item(dialect.MAV_CMD_NAV_DELAY, 0.0, 0.0, p1=5.0, frame=2)
+
+
+async def disarmed(w: World) -> None:
+    await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, timeout=60.0)
+
+
+@pytest.mark.parametrize("last", [LAND, RTL], ids=["land", "return"])
+@pytest.mark.parametrize("late", [0.5, None])
+async def test_mission_whose_end_is_reported_late_or_never_is_complete(last: Item, late: float | None) -> None:
+    """Its last line is reported, and the drone lands or returns, before it reports its plan as stopped."""
+    async with world(web=True) as w:
+        await put(w, [takeoff(6.0), way(12.0, 0.0, 6.0), last])
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=0)
+        if late is None:
+            w.drone.faults.unreported = frozenset({PLAYING})
+        else:
+            w.drone.faults.late = {PLAYING: late}
+        await disarmed(w)
+        assert whole(await w.client.wait("MISSION_CURRENT")).mission_state == COMPLETE
+
+
+async def test_landing_of_another_controller_on_the_way_to_a_landing_place_pauses_the_mission() -> None:
+    async with world(speed=1.0, web=True) as w:
+        land = Item(dialect.MAV_CMD_NAV_LAND, *around(PLACE, (100.0, 0.0))[0], p4=float("nan"), frame=3)
+        await put(w, [takeoff(15.0), way(5.0, 0.0, 15.0), land])
+        await start(w)
+        await state(w, ACTIVE, seq=2, since=0)
+        w.drone.faults.unreported = frozenset({PLAYING})
+        await w.drone.wait_log(lambda entry: w.drone.pose.north > 12.0, 20.0)
+        mark = w.client.mark()
+        another_controller(w, ardrone3.Landing())
+        await state(w, PAUSED, since=mark)
+        await disarmed(w)
+        assert whole(await w.client.wait("MISSION_CURRENT")).mission_state == PAUSED
+        assert w.drone.pose.north < 60.0
+
+
+@pytest.mark.parametrize("model", ["4k", "ai"])
+async def test_item_whose_report_crosses_a_hold_is_reached(model: str) -> None:
+    async with world(speed=1.0, model=model, web=True) as w:
+        await put(w, [takeoff(6.0), way(12.0, 0.0, 6.0), WAIT, way(12.0, 12.0, 6.0)])
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=0, timeout=60.0)
+        w.drone.faults.down = Impairment(delay=0.4)
+        lines = w.drone.firmware.flight_plan.items
+        wait = next(number for number, line in enumerate(lines) if "DELAY" in line.command.name)
+        await w.drone.wait_log(lambda entry: entry.name == EXECUTED and entry.args["idx"] == wait, 90.0)
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        mark = w.client.mark()
+        assert (await w.client.command(START, 0, 0)).result == ACCEPTED
+        await state(w, COMPLETE, since=mark, timeout=90.0)
+        assert reached(w) == [0, 1, 2, 3]
+
+
+@pytest.mark.parametrize("by", ["start", "current"])
+@pytest.mark.parametrize("after", [0.3, 1.2, 1.6])
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+async def test_second_start_joins_the_one_under_way(
+    monkeypatch: pytest.MonkeyPatch, flavour: str, by: str, after: float
+) -> None:
+    """ArduPilot's operators choose Auto, arm, and send MISSION_START; a drone takes its time for a file."""
+    upload_file = FlightPlan.upload
+
+    async def slowly(self: FlightPlan, plan: bytes) -> str:
+        await asyncio.sleep(1.0)
+        return await upload_file(self, plan)
+
+    monkeypatch.setattr(FlightPlan, "upload", slowly)
+    async with world(speed=1.0, flavour=flavour, web=True) as w:
+        await put(w, CORNERS)
+        w.drone.faults.down = Impairment(delay=0.4)
+        mode = (1, MISSION_MODE[flavour]) if flavour == "ardupilot" else PX4_MISSION
+        assert (await w.client.command(SET_MODE, *mode)).result == ACCEPTED
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        mark = w.client.mark()
+        await asyncio.sleep(after)
+        if by == "start":
+            assert (await w.client.command(START, 0, 0, timeout=20.0)).result == ACCEPTED
+        else:
+            w.client.send(newer.MAVLink_mission_set_current_message(1, 1, int(flavour == "ardupilot")))
+        await state(w, ACTIVE, seq=1, since=mark)
+        assert len(w.commands("common.Mavlink.Start")) == 1
+
+
+@pytest.mark.parametrize("descent", [LAND_CMD, RTL_CMD])
+@pytest.mark.parametrize("items", [[takeoff(6.0), way(12.0, 0.0, 400.0)], [takeoff(2.0)]], ids=["high", "nothing"])
+async def test_refused_mission_ends_no_descent(descent: int, items: list[Item]) -> None:
+    async with world(speed=1.0, web=True) as w:
+        await w.take_off(20.0)
+        await put(w, items)
+        await refused_in(w, descent, PX4_MISSION)
+
+
+@pytest.mark.parametrize("descent", [LAND_CMD, RTL_CMD])
+async def test_mission_outside_the_fence_ends_no_descent(descent: int) -> None:
+    async with world(speed=1.0, web=True) as w:
+        await w.take_off(20.0)
+        await put(w, [takeoff(6.0), way(200.0, 0.0, 20.0)])
+        assert (await upload(w.client, square(PLACE, 100.0), FENCE)).type == 0
+        await refused_in(w, descent, PX4_MISSION)
+
+
+@pytest.mark.parametrize("descent", [LAND_CMD, RTL_CMD])
+async def test_refused_offboard_ends_no_descent(descent: int) -> None:
+    """Sticks that follow the camera fly no setpoints."""
+    async with world(speed=1.0) as w:
+        await w.take_off(20.0)
+        style = piloting_style.PilotingStyleStyle.CAMERA_OPERATED
+        another_controller(w, piloting_style.SetStyle(style))
+        pilot = await w.connect(254)
+        async with streaming(pilot, local(VELOCITY_ONLY, v=(1.0, 0.0, 0.0))):
+            await refused_in(w, descent, PX4_OFFBOARD)
+
+
+async def refused_in(w: World, descent: int, mode: tuple[int, int, int]) -> None:
+    """A mode that is requested in a landing or return is refused, and that goes on."""
+    assert (await w.client.command(descent)).result == ACCEPTED
+    shown = w.modes.land if descent == LAND_CMD else w.modes.returning
+    await w.client.heartbeat(lambda beat: beat.custom_mode == shown)
+    await watched(0.5)
+    commands = len(sent(w))
+    assert (await w.client.command(SET_MODE, *mode)).result not in (ACCEPTED, IN_PROGRESS)
+    await watched(1.5)
+    assert sent(w)[commands:] == []
+    assert (await w.client.heartbeat(lambda beat: True)).custom_mode == shown
+
+
+def sent(w: World) -> list[str]:
+    """The commands that move the drone, without its sticks at rest."""
+    entries = [entry for entry in w.drone.log if entry.kind == "command"]
+    return [entry.name for entry in entries if entry.name.startswith(("ardrone3.Piloting.", "rth.")) and moves(entry)]
+
+
+def moves(entry: Any) -> bool:
+    return not entry.name.endswith("PCMD") or any(entry.args[axis] for axis in ("roll", "pitch", "yaw", "gaz"))
+
+
+async def test_mission_that_replaces_one_that_waits_for_arming_says_so() -> None:
+    async with world(web=True) as w:
+        await put(w, CORNERS)
+        assert (await w.client.command(SET_MODE, *PX4_MISSION)).result == ACCEPTED
+        mark = w.client.mark()
+        await put(w, [takeoff(6.0), way(9.0, 0.0, 6.0)])
+        await said(w, "Mission not started", mark)
+
+
+@pytest.mark.parametrize("task", ["orbit", "mission"])
+async def test_newer_fence_across_the_way_is_not_entered(task: str) -> None:
+    async with world(speed=1.0, web=True) as w:
+        await w.take_off(10.0)
+        if task == "orbit":
+            centre = around(PLACE, (20.0, 0.0))[0]
+            place = {"x": centre[0], "y": centre[1], "z": HOME[2] + 10.0}
+            ack = await w.client.command(dialect.MAV_CMD_DO_ORBIT, 20.0, 5.0, 0, float("nan"), frame=0, **place)
+            assert ack.result == ACCEPTED
+        else:
+            await put(w, [way(0.0, 0.0, 10.0), way(60.0, 0.0, 10.0)])
+            assert (await w.client.command(START, 0, 0)).result == ACCEPTED
+        await w.drone.wait_log(lambda entry: w.drone.pose.north > 5.0, 20.0)
+        mark = w.client.mark()
+        zone = square(around(PLACE, (40.0, 0.0))[0], 12.0, inclusion=False)
+        assert (await upload(w.client, zone, FENCE)).type == 0
+        await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Fence hold"), since=mark, timeout=30.0)
+        await watched(5.0)
+        poses = [entry.args for entry in w.drone.log if entry.kind == "pose"]
+        assert not [pose for pose in poses if pose["north"] > 28.0 and abs(pose["east"]) < 12.0]
+
+
+async def test_newer_fence_around_the_way_disturbs_no_mission() -> None:
+    async with world(speed=1.0, web=True) as w:
+        await w.take_off(10.0)
+        await put(w, [way(0.0, 0.0, 10.0), way(40.0, 0.0, 10.0), way(40.0, 20.0, 10.0)])
+        assert (await w.client.command(START, 0, 0)).result == ACCEPTED
+        await w.drone.wait_log(lambda entry: w.drone.pose.north > 5.0, 20.0)
+        corners = around(PLACE, (43.0, -10.0), (43.0, 23.0), (-10.0, 23.0), (-10.0, -10.0))
+        assert (await upload(w.client, polygon(corners), FENCE)).type == 0
+        await state(w, COMPLETE, since=0, timeout=60.0)
+        assert (w.drone.pose.north, w.drone.pose.east) == pytest.approx((40.0, 20.0), abs=2.0)
