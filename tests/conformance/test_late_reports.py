@@ -21,6 +21,7 @@ from support.fault_scenarios import (
     SET_MODE,
     TAKEOFF_CMD,
     another_controller,
+    goto,
     heard,
     on_command,
     results,
@@ -30,7 +31,7 @@ from support.fault_scenarios import (
 from support.setpoints import POSITION_ONLY, VELOCITY_ONLY, local, streaming
 from support.world import World, world
 
-from anafi_mav.arsdk.messages import ardrone3, rth
+from anafi_mav.arsdk.messages import ardrone3, common, rth
 from anafi_mav.sim.world.faults import Impairment
 
 ROI, YAW, ALTITUDE = (
@@ -156,6 +157,25 @@ async def test_land_is_sent_while_the_end_of_a_landing_is_not_reported_yet() -> 
         await flies(w, "flying", began)
         assert (await w.client.command(LAND_CMD)).result == ACCEPTED
         await flies(w, "landed", began)
+
+
+async def test_return_is_sent_while_the_end_of_the_one_before_is_not_reported_yet() -> None:
+    """Hold has ended it without a report, and the states that are requested then are on their way."""
+    async with world(speed=1.0) as w:
+        await w.take_off(25.0)
+        assert await goto(w, 60.0, 25.0) == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 40.0, 40.0)
+        assert (await w.client.command(RTL)).result == ACCEPTED
+        w.drone.faults.unreported = frozenset({rth.State.NAME})
+        w.drone.faults.up = w.drone.faults.down = Impairment(delay=0.4)
+        began = now()
+        w.client.send_command(SET_MODE, *PX4_HOLD)
+        await w.drone.wait_log(lambda e: e.name == rth.Abort.NAME, 10.0, since=began)
+        await watched(0.2)  # the end is not reported
+        w.drone.faults.unreported = frozenset()
+        await w.drone.wait_log(lambda e: e.name == common.AllStates.NAME, 10.0, since=began)
+        assert (await w.client.command(RTL)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] < 3.0, 60.0, since=began)
 
 
 @pytest.mark.parametrize("delay", [0.2, 0.6])

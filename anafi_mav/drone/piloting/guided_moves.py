@@ -12,12 +12,12 @@ import math
 from collections.abc import Callable
 
 from anafi_mav.arsdk.codec.wire import Message
-from anafi_mav.arsdk.messages import ardrone3, rth
+from anafi_mav.arsdk.messages import ardrone3, common, rth
 from anafi_mav.arsdk.messages import move as guided
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, FlyingStateChanged, OrientationMode
 from anafi_mav.arsdk.messages.rth import RthState
 from anafi_mav.drone.element import Element, Position
-from anafi_mav.drone.expectation import Commander, loop_time
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation, loop_time
 from anafi_mav.drone.piloting.moves import Displacement, Move, MoveEnd, Moves
 from anafi_mav.drone.piloting.state import PilotingState, in_state
 from anafi_mav.drone.piloting.stick_stream import StickStream
@@ -320,11 +320,16 @@ class ReturnHome:
         self._abortion_insists = even_its_own
 
         def quiet(delivery: asyncio.Future[None]) -> None:
-            if delivery is self._abortion:  # a newer one has its own time
+            if delivery is not self._abortion:  # a newer one has its own time
+                return
+            if not self._home.state.returning:
                 self._moves.aborted()
-                if self._home.state.returning:
-                    with contextlib.suppress(LinkLost):
-                        self._home.request_states()
+                return
+            states = self._commander.expect((common.AllStatesChanged,), lambda message: True)
+            states.expire_after(ANSWER_TIMEOUT, common.AllStates.NAME)
+            states.future.add_done_callback(lambda known: self._states_known(delivery, states))
+            with contextlib.suppress(LinkLost):
+                self._home.request_states()
 
         def heard(delivery: asyncio.Future[None]) -> None:
             asyncio.get_running_loop().call_later(QUIET, quiet, delivery)
@@ -332,6 +337,13 @@ class ReturnHome:
         delivery = self._abortion = self._commander.send_stop(rth.Abort())
         delivery.add_done_callback(heard)
         return delivery
+
+    def _states_known(self, delivery: asyncio.Future[None], states: Expectation[bool]) -> None:
+        """The drone has reported its states after an abort, or answers too late."""
+        states.close()
+        states.future.exception()
+        if delivery is self._abortion:
+            self._moves.aborted()
 
     def drop(self, why: str) -> bool:
         """The return that we asked for, running or on its way, is not ours any more.
