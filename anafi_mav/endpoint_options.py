@@ -324,12 +324,24 @@ def _system_ids(name: str, systems: tuple[int | str, ...]) -> frozenset[int]:
     return frozenset(ids)
 
 
+MAPPED_PREFIX = 96
+"""Bits before the IPv4 address in an IPv6 one that stands for it."""
+
+
 @functools.lru_cache(maxsize=64)
 def _networks(peers: tuple[str, ...]) -> tuple[Network, ...]:
     found = []
     for text in peers:
         try:
-            found.append(ipaddress.ip_network(text))
+            found.append(_as_ipv4(ipaddress.ip_network(text)))
         except ValueError as error:
             raise ConfigError("allowed_peers", f"expected an IP address or a network, got {text!r}: {error}") from error
     return tuple(found)
+
+
+def _as_ipv4(network: Network) -> Network:
+    """Return the IPv4 network that an IPv6 one stands for (::ffff:a.b.c.d, RFC 4291 §2.5.5.2), or the same network."""
+    mapped = network.network_address.ipv4_mapped if isinstance(network, ipaddress.IPv6Network) else None
+    if mapped is None or network.prefixlen < MAPPED_PREFIX:
+        return network
+    return ipaddress.IPv4Network((mapped, network.prefixlen - MAPPED_PREFIX))

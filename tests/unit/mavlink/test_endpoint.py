@@ -150,6 +150,21 @@ def test_mapping_and_url_give_the_same_options() -> None:
 
 
 @pytest.mark.parametrize(
+    ("peers", "networks"),
+    [
+        ("::ffff:10.0.0.1", ["10.0.0.1/32"]),
+        ("::ffff:10.9.0.0/112,::1", ["10.9.0.0/16", "::1/128"]),
+        ("::ffff:0:0/96", ["0.0.0.0/0"]),
+        ("::/0", ["::/0"]),
+    ],
+)
+def test_ipv4_peers_in_the_form_of_ipv6_are_ipv4_peers(peers: str, networks: list[str]) -> None:
+    """A socket of both families names them so; their addresses are compared as IPv4."""
+    options = parse_endpoint(f"udpin://[::]:14550?allowed_peers={peers}", FLAVOURS).options
+    assert [str(network) for network in options.networks or ()] == networks
+
+
+@pytest.mark.parametrize(
     ("mapping", "key", "problem"),
     [
         ({"url": "udpin:0.0.0.0:1"}, "url", "expected a URL that begins with one of"),
