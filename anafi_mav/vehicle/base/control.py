@@ -257,7 +257,8 @@ class Control:
 
         The task becomes active by `Grant.begin`, at the end of the block at the latest. When the request fails, the
         hovering mode of before is active again; after `begin` it is the one below the task. So is the task of before if
-        the drone flies it on. A newer request cancels the action, and is not disturbed by either.
+        the drone flies it on. After a stop that the drone has not confirmed it is Hold. A newer request cancels the
+        action, and is not disturbed by either.
 
         `below`: the hovering mode after the task; None: Hold. `pauses`: streams do not leave it. `rules`: for this
         request, instead of the task's own. `condition`: what the request needs beyond them; what it returns is
