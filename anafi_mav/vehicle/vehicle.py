@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Awaitable, Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -533,10 +533,7 @@ class Vehicle(Aircraft):
                 await self.offboard.engage(by)
             case FlightMode.MISSION:
                 if self.mission.there and not self.mission.flying:
-                    if self.descends:
-                        self.control.check(self.mission, by, end_of_descent(self.mission.rules))
-                        await self.mission.require_flyable()  # a mission that is refused ends nothing
-                    await self._free(self.mission, by)
+                    await self._free(self.mission, by, self.mission.require_flyable)
                 await self.mission.engage(by)
             case FlightMode.TERMINATED:
                 await self.terminate(by)
@@ -626,17 +623,22 @@ class Vehicle(Aircraft):
         if not by.counted:
             raise Refused(what, NOT_COUNTED)
 
-    async def _free(self, task: FlightTask, by: Right) -> None:
+    async def _free(self, task: FlightTask, by: Right, require: Callable[[], Awaitable[None]] | None = None) -> None:
         """End a landing or return that the task and `by` may end; returns when the drone hovers.
 
-        Returns at once when the drone neither lands nor returns.
+        Returns at once when the drone neither lands nor returns. A task that is refused ends nothing: `require` raises
+        `Refused` for what it needs beyond its rules.
         """
         self.control.require_allowed(task, by)
         if self.descends:
             needs = task.rules.needs & ~(Needs.NO_DESCENT | Needs.IN_AIR)  # these are what the stop is for
             if (reason := self.lacking(needs)) is not None:
                 raise Refused(task.rules.what, reason)
-            async with self.control.acquire(Hover(), by=by, rules=end_of_descent(task.rules)):
+            rules = end_of_descent(task.rules)
+            if require is not None:
+                self.control.check(task, by, rules)
+                await require()
+            async with self.control.acquire(Hover(), by=by, rules=rules):
                 pass
 
     def descent_end(self, rules: TaskRules, by: By) -> DescentEnd:

@@ -157,8 +157,6 @@ class MissionFlight(PlainTask):
         Asked before a landing or return is ended for it.
         """
         await self.storing.over()
-        if (reason := self._vehicle.lacking(self.rules.needs)) is not None:
-            raise Refused(texts.MISSION, reason)
         attempt = self.machine.attempt()
         course = await self._laid_out(attempt.mission.items, attempt.item, attempt)
         await check_path(self._vehicle, course.parts, warns=False)
@@ -518,9 +516,10 @@ class MissionFlight(PlainTask):
     def on_vehicle(self) -> None:
         """Landing, return or flying state have changed."""
         machine = self.machine
-        if machine.state is State.ENDING or (machine.state is State.FLYING_FILE and machine.progress.leg_done):
+        state = machine.state
+        if state is State.ENDING or (state is State.FLYING_FILE and machine.progress.leg_done):
             self._handle(machine.reported(self._report()))
-        elif machine.state is State.FLYING_FILE and machine.ending and self._vehicle.on_ground:
+        elif state is State.FLYING_FILE and self._vehicle.on_ground and machine.ending:
             # It has landed at its last line, and reports neither that nor the end of its plan.
             self._handle(machine.halted(stopped=True, report=self._report(), now=self._now))
 
