@@ -340,7 +340,10 @@ def _networks(peers: tuple[str, ...]) -> tuple[Network, ...]:
 
 
 def _as_ipv4(network: Network) -> Network:
-    """Return the IPv4 network that an IPv6 one stands for (::ffff:a.b.c.d, RFC 4291 §2.5.5.2), or the same network."""
+    """Return the IPv4 network that an IPv6 one stands for, or the same network.
+
+    ::ffff:a.b.c.d stands for a.b.c.d (RFC 4291 §2.5.5.2).
+    """
     mapped = network.network_address.ipv4_mapped if isinstance(network, ipaddress.IPv6Network) else None
     if mapped is None or network.prefixlen < MAPPED_PREFIX:
         return network
