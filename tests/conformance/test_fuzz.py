@@ -353,7 +353,8 @@ async def test_commands_with_invalid_numbers_are_answered(flavour: str, mistakes
         assert {*GOING_DOWN, *MAY_MOVE} <= set(known)
         began = w.drone.log[-1].t
         for id in GOING_DOWN:
-            await each(w, id, began, lambda p: False)
+            # A Landing leaves on the ground, too: another controller's take-off may not be reported yet.
+            await each(w, id, began, lambda p: False, harmless=frozenset({"ardrone3.Piloting.Landing"}))
         assert w.drone.flying_state.name == "LANDED"
         # Whatever take-off some of it asked for is not carried out: arming is a step of its own.
         assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0)).result == 0
@@ -377,14 +378,24 @@ async def test_mission_commands_with_invalid_numbers_are_answered(flavour: str, 
         assert mistakes == []
 
 
-async def each(w: World, id: int, since: float, may_move: Callable[[Parameters], bool]) -> None:
-    """Send a command with each parameter at each extreme, the others unset or 0; nothing moves but what may."""
+async def each(
+    w: World,
+    id: int,
+    since: float,
+    may_move: Callable[[Parameters], bool],
+    *,
+    harmless: frozenset[str] = frozenset(),
+) -> None:
+    """Send a command with each parameter at each extreme, the others unset or 0; nothing moves but what may.
+
+    `harmless`: commands that move nothing here.
+    """
     for others, slot, extreme in itertools.product((NAN, 0.0), range(7), EXTREMES):
         p = [others] * 7
         p[slot] = extreme
         ack = await w.client.command(id, *p[:4], x=p[4], y=p[5], z=p[6], timeout=20.0)
         assert ack.result != dialect.MAV_RESULT_FAILED, (id, p)
         await asyncio.sleep(COMMAND_EVERY)
-        if moved := motions(w, since):
+        if moved := [name for name in motions(w, since) if name not in harmless]:
             assert may_move(tuple(p)), (id, p, moved)
             since = w.drone.log[-1].t
