@@ -171,6 +171,12 @@ class MissionFlight(PlainTask):
             self._begun = self._begun or asyncio.Event()
             await self._begun.wait()
 
+    def _release_waiting(self) -> None:
+        """Let the commands go on that wait for the end of a start."""
+        if self._begun is not None:
+            self._begun.set()
+            self._begun = None
+
     async def choose(self, by: Right, item: int) -> None:
         """Make an item the current one; a mission that is flown, or about to be, continues there.
 
@@ -291,8 +297,7 @@ class MissionFlight(PlainTask):
         elif deadline != self._alarm.at:
             self._alarm.set(deadline)
         if self._begun is not None and self.machine.state not in _BEGINS:
-            self._begun.set()
-            self._begun = None
+            self._release_waiting()
         if self._outlet is not None:
             self._outlet.mission_changed()
         return work
@@ -557,9 +562,7 @@ class MissionFlight(PlainTask):
         """The drone may fly on with the file that it has. What the gateway flies itself ends here."""
         self.machine.link_down()
         self._alarm.cancel()
-        if self._begun is not None:
-            self._begun.set()
-            self._begun = None
+        self._release_waiting()
 
     def link_up(self, record: MissionRecord | None) -> None:
         """The drone is connected again, or to a new gateway: look if it flies our mission."""

@@ -674,9 +674,8 @@ class MissionMachine:
     def reported(self, report: DroneReport, kind: type[Message] | None = None) -> _Steps:
         """The drone has reported a landing, a return, an alert, or (`kind`) a part of its position."""
         phase = self.phase
-        if (
-            phase.state is S.FLYING_FILE
-        ):  # its last line is executed, and the drone has not reported its plan as stopped
+        if phase.state is S.FLYING_FILE:
+            # Its last line may be executed before the drone reports its plan as stopped.
             if kind is None and self.progress.leg_done and self.ending and report.lands_or_returns:
                 yield from self._part_over()
             return
