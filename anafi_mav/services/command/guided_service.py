@@ -114,7 +114,7 @@ class GuidedService(Service):
     def actions(self) -> Mapping[int, Action]:
         return {
             dialect.MAV_CMD_DO_CHANGE_SPEED: Action(
-                self._change_speed, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
+                self._change_speed, location=False, altitude=Altitude.UNUSED, effect=Effect.EACH
             ),
             dialect.MAV_CMD_DO_CHANGE_ALTITUDE: Action(
                 self._change_altitude,
@@ -137,7 +137,7 @@ class GuidedService(Service):
                 self._set_home,
                 location=True,
                 altitude=Altitude.AMSL,
-                effect=Effect.CHANGE,
+                effect=Effect.EACH,
                 progress=ProgressPolicy.LATE,
             ),
         }
@@ -179,12 +179,14 @@ class GuidedService(Service):
         vehicle = self.host.vehicle
         if vehicle.mode in _OWN_SPEED:
             raise Refused(texts.SPEED, texts.FIXED_IN_MODE.fill(mode=vehicle.mode.value))
-        if kind in (_AIRSPEED, _GROUNDSPEED):
-            vehicle.commanded_speeds = replace(vehicle.commanded_speeds, cruise=wanted)
+        is_horizontal, speeds = kind in (_AIRSPEED, _GROUNDSPEED), vehicle.commanded_speeds
+        if is_horizontal:
+            vehicle.commanded_speeds = replace(speeds, cruise=wanted, cruise_orders=speeds.cruise_orders + 1)
         else:
-            vehicle.commanded_speeds = replace(vehicle.commanded_speeds, climb=wanted)
+            vehicle.commanded_speeds = replace(speeds, climb=wanted)
         if (goto := vehicle.guided.goto) is not None:
-            await vehicle.guided.go(goto, by=command.right)
+            # The newer order replaces the speed that the move's own command has named.
+            await vehicle.guided.go(replace(goto, speed=None) if is_horizontal else goto, by=command.right)
 
     async def _change_altitude(self, command: Command) -> None:
         """MAV_CMD_DO_CHANGE_ALTITUDE: param1 height in m, param2 MAV_FRAME.

@@ -61,8 +61,11 @@ class _Orbit:
     """One orbit, from the way to the circle on; the newest one is kept after its end."""
 
     lap: Lap
-    cruise: float | None
-    """The vehicle's cruise speed when the orbit's was last decided: a change of it changes the orbit's."""
+    cruise: tuple[float | None, int]
+    """The vehicle's cruise speed, and how often it was commanded, when the orbit's was last decided.
+
+    A change of either changes the orbit's.
+    """
     approach: asyncio.Task[None] | None = None
     controller: VelocityController | None = None
     """None on the way to the circle."""
@@ -143,7 +146,7 @@ class OrbitService(Service, PlainTask):
         circle = self._described(command)
         async with vehicle.control.acquire(self, by=command.right, condition=lambda: self._way(circle)) as grant:
             start, is_away = grant.found
-            orbit = _Orbit(Lap(self._held_back(circle)), vehicle.cruise_speed)
+            orbit = _Orbit(Lap(self._held_back(circle)), _cruise(vehicle))
             if is_away:
                 heading = heading_at(orbit.lap.circle, _bearing(circle.centre, start))
                 await vehicle.guided.move(Goto(start, circle.height, heading, None, FlightMode.HOLD))
@@ -254,9 +257,9 @@ class OrbitService(Service, PlainTask):
         if orbit is None or orbit.controller is None or not vehicle.control.keeps(self):
             return
         lap = orbit.lap
-        if (cruise := vehicle.cruise_speed) != orbit.cruise:
+        if (cruise := _cruise(vehicle)) != orbit.cruise:
             orbit.cruise = cruise
-            lap.circle = self._held_back(replace(lap.circle, speed=cruise or DEFAULT_SPEED))
+            lap.circle = self._held_back(replace(lap.circle, speed=cruise[0] or DEFAULT_SPEED))
         limits = vehicle.drone.piloting.limits
         demand = None if vehicle.place is None else lap.demand(vehicle.offboard.motion)
         sticks = None if demand is None or limits is None else orbit.controller.sticks(demand, limits, now)
@@ -286,6 +289,10 @@ class OrbitService(Service, PlainTask):
             units.deg_e7(circle.centre.longitude),
             amsl,
         )
+
+
+def _cruise(vehicle: Vehicle) -> tuple[float | None, int]:
+    return vehicle.cruise_speed, vehicle.commanded_speeds.cruise_orders
 
 
 def _facing(behaviour: float) -> Facing:

@@ -78,7 +78,7 @@ class FenceService(Service):
         # Not a query: who was refused a place before may ask for it again at once.
         return {
             dialect.MAV_CMD_DO_FENCE_ENABLE: Action(
-                self._enable, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
+                self._enable, location=False, altitude=Altitude.UNUSED, effect=Effect.EACH
             )
         }
 

@@ -83,6 +83,8 @@ class CommandedSpeeds:
     """m/s over ground."""
     climb: float | None = None
     """m/s up and down."""
+    cruise_orders: int = 0
+    """How often the speed over ground was commanded: an orbit with a speed of its own obeys the same one again."""
 
 
 class Aircraft(Conditions):
