@@ -211,6 +211,8 @@ PLACES: list[Placed] = [
     (local(POSITION_ONLY, 1, at=(12.0, -6.0, -10.0)), (12.0, -6.0, 10.0)),
     (earth(POSITION_ONLY, 5, -3.0, 6.0, HOME[2] + 7.0), (-3.0, 6.0, 7.0)),
     (earth(POSITION_ONLY, 6, 8.0, 0.0, 12.0), (8.0, 0.0, 12.0)),
+    (earth(POSITION_ONLY, 0, 2.0, -4.0, HOME[2] + 9.0), (2.0, -4.0, 9.0)),
+    (earth(POSITION_ONLY, 3, -2.0, 3.0, 10.0), (-2.0, 3.0, 10.0)),
 ]
 """Setpoints and where they lead: north, east, up."""
 

@@ -18,8 +18,10 @@ an acceleration, or nothing, which holds it still. What counts from where (MAVLi
 | 1 LOCAL_NED | north, east, down | where the drone took off | from north |
 | 7 LOCAL_OFFSET_NED | north, east, down | where the drone is | from north |
 | 8 BODY_NED, 9 BODY_OFFSET_NED, 12 BODY_FRD | front, right, down | where the drone is | from the heading |
-| 5 GLOBAL_INT | north, east, down | the earth; height above mean sea level | from north |
-| 6 GLOBAL_RELATIVE_ALT_INT | north, east, down | the earth; height above take-off | from north |
+| 0 GLOBAL, 5 GLOBAL_INT | north, east, down | the earth; height above mean sea level | from north |
+| 3 GLOBAL_RELATIVE_ALT, 6 with INT | north, east, down | the earth; height above take-off | from north |
+
+Frames 5 and 6 are deprecated synonyms of 0 and 3 (common.xml SET_POSITION_TARGET_GLOBAL_INT): degE7 in all of them.
 
 Front and right are those of the heading, whatever the tilt.
 
@@ -90,6 +92,8 @@ _LOCAL_FRAMES: dict[int, tuple[PositionReference, bool]] = {
 
 
 _GLOBAL_FRAMES: dict[int, PositionReference] = {
+    dialect.MAV_FRAME_GLOBAL: PositionReference.SEA,
+    dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT: PositionReference.TAKEOFF,
     dialect.MAV_FRAME_GLOBAL_INT: PositionReference.SEA,
     dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: PositionReference.TAKEOFF,
 }
