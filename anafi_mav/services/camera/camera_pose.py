@@ -14,6 +14,7 @@ from anafi_mav.drone.values import ValueLayout, Values
 from anafi_mav.drone.video.video import VideoFrame
 from anafi_mav.services.camera.pose_track import DEGREES, CameraPose, PoseSource, PoseTrack, ValueTrack
 from anafi_mav.units import RAD_PER_DEG
+from anafi_mav.vehicle.vehicle import Vehicle
 
 Sample: TypeAlias = tuple[float, ...]
 
@@ -45,11 +46,10 @@ def camera_angles(drone: Drone) -> tuple[float, float, float] | None:
     )
 
 
-def current_pose(drone: Drone) -> CameraPose:
-    """Return the newest pose."""
-    location = drone.gps.state.location
-    place = None if location is None else (location.latitude, location.longitude)
-    return CameraPose(place, drone.piloting.state.altitude, camera_angles(drone))
+def current_pose(vehicle: Vehicle) -> CameraPose:
+    """Return the newest pose; without a place while that of the vehicle is unknown or old."""
+    drone = vehicle.drone
+    return CameraPose(vehicle.place, drone.piloting.state.altitude, camera_angles(drone))
 
 
 def _heading(message: events.AttitudeChanged) -> Sample:

@@ -65,7 +65,7 @@ class CameraService(Service):
                 lambda vehicle, times: camera_messages.settings(vehicle.drone, times)
             ),
             dialect.MAVLINK_MSG_ID_CAMERA_FOV_STATUS: MessageStream(
-                lambda vehicle, times: camera_messages.fov_status(vehicle, times, current_pose(vehicle.drone))
+                lambda vehicle, times: camera_messages.fov_status(vehicle, times, current_pose(vehicle))
             ),
             dialect.MAVLINK_MSG_ID_CAMERA_THERMAL_RANGE: MessageStream(_thermal_range, is_supported=_has_thermal),
         }

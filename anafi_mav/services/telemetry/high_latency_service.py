@@ -18,12 +18,13 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Command
-from anafi_mav.services.flavours import Flavour
+from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.pose import reported_pose
 from anafi_mav.services.service import Host, Query, Service
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.services.telemetry.telemetry_flight import target
 from anafi_mav.services.telemetry.telemetry_status import percent, sensor_bits
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.subscriptions import ValueInterest, ValueSubscriptions
 from anafi_mav.vehicle.vehicle import Vehicle
 
@@ -69,18 +70,22 @@ def _base_mode(vehicle: Vehicle) -> int:
     return int(base - 256 if base > 127 else base)
 
 
-def high_latency(vehicle: Vehicle, times: Times, climb: float) -> dialect.MAVLink_message | None:
+def high_latency(
+    vehicle: Vehicle, times: Times, climb: float, last_place: GeoPoint | None = None
+) -> dialect.MAVLink_message | None:
     """Return HIGH_LATENCY2; None before a first GPS fix.
 
+    `last_place` stands for a position that is lost: HL_FAILURE_FLAG_GPS and unknown accuracies report that, and without
+    the message a client would go on showing that place, an old mode and an old battery.
     `climb` is the fastest climb or descent since the last message (m/s). Without a target the drone's own position is
     sent as the target. Throttle, airspeed and wind are not reported and have no "unknown": 0.
     """
-    pose = reported_pose(vehicle)
-    place, height = pose.place, pose.amsl(vehicle)
+    pose, gps = reported_pose(vehicle), vehicle.drone.gps.state
+    place, height = pose.place or last_place, pose.amsl(vehicle)
     if place is None or height is None or pose.attitude is None or pose.velocity is None:
         return None
-    gps = vehicle.drone.gps.state
-    horizontal = [a for a in (gps.latitude_accuracy, gps.longitude_accuracy) if a is not None]
+    horizontal = [a for a in (gps.latitude_accuracy, gps.longitude_accuracy) if a is not None and pose.place]
+    vertical = gps.altitude_accuracy if pose.place else None
     heading = _half_degrees(pose.attitude.yaw)
     goal = target(vehicle)
     goal_height = None if goal is None else vehicle.height.amsl(goal.altitude)
@@ -103,7 +108,7 @@ def high_latency(vehicle: Vehicle, times: Times, climb: float) -> dialect.MAVLin
         windspeed=0,
         wind_heading=0,
         eph=UNKNOWN_U8 if not horizontal else min(max(horizontal) * 10, UNKNOWN_U8 - 1),
-        epv=UNKNOWN_U8 if gps.altitude_accuracy is None else min(gps.altitude_accuracy * 10, UNKNOWN_U8 - 1),
+        epv=UNKNOWN_U8 if vertical is None else min(vertical * 10, UNKNOWN_U8 - 1),
         temperature_air=0,
         climb_rate=units.saturate(climb * 10.0, 8),
         battery=percent(vehicle.drone.battery.state.percent),
@@ -124,8 +129,10 @@ class HighLatencyService(Service):
         """When the next HIGH_LATENCY2 is due, for each channel in high-latency mode."""
         self._interest = ValueInterest((events.SpeedChanged,), is_on=False)
         """On while a channel is in high-latency mode."""
-        self._climb = 0.0
-        """Fastest climb or descent since the last message, m/s."""
+        self._climbs: dict[Channel, float] = {}
+        """Fastest climb or descent since the last message on each of these channels, m/s."""
+        self._last_place: GeoPoint | None = None
+        """The drone's newest known position; None before the first one."""
 
     def queries(self) -> Mapping[int, Query]:
         return {dialect.MAV_CMD_CONTROL_HIGH_LATENCY: self._control}
@@ -138,24 +145,35 @@ class HighLatencyService(Service):
 
     def _on_speed(self, values: Values, now: float) -> None:
         if math.isfinite(climb := values.message(events.SpeedChanged).speedZ):
-            self._climb = max(self._climb, abs(climb))
+            self._climbs = {channel: max(self._climbs.get(channel, 0.0), abs(climb)) for channel in self._next}
+
+    def link_down(self) -> None:
+        self._last_place = None
 
     def tick(self, now: float) -> float:
+        self._last_place = self.host.vehicle.place or self._last_place
         due = [channel for channel, at in self._next.items() if now >= at]
         for channel in due:
             self._next[channel] = now + EVERY
-        if due:
-            times, vehicle = self.host.times(), self.host.vehicle
-            self.host.send_by_flavour(lambda flavour: self._build(vehicle, times.for_flavour(flavour)), due)
-            self._climb = 0.0
+            times = self.host.times().for_flavour(flavour_of(channel))
+            message = self._message(self.host.vehicle, times, self._climbs.pop(channel, 0.0))
+            if message is not None:
+                self.host.send(message, channel)
         return min(self._next.values(), default=NEVER)
 
     def channel_closed(self, channel: Channel) -> None:
         self._next.pop(channel, None)
+        self._climbs.pop(channel, None)
         self._interest.switch(bool(self._next))
 
     def _build(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-        return high_latency(vehicle, times, self._climb)
+        """Return it for a channel that is in no high-latency mode: with the present climb."""
+        return self._message(vehicle, times, 0.0)
+
+    def _message(self, vehicle: Vehicle, times: Times, climb: float) -> dialect.MAVLink_message | None:
+        velocity = vehicle.drone.piloting.state.velocity
+        climb = climb if velocity is None else max(climb, abs(velocity.down))
+        return high_latency(vehicle, times, climb, self._last_place or vehicle.origin)
 
     def _control(self, inbound: Inbound, command: Command) -> int:
         wanted = command.params[0]

@@ -78,6 +78,9 @@ class TelemetryService(Service):
         Without positions a station keeps showing the last one.
         """
         is_old = self.host.vehicle.position_is_old
+        if is_old or self._position_is_old:
+            # No event reports that the fix of GPS_RAW_INT is gone; repeated for clients that connect later.
+            self.host.mark_updated(dialect.MAVLINK_MSG_ID_GPS_RAW_INT, now)
         if is_old != self._position_is_old:
             self._position_is_old = is_old
             if is_old:

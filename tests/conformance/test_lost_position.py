@@ -1,0 +1,82 @@
+"""What clients are told of the position, the climb and the fix while the drone reports no position any more."""
+
+from __future__ import annotations
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.cameras import PHOTO, enter, request
+from support.fault_scenarios import ACCEPTED
+from support.mav import NAN
+from support.world import HOME, World, world
+
+from anafi_mav.arsdk.messages import ardrone3
+
+HIGH_LATENCY, HL_FAILURE_GPS = dialect.MAV_CMD_CONTROL_HIGH_LATENCY, dialect.HL_FAILURE_FLAG_GPS
+UNKNOWN = 2**31 - 1
+LOCATION = ardrone3.GpsLocationChanged.NAME
+
+
+async def position_unknown(w: World) -> None:
+    """The drone's locations stop, without a word about its fix."""
+    mark = w.client.mark()
+    w.drone.faults.unreported = frozenset({LOCATION})
+    await w.client.wait("STATUSTEXT", lambda m: "Position unknown" in m.text, since=mark, timeout=30.0)
+
+
+async def test_fix_is_gone_while_locations_are_missing() -> None:
+    async with world() as w:
+        await w.take_off(5.0)
+        mark = w.client.mark()
+        await position_unknown(w)
+        await w.client.wait("GPS_RAW_INT", lambda m: m.fix_type < dialect.GPS_FIX_TYPE_2D_FIX, since=mark, timeout=10.0)
+        late = await w.connect(sysid=200)
+        await late.wait("GPS_RAW_INT", lambda m: m.fix_type < dialect.GPS_FIX_TYPE_2D_FIX, since=0, timeout=10.0)
+        w.drone.faults.unreported = frozenset()
+        await w.client.wait("GPS_RAW_INT", lambda m: m.fix_type == dialect.GPS_FIX_TYPE_3D_FIX, timeout=10.0)
+
+
+async def test_place_of_the_camera_is_unknown_while_locations_are_missing() -> None:
+    async with world(video=False) as w:
+        await w.take_off(10.0)
+        await enter(w.client, PHOTO)
+        assert (await request(w.client, "CAMERA_FOV_STATUS")).lat_camera != UNKNOWN
+        await position_unknown(w)
+        assert (await request(w.client, "CAMERA_FOV_STATUS")).lat_camera == UNKNOWN
+
+
+async def test_high_latency_message_reports_a_lost_fix() -> None:
+    async with world(clients=2) as w:
+        await w.take_off(4.0)
+        far, near = w.clients
+        assert (await far.command(HIGH_LATENCY, 1)).result == ACCEPTED
+        await far.wait("HIGH_LATENCY2", timeout=8.0)
+        w.drone.faults.gps = False
+        await near.wait("GPS_RAW_INT", lambda m: m.fix_type < dialect.GPS_FIX_TYPE_2D_FIX)
+        message = await far.wait("HIGH_LATENCY2", lambda m: m.failure_flags & HL_FAILURE_GPS, timeout=30.0)
+        assert abs(message.latitude / 1e7 - HOME[0]) < 1e-3
+        assert message.eph == 255
+
+
+async def test_high_latency_message_on_request_has_the_climb() -> None:
+    async with world() as w:
+        await w.take_off(4.0)
+        ack = await w.client.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, 235, 500_000)
+        assert ack.result == ACCEPTED
+        mark = w.client.mark()
+        up = HOME[2] + 40.0
+        ack = await w.client.command(dialect.MAV_CMD_DO_REPOSITION, -1, 1, 0, NAN, frame=0, x=NAN, y=NAN, z=up)
+        assert ack.result == ACCEPTED
+        await w.client.wait("HIGH_LATENCY2", lambda m: m.climb_rate > 5, since=mark, timeout=8.0)
+
+
+async def test_high_latency_messages_of_two_clients_have_a_largest_climb_each() -> None:
+    async with world(clients=3) as w:
+        one, other, _ = w.clients
+        await w.take_off(5.0)
+        assert (await one.command(HIGH_LATENCY, 1)).result == ACCEPTED
+        await one.wait("HIGH_LATENCY2", since=0, timeout=8.0)
+        assert (await other.command(HIGH_LATENCY, 1)).result == ACCEPTED
+        await other.wait("HIGH_LATENCY2", since=0, timeout=8.0)
+        marks = one.mark(), other.mark()
+        w.drone.inject(ardrone3.SpeedChanged(0.0, 0.0, -4.0))
+        for client, mark in zip((one, other), marks, strict=True):
+            assert (await client.wait("HIGH_LATENCY2", since=mark, timeout=9.0)).climb_rate == 40
