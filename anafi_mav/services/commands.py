@@ -189,8 +189,8 @@ class Definition:
     """One for all, or by the command's parameters."""
     offered: Callable[[Flavour], bool] = lambda flavour: True
     """Return True for flavours whose clients have the command."""
-    still_holds: Callable[[], bool] = lambda: True
-    """Return False once what the action did has ended or changed: the same command is then a new one."""
+    still_holds: Callable[[Command], bool] = lambda command: True
+    """Return False once what this command did has ended or changed: the same command is then a new one."""
 
     def check(self, id: int) -> None:
         """Raise `ValueError` when this contradicts MAVLink's definition of the MAV_CMD, or itself."""
@@ -373,7 +373,7 @@ class Execution(Struct, eq=False):
     @property
     def still_holds(self) -> bool:
         """False when it was accepted and what it did has ended or changed since."""
-        return self.result != dialect.MAV_RESULT_ACCEPTED or self.command.definition.still_holds()
+        return self.result != dialect.MAV_RESULT_ACCEPTED or self.command.definition.still_holds(self.command)
 
 
 def is_in_window(execution: Execution, now: float) -> bool:

@@ -224,3 +224,19 @@ async def test_newer_fence_around_the_way_disturbs_no_mission() -> None:
         assert (await upload(w.client, polygon(corners), FENCE)).type == 0
         await state(w, COMPLETE, since=0, timeout=60.0)
         assert (w.drone.pose.north, w.drone.pose.east) == pytest.approx((40.0, 20.0), abs=2.0)
+
+
+async def test_distance_and_number_of_the_next_way_point_are_reported() -> None:
+    async with world(flavour="ardupilot", web=True, speed=1.0) as w:
+        w.client.send(dialect.MAVLink_request_data_stream_message(1, 1, 0, 4, 1))
+        await put(w, [takeoff(8.0), way(60.0, 0.0, 8.0), way(160.0, 0.0, 8.0)])
+        await start(w)
+        await w.drone.wait_log(lambda entry: w.drone.pose.north > 20.0, 60.0)
+        output = await w.client.wait("NAV_CONTROLLER_OUTPUT")
+        assert output.wp_dist == pytest.approx(60.0 - w.drone.pose.north, abs=8.0)
+        assert output.target_bearing == pytest.approx(0, abs=2)
+        mark = w.client.mark()
+        assert (await w.client.command(dialect.MAV_CMD_REQUEST_MESSAGE, 235)).result == ACCEPTED
+        message = await w.client.wait("HIGH_LATENCY2", since=mark)
+        assert message.wp_num == 2  # behind home and the take-off
+        assert message.target_distance * 10 == pytest.approx(60.0 - w.drone.pose.north, abs=10.0)

@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.fault_scenarios import ACCEPTED
 from support.flavours import both
 from support.mav import NAN, Client
+from support.missions import CORNERS, put
 from support.params import read, write
 from support.world import HOME, World, world
 
@@ -20,6 +21,7 @@ SPEED, SET_HOME, ENABLE = (
     dialect.MAV_CMD_DO_SET_HOME,
     dialect.MAV_CMD_DO_FENCE_ENABLE,
 )
+CHOOSE = dialect.MAV_CMD_DO_SET_MISSION_CURRENT
 FAR = geo.destination(*HOME[:2], 150.0, 0.0)
 
 
@@ -128,3 +130,19 @@ async def test_speed_of_before_replaces_that_which_an_orbit_has_named() -> None:
         await flies_at(w, 2.0, 30.0)
         await change_speed(w.client, 4.0)
         await flies_at(w, 4.0, 20.0)
+
+
+@pytest.mark.parametrize("by", ["another client", "a message"])
+async def test_item_is_chosen_once_more_after_another_choice(by: str) -> None:
+    async with world(web=True, clients=2) as w:
+        one, other = w.clients
+        await put(w, CORNERS)
+        assert (await one.command(CHOOSE, 2)).result == ACCEPTED
+        if by == "a message":
+            one.send(dialect.MAVLink_mission_set_current_message(1, 1, 1))
+            await one.wait("MISSION_CURRENT", lambda m: m.seq == 1)
+        else:
+            assert (await other.command(CHOOSE, 1)).result == ACCEPTED
+        mark = one.mark()
+        assert (await one.command(CHOOSE, 2)).result == ACCEPTED
+        await one.wait("MISSION_CURRENT", lambda m: m.seq == 2, since=mark)

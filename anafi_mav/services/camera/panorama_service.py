@@ -53,7 +53,7 @@ class PanoramaService(Service, PlainTask):
         return {
             dialect.MAV_CMD_PANORAMA_CREATE: Action(
                 self._create,
-                still_holds=lambda: self._is_active,
+                still_holds=lambda command: self._is_active,
                 location=False,
                 altitude=Altitude.UNUSED,
                 effect=Effect.IRREVOCABLE,

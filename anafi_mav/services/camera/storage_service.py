@@ -197,7 +197,7 @@ class StorageService(Service):
                 effect=Effect.ONCE,
                 progress=ProgressPolicy.LATE,
                 group=ActionGroup.STORAGE,
-                still_holds=lambda: self._is_empty,
+                still_holds=lambda command: self._is_empty,
             )
         }
 

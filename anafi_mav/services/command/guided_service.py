@@ -121,7 +121,7 @@ class GuidedService(Service):
                 location=False,
                 altitude=Altitude.UNUSED,
                 effect=Effect.CHANGE,
-                still_holds=lambda: not self.host.vehicle.guided.has_failed,
+                still_holds=lambda command: not self.host.vehicle.guided.has_failed,
             ),
             dialect.MAV_CMD_CONDITION_YAW: Action(
                 self._turn,

@@ -104,7 +104,9 @@ class OrbitService(Service, PlainTask):
                 altitude=Altitude.AMSL,
                 effect=Effect.CHANGE,
                 progress=ProgressPolicy.EARLY,
-                still_holds=lambda: self._newest is not None and (not self._newest.is_over or self._newest.lap.done),
+                still_holds=lambda command: (
+                    self._newest is not None and (not self._newest.is_over or self._newest.lap.done)
+                ),
             )
         }
 

@@ -84,7 +84,11 @@ class MissionService(Service):
                 mode=lambda command: FlightMode.MISSION,
             ),
             dialect.MAV_CMD_DO_SET_MISSION_CURRENT: Action(
-                self._choose, location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE
+                self._choose,
+                location=False,
+                altitude=Altitude.UNUSED,
+                effect=Effect.CHANGE,
+                still_holds=self._keeps_choice,
             ),
         }
 
@@ -145,6 +149,16 @@ class MissionService(Service):
                 await flight.reset(command.right)
             return
         await flight.choose(command.right, _ours(int(item), command.client))
+
+    def _keeps_choice(self, command: Command) -> bool:
+        """Return False when another item is current than this command has chosen.
+
+        A mission that is flown goes on from it: the same command repeated must not take it back.
+        """
+        item = command.params[0]
+        if self._flight.flying or math.isnan(item) or item == KEEP:
+            return True
+        return self._flight.machine.progress.current == _ours(int(item), command.client)
 
     def _set_current(self, inbound: Inbound) -> None:
         """MISSION_SET_CURRENT: MISSION_CURRENT answers it, or a text.

@@ -112,12 +112,22 @@ def high_latency(
         temperature_air=0,
         climb_rate=units.saturate(climb * 10.0, 8),
         battery=percent(vehicle.drone.battery.state.percent),
-        wp_num=UNKNOWN_U16,
+        wp_num=_item(vehicle, times.flavour),
         failure_flags=failures(vehicle),
         custom0=_base_mode(vehicle) if times.flavour.base_mode_in_custom0 else 0,
         custom1=0,
         custom2=0,
     )
+
+
+def _item(vehicle: Vehicle, flavour: Flavour) -> int:
+    """Return the number of the current item as this flavour counts; unknown without a mission."""
+    if not vehicle.mission.there:
+        return UNKNOWN_U16
+    machine = vehicle.mission.machine
+    if flavour.zero_home:
+        return 0 if machine.is_untouched else machine.progress.current + 1
+    return machine.progress.current
 
 
 class HighLatencyService(Service):

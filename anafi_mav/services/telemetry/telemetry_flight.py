@@ -18,6 +18,7 @@ from anafi_mav.drone.events import MoveToStatus
 from anafi_mav.drone.piloting.state import Attitude, Velocity
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.stream import MessageStream, Times
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.vehicle import Vehicle
 
 NAN = math.nan
@@ -211,7 +212,7 @@ def rangefinder(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | Non
 
 
 class MoveTarget(NamedTuple):
-    """Target of a running moveTo, seen from the drone."""
+    """Target of a running moveTo, or the mission's next way point, seen from the drone."""
 
     bearing: float
     """deg, clockwise from north, -180..180."""
@@ -224,15 +225,21 @@ class MoveTarget(NamedTuple):
 def target(vehicle: Vehicle) -> MoveTarget | None:
     """Return the present target; None without one, or while the drone's position is unknown."""
     place, state = vehicle.place, vehicle.drone.piloting.state
-    if place is None or state.move_target is None or state.move_to != MoveToStatus.RUNNING:
+    if place is None:
         return None
-    goal = state.move_target
-    north, east = geo.offset(place.latitude, place.longitude, goal.latitude, goal.longitude)
-    return MoveTarget(math.degrees(math.atan2(east, north)), math.hypot(north, east), goal.altitude)
+    if state.move_target is not None and state.move_to == MoveToStatus.RUNNING:
+        goal = GeoPoint(state.move_target.latitude, state.move_target.longitude), state.move_target.altitude
+    elif (of_mission := vehicle.mission.target) is not None:
+        goal = of_mission
+    else:
+        return None
+    (latitude, longitude), altitude = goal
+    north, east = geo.offset(place.latitude, place.longitude, latitude, longitude)
+    return MoveTarget(math.degrees(math.atan2(east, north)), math.hypot(north, east), altitude)
 
 
 def nav_controller_output(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
-    """Return NAV_CONTROLLER_OUTPUT: distance and direction of the target of a running moveTo.
+    """Return NAV_CONTROLLER_OUTPUT: distance and direction of the present target.
 
     Without a target: distance 0, ahead.
     """

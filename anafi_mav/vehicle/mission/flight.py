@@ -24,6 +24,7 @@ from anafi_mav.plans.translation.translate import FlightPlanFile
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.control import Condition
 from anafi_mav.vehicle.base.flight_task import Needs, PlainTask, TaskRules
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import DroneRefused, Refused, reason_of, text_of
 from anafi_mav.vehicle.base.right import Extent, Right
@@ -51,7 +52,7 @@ from anafi_mav.vehicle.mission.effects import (
     Work,
 )
 from anafi_mav.vehicle.mission.machine import PROOF, MissionMachine, State
-from anafi_mav.vehicle.mission.path import FilesOnDrone, check_path, lay_out, way_points
+from anafi_mav.vehicle.mission.path import FilesOnDrone, check_path, lay_out, next_place, way_points
 from anafi_mav.vehicle.mission.payload_state import payload_after
 from anafi_mav.vehicle.mission.record import MissionRecord
 from anafi_mav.vehicle.mission.steps import fly_step
@@ -220,6 +221,17 @@ class MissionFlight(PlainTask):
     def flying(self) -> bool:
         """True while the mission is flown."""
         return self.machine.flying
+
+    @property
+    def target(self) -> tuple[GeoPoint, float] | None:
+        """Way point that the drone flies to by its file: place, m above take-off.
+
+        None without one.
+        """
+        progress = self.machine.progress
+        if self.machine.state is not State.FLYING_FILE or progress.leg is None:
+            return None
+        return next_place(progress.leg.content, progress.line)
 
     @property
     def paused(self) -> bool:

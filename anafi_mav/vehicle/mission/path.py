@@ -6,6 +6,7 @@ The check reads the lines of the files, because those are flown. A file is uploa
 from __future__ import annotations
 
 import asyncio
+import functools
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -31,6 +32,9 @@ ACCEPTANCE = 5.0
 
 MAX_FILES = 16
 """Files that are remembered; the drone keeps more, and one that is forgotten is uploaded again."""
+
+REMEMBERED = 256
+"""Next way points that are remembered: telemetry asks for each of them several times a second."""
 
 _AMSL_FRAMES = (mav_enums.MAV_FRAME_GLOBAL, mav_enums.MAV_FRAME_GLOBAL_INT)
 
@@ -120,6 +124,16 @@ def way_points(leg: FlightPlanFile, after: int = -1) -> Iterator[WayPoint]:
             place = GeoPoint(float(columns[_LATITUDE]), float(columns[_LONGITUDE]))
             radius = float(columns[_RADIUS])
             yield WayPoint(item, place, float(columns[_HEIGHT]), radius if radius > 0.0 else ACCEPTANCE)
+
+
+@functools.lru_cache(maxsize=REMEMBERED)
+def next_place(content: bytes, after: int) -> tuple[GeoPoint, float] | None:
+    """Return place and height (m above take-off) of the first way point after a line."""
+    for line in content.decode().splitlines()[after + 2 :]:
+        columns = line.split("\t")
+        if int(columns[_COMMAND]) == mav_enums.MAV_CMD_NAV_WAYPOINT:
+            return GeoPoint(float(columns[_LATITUDE]), float(columns[_LONGITUDE])), float(columns[_HEIGHT])
+    return None
 
 
 async def check_path(

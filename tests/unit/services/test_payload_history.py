@@ -91,7 +91,7 @@ def test_answer_is_void_once_its_effect_has_ended() -> None:
         altitude=Altitude.UNUSED,
         effect=Effect.ONCE,
         group=ActionGroup.STORAGE,
-        still_holds=lambda: holds,
+        still_holds=lambda command: holds,
     )
     history, command = PayloadHistory(), replace(make(Effect.ONCE), definition=row)
     run(history, command, 10.0)
