@@ -22,6 +22,16 @@ def raise_on_interrupt() -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def raise_on_termination() -> None:
+    """Let SIGTERM raise SystemExit from now on, unless it is ignored or has a handler."""
+
+    def end(number: int, frame: object) -> None:
+        raise SystemExit(128 + number)
+
+    if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, end)
+
+
 def listen(callback: Callable[[signal.Signals], object], *names: str) -> None:
     """Call `callback` in the event loop with each signal of these names."""
     loop = asyncio.get_running_loop()

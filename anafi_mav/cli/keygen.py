@@ -62,6 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Raises `ConfigError`."""
     interrupts.raise_on_interrupt()  # a terminal that hides what is typed has to show it again
+    interrupts.raise_on_termination()
     name: str = arguments.name
     if NAME.fullmatch(name) is None:
         raise ConfigError("NAME", f"expected {NAME_EXPECTED}, got {name!r}")

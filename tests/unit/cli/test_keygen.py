@@ -132,7 +132,9 @@ def test_passphrase_that_is_no_text_is_refused(
 
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="it needs a pseudo-terminal")
-@pytest.mark.parametrize(("typed", "status"), [(b"\x03", 130), (b"\x04", MISUSED)], ids=["Ctrl-C", "Ctrl-D"])
+@pytest.mark.parametrize(
+    ("typed", "status"), [(b"\x03", 130), (b"\x04", MISUSED), (b"", 143)], ids=["Ctrl-C", "Ctrl-D", "SIGTERM"]
+)
 def test_prompt_that_is_left_shows_again_what_is_typed(state: Path, typed: bytes, status: int) -> None:
     import fcntl
     import termios
@@ -149,7 +151,10 @@ def test_prompt_that_is_left_shows_again_what_is_typed(state: Path, typed: bytes
         while not said.endswith(b": "):  # getpass hides what is typed before it asks
             said += os.read(outer, 1)
         assert not termios.tcgetattr(inner)[3] & termios.ECHO
-        os.write(outer, typed)
+        if typed:
+            os.write(outer, typed)
+        else:
+            process.terminate()
         assert process.wait() == status
         assert termios.tcgetattr(inner)[3] & termios.ECHO
     os.close(inner)
