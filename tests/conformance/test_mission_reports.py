@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import LAND_CMD, PX4_HOLD, PX4_OFFBOARD, SET_MODE, another_controller, watched
+from support.fault_scenarios import LAND_CMD, PX4_HOLD, PX4_OFFBOARD, SET_MODE, another_controller, until, watched
 from support.fault_scenarios import RTL as RTL_CMD
 from support.missions import (
     ACTIVE,
@@ -30,6 +30,7 @@ from support.missions import (
     way,
     whole,
 )
+from support.params import write
 from support.plans import FENCE, Item, around, polygon, square, upload
 from support.setpoints import VELOCITY_ONLY, local, streaming
 from support.world import ARMED, HOME, World, world
@@ -100,6 +101,58 @@ async def test_item_whose_report_crosses_a_hold_is_reached(model: str) -> None:
         assert reached(w) == [0, 1, 2, 3]
 
 
+def take_time(monkeypatch: pytest.MonkeyPatch, seconds: float = 1.0) -> None:
+    """Let the drone take its time for each file."""
+    upload_file = FlightPlan.upload
+
+    async def slowly(self: FlightPlan, plan: bytes) -> str:
+        await asyncio.sleep(seconds)
+        return await upload_file(self, plan)
+
+    monkeypatch.setattr(FlightPlan, "upload", slowly)
+
+
+@pytest.mark.parametrize("flies", [False, True])
+@pytest.mark.parametrize("after", [0.3, 1.2, 1.6, 2.3])
+@pytest.mark.parametrize("first", ["mode", "start"])
+async def test_second_start_of_an_armed_vehicle_joins_the_first(
+    monkeypatch: pytest.MonkeyPatch, first: str, after: float, flies: bool
+) -> None:
+    take_time(monkeypatch)
+    async with world(speed=1.0, web=True) as w:
+        if flies:
+            await w.take_off(6.0)
+        else:
+            assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        await put(w, CORNERS[flies:])
+        w.drone.faults.down = Impairment(delay=0.4)
+        commands = [(SET_MODE, *PX4_MISSION), (START, 0, 0)]
+        mark = w.client.mark()
+        for command in commands if first == "mode" else reversed(commands):
+            w.client.send_command(*command)
+            await asyncio.sleep(after)
+        found = await until(w.client, mark, 2, 30.0)
+        assert [result for _, result in found] == [ACCEPTED, ACCEPTED]
+        assert len(w.commands("common.Mavlink.Start")) == 1
+
+
+@pytest.mark.parametrize("after", [0.3, 1.2])
+async def test_item_that_is_chosen_while_a_start_prepares_is_flown(
+    monkeypatch: pytest.MonkeyPatch, after: float
+) -> None:
+    take_time(monkeypatch)
+    async with world(speed=1.0, web=True) as w:
+        await w.take_off(6.0)
+        await put(w, CORNERS)
+        mark = w.client.mark()
+        w.client.send_command(SET_MODE, *PX4_MISSION)
+        await asyncio.sleep(after)
+        ack = await w.client.command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, 2, 0, timeout=20.0)
+        assert ack.result == ACCEPTED
+        await state(w, COMPLETE, since=mark, timeout=60.0)
+        assert 1 not in reached(w, mark)
+
+
 @pytest.mark.parametrize("by", ["start", "current"])
 @pytest.mark.parametrize("after", [0.3, 1.2, 1.6])
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
@@ -107,13 +160,7 @@ async def test_second_start_joins_the_one_under_way(
     monkeypatch: pytest.MonkeyPatch, flavour: str, by: str, after: float
 ) -> None:
     """ArduPilot's operators choose Auto, arm, and send MISSION_START; a drone takes its time for a file."""
-    upload_file = FlightPlan.upload
-
-    async def slowly(self: FlightPlan, plan: bytes) -> str:
-        await asyncio.sleep(1.0)
-        return await upload_file(self, plan)
-
-    monkeypatch.setattr(FlightPlan, "upload", slowly)
+    take_time(monkeypatch)
     async with world(speed=1.0, flavour=flavour, web=True) as w:
         await put(w, CORNERS)
         w.drone.faults.down = Impairment(delay=0.4)
@@ -212,6 +259,50 @@ async def test_newer_fence_across_the_way_is_not_entered(task: str) -> None:
         await watched(5.0)
         poses = [entry.args for entry in w.drone.log if entry.kind == "pose"]
         assert not [pose for pose in poses if pose["north"] > 28.0 and abs(pose["east"]) < 12.0]
+
+
+ZONE = square(around(PLACE, (40.0, 0.0))[0], 12.0, inclusion=False)
+
+
+async def stays_out(w: World) -> None:
+    """The drone holds before `ZONE`."""
+    await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Fence hold"), timeout=30.0)
+    await watched(5.0)
+    assert max(entry.args["north"] for entry in w.drone.log if entry.kind == "pose") < 28.0
+
+
+async def test_fence_that_is_uploaded_while_a_start_prepares_is_not_entered(monkeypatch: pytest.MonkeyPatch) -> None:
+    take_time(monkeypatch, 1.5)
+    async with world(speed=1.0, web=True) as w:
+        await w.take_off(10.0)
+        await put(w, [way(0.0, 0.0, 10.0), way(60.0, 0.0, 10.0)])
+        w.client.send_command(START, 0, 0)
+        await asyncio.sleep(0.7)
+        assert (await upload(w.client, ZONE, FENCE)).type == 0
+        await stays_out(w)
+
+
+async def test_fence_whose_action_is_set_on_the_way_is_not_entered() -> None:
+    async with world(speed=1.0, web=True) as w:
+        await w.take_off(10.0)
+        assert (await upload(w.client, ZONE, FENCE)).type == 0
+        await write(w.client, "GF_ACTION", 0, 6)
+        await put(w, [way(0.0, 0.0, 10.0), way(60.0, 0.0, 10.0)])
+        assert (await w.client.command(START, 0, 0)).result == ACCEPTED
+        await w.drone.wait_log(lambda entry: w.drone.pose.north > 5.0, 20.0)
+        await write(w.client, "GF_ACTION", 2, 6)
+        await stays_out(w)
+
+
+async def test_newer_fence_behind_many_way_points_is_not_entered() -> None:
+    """A long way is judged some points at a time."""
+    async with world(speed=1.0, web=True) as w:
+        await w.take_off(10.0)
+        await put(w, [way(float(north), 0.0, 10.0) for north in range(61)])
+        assert (await w.client.command(START, 0, 0, timeout=20.0)).result == ACCEPTED
+        await w.drone.wait_log(lambda entry: w.drone.pose.north > 5.0, 40.0)
+        assert (await upload(w.client, ZONE, FENCE)).type == 0
+        await stays_out(w)
 
 
 async def test_newer_fence_around_the_way_disturbs_no_mission() -> None:

@@ -7,8 +7,9 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from anafi_mav import texts
@@ -46,6 +47,9 @@ LOOK_EVERY = 0.5
 LOOK_SOONEST = 0.1
 """s between looks for a new speed alone. An ANAFI reports its speed every 0.2 s."""
 
+JUDGED_AT_ONCE = 8
+"""Way points whose place and way are judged by the fence in one look: a few milliseconds for a large fence."""
+
 MIRROR_EVERY = 0.9
 """s, at least, between checks whether the drone's own geofence must change. The services tick once a second."""
 
@@ -65,8 +69,14 @@ class FenceService(Service):
         """When the drone last reported its position."""
         self._looked = self._mirrored = -math.inf
         self._breach_ms = 0
-        self._judged: tuple[int, int] | None = None
-        """The flight, by its `orders`, and the fence by which its whole way was judged."""
+        self._judged: tuple[int, int | None] | None = None
+        """The flight, by its `orders`, and the fence by which its whole way is or was judged; None: it had none."""
+        self._is_first = True
+        """That fence is the first of this flight."""
+        self._judging: Iterator[bool | None] = iter(())
+        """The judgement of the mission's way that is under way."""
+        self._is_inside: bool | None = None
+        """That judgement; None while it is under way."""
         self._announced: tuple[Any, ...] | None = None
         """Content of the newest FENCE_STATUS."""
 
@@ -143,15 +153,26 @@ class FenceService(Service):
     def _has_judged_way(self) -> bool:
         """Return True while the way of the flown plan or orbit is known to be inside the fence.
 
-        That of a plan is judged again by a newer fence, that of an orbit is not.
+        That of a plan is judged as it begins and again by a newer fence, some points with each look; until then the
+        check before its start counts for the first fence. That of an orbit is not judged again.
         """
-        vehicle, watch = self.host.vehicle, self._watch
-        flight, fence = vehicle.control.epoch, hash((watch.items.identity, watch.types))
-        if self._judged is None or self._judged[0] != flight:
+        vehicle, watch, mission = self.host.vehicle, self._watch, self.host.vehicle.mission
+        if vehicle.control.active is mission and not mission.flying:
+            return True  # it has not begun
+        flight = vehicle.control.epoch
+        if not watch.fence.zones:
+            self._judged = flight, None
+            return True
+        fence = hash((watch.items.identity, watch.types, watch.action is Reaction.NONE))
+        if self._judged != (flight, fence):
+            self._is_first = self._judged is None or self._judged[0] != flight
             self._judged = flight, fence
-        if self._judged[1] != fence and vehicle.mission.flying and vehicle.mission.leads_inside():
-            self._judged = flight, fence
-        return self._judged[1] == fence
+            self._is_inside = None if mission.flying else self._is_first
+            self._judging = mission.judge_way() if mission.flying else iter(())
+        if self._is_inside is None:
+            found = itertools.islice(self._judging, JUDGED_AT_ONCE)
+            self._is_inside = next((inside for inside in found if inside is not None), None)
+        return self._is_first if self._is_inside is None else self._is_inside
 
     @property
     def _ends_inside(self) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Coroutine, Hashable, Sequence
+from collections.abc import Coroutine, Hashable, Iterator, Sequence
 from typing import Any, Protocol
 
 from anafi_mav import texts
@@ -98,6 +98,8 @@ class MissionFlight(PlainTask):
         """Runs the machine's work when no command of a client does."""
         self._begun: asyncio.Event | None = None
         """Set when the start under way has ended; None while no command waits for that."""
+        self._commanded: list[MissionAttempt] = []
+        """Those that commands are starting, in the order of their arrival; the machine knows one from Acquire on."""
 
     def attach(self, outlet: MissionOutlet) -> None:
         """Report to clients and memory from now on."""
@@ -136,7 +138,13 @@ class MissionFlight(PlainTask):
         attempt = machine.attempt(item)
         if vehicle.armed:
             self._require_freedom(attempt, ends_return=self.returns)
-            await self._work(Prepare(attempt), by)
+            self._commanded.append(attempt)
+            try:
+                await self._work(Prepare(attempt), by)
+            finally:
+                self._commanded.remove(attempt)
+                if self._begun is not None and self._beginning is None:
+                    self._release_waiting()
             self._require_same(attempt)
             return
 
@@ -168,9 +176,16 @@ class MissionFlight(PlainTask):
         A second one would stop a drone that is about to take off.
         ArduCopter's operators choose Auto, arm, and then send MISSION_START.
         """
-        while self.machine.state in _BEGINS:
+        while self._beginning is not None:
             self._begun = self._begun or asyncio.Event()
             await self._begun.wait()
+
+    @property
+    def _beginning(self) -> MissionAttempt | None:
+        """The newest start under way."""
+        if self._commanded:
+            return self._commanded[-1]
+        return self.machine.phase.attempt if self.machine.state in _BEGINS else None
 
     def _release_waiting(self) -> None:
         """Let the commands go on that wait for the end of a start."""
@@ -188,12 +203,12 @@ class MissionFlight(PlainTask):
             raise Refused(texts.CURRENT_ITEM, texts.NO_MISSION)
         if not 0 <= item < len(self.machine.mission.items):
             raise Refused(texts.CURRENT_ITEM, texts.NO_SUCH_ITEM.fill(number=item + FIRST_LABEL), lasting=True)
-        begun = self.machine.phase.attempt if self.machine.state in _BEGINS else None
+        begun = self._beginning
         begins_there = begun is not None and begun.item == item and not begun.jumps
         if self.machine.is_at(item) or begins_there:
             self.outlet.mission_changed()  # the answer to a message
             return
-        if self.machine.flying or self.machine.state in (State.PREPARING, State.TAKING_OVER, State.STARTING):
+        if self.machine.flying or begun is not None:
             await self.engage(by, item)
         else:
             self._handle(self.machine.choose(item))
@@ -255,8 +270,11 @@ class MissionFlight(PlainTask):
         same = drone.flight_plan.state.uid == machine.progress.uid
         return machine.returning or (by_plan and same and machine.returned)
 
-    def leads_inside(self) -> bool:
-        """Return True if the rest of the way that is laid out is inside the fence."""
+    def judge_way(self) -> Iterator[bool | None]:
+        """Judge if the rest of the way that is laid out is inside the fence, a way point at a time.
+
+        Yields None after each of them, and the judgement at last: a long way takes seconds.
+        """
         vehicle, progress = self._vehicle, self.machine.progress
         where, line = vehicle.place, progress.line
         try:
@@ -264,10 +282,12 @@ class MissionFlight(PlainTask):
                 for point in way_points(part, line) if isinstance(part, FlightPlanFile) else ():
                     vehicle.fence.check_place(point.place, vehicle.home, where)
                     where = point.place
+                    yield None
                 line = -1
         except OutsideFence:
-            return False
-        return True
+            yield False
+        else:
+            yield True
 
     # Effects.
 
@@ -308,7 +328,7 @@ class MissionFlight(PlainTask):
             self._alarm.cancel()
         elif deadline != self._alarm.at:
             self._alarm.set(deadline)
-        if self._begun is not None and self.machine.state not in _BEGINS:
+        if self._begun is not None and self._beginning is None:
             self._release_waiting()
         if self._outlet is not None:
             self._outlet.mission_changed()
