@@ -171,6 +171,10 @@ class SentCommand(msgspec.Struct, eq=False):
         closed = self.phase in (Phase.WITHDRAWN, Phase.ABANDONED)
         return self.awaited or (closed and now < self.may_begin_until)
 
+    def lasts(self, now: float) -> bool:
+        """Return True while its effect is reported, or may still begin."""
+        return self.phase is Phase.CONFIRMED or self.is_in_effect or self.may_begin(now)
+
     def is_ignored(self, now: float) -> bool:
         """Return True for a launch of before that the drone has received and has not reacted to.
 

@@ -28,6 +28,7 @@ from support.fault_scenarios import (
     until,
     watched,
 )
+from support.params import write
 from support.setpoints import POSITION_ONLY, VELOCITY_ONLY, local, streaming
 from support.world import World, world
 
@@ -194,18 +195,56 @@ async def test_takeoff_that_a_landing_has_prevented_is_not_accepted(delay: float
         assert (ack.result == ACCEPTED) == (w.drone.pose.up > 0.5)
 
 
-async def test_forced_disarm_cuts_no_motors_in_the_air() -> None:
+@pytest.mark.parametrize("is_after_hand_launch", [False, True])
+async def test_forced_disarm_cuts_no_motors_in_the_air(is_after_hand_launch: bool) -> None:
     """By the fresh height: the flying state that is reported is two seconds old. `allow_kill` is off."""
     async with world(speed=1.0) as w:
-        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        if is_after_hand_launch:
+            await write(w.client, "ANF_HAND_LAUNCH", 1, 6)
+            assert (await w.client.command(ARM, 1)).result == ACCEPTED
+            assert (await w.client.command(ARM, 0)).result == ACCEPTED
+            await flies(w, "landed", now() - 1.0)
+            await watched(11.0)  # until that launch is over for good
         w.drone.faults.late = {FLYING: 2.0}
-        w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
+        began = now()
+        another_controller(w, ardrone3.TakeOff())
         ramping = dialect.MAV_LANDED_STATE_TAKEOFF
         await w.client.wait("EXTENDED_SYS_STATE", lambda m: m.landed_state == ramping, timeout=10.0)
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["up"] > 0.5, 10.0)
         await w.client.command(ARM, 0, FORCED, timeout=20.0)
         assert heard(w, "Emergency") == []
-        await flies(w, "landed")
+        await flies(w, "landed", began)
+
+
+@pytest.mark.parametrize("degrees", [0, 1])
+async def test_turn_by_nearly_nothing_ends_a_turn(degrees: int) -> None:
+    """The drone reports at once that it is there, as it does of a turn that was cancelled."""
+    async with world(speed=1.0) as w:
+        await w.take_off(5.0)
+        w.client.send_command(YAW, 90, 30, 1, 1)
+        await flies(w, "flying", now())
+        mark, began = w.client.mark(), now()
+        w.client.send_command(YAW, degrees, 30, 1, 1)
+        assert (YAW, ACCEPTED) in await until(w.client, mark, 2, 30.0)
+        assert now() - began < 10.0
+
+
+@pytest.mark.parametrize("gap", [0.1, 0.3])
+async def test_stop_that_a_region_of_interest_replaces_ends_an_older_stream(gap: float) -> None:
+    """The drone has obeyed Brake, and its report is on the way when the region is commanded."""
+    async with world(speed=1.0, flavour="ardupilot") as w:
+        companion = await w.connect(sysid=240)
+        await w.take_off(21.0)
+        async with streaming(companion, FAR):
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 5.0, 20.0)
+            w.drone.faults.up = w.drone.faults.down = Impairment(delay=0.25)
+            w.client.send_command(SET_MODE, *BRAKE)
+            await asyncio.sleep(gap)
+            mark = w.client.mark()
+            w.client.send_command(ROI, 0, 0, 0, 0, frame=6, x=48.8795, y=2.3677, z=0.0)
+            await w.client.wait("COMMAND_ACK", lambda ack: (ack.command, ack.result) == (ROI, ACCEPTED), since=mark)
+            await watched(6.0)
+        assert w.drone.pose.north < 30.0
 
 
 @pytest.mark.parametrize("is_same", [True, False])

@@ -53,6 +53,8 @@ Twice the tolerance of `_same`.
 """
 _NO_MOVE = 1e-3
 """m or rad below which a moveBy went nowhere."""
+_TINY = 0.1, 0.05
+"""m and rad within which a drone counts as there: a moveBy that asks for no more may go nowhere."""
 _SHORT = 1.0, 0.2
 """m and rad by which the end of a moveBy may differ from what was commanded."""
 
@@ -174,6 +176,15 @@ def _axes(message: ardrone3.MoveByEnd, offset: Displacement) -> list[tuple[float
 def _is_short(message: ardrone3.MoveByEnd, offset: Displacement | None) -> bool:
     """Return True when this end of a moveBy is not where it was to lead."""
     return offset is not None and any(abs(flown - asked) > about for flown, asked, about in _axes(message, offset))
+
+
+def _is_tiny(offset: Displacement | None) -> bool:
+    """Return True when the end of this moveBy may be where it began."""
+    length, angle = _TINY
+    return offset is not None and (
+        max(abs(offset.front), abs(offset.right), abs(offset.down)) <= length
+        and abs(math.remainder(offset.turn, 2.0 * math.pi)) <= angle
+    )
 
 
 def _leads_elsewhere(message: ardrone3.MoveByEnd, offset: Displacement | None) -> bool:
@@ -403,7 +414,8 @@ class Moves:
     def _is_stray(self, message: ardrone3.MoveByEnd, now: float) -> bool:
         """Return True when this event belongs to a moveBy that was cancelled before the present one.
 
-        Nothing but a newer moveBy interrupts one, and a move that is not zero does not succeed by staying.
+        Nothing but a newer moveBy interrupts one, and a move that asks for more than a drone tells from nothing does
+        not succeed by staying.
         """
         if now >= self._stray_until:
             return False
@@ -412,7 +424,8 @@ class Moves:
         if message.error != MoveByError.OK:
             return False
         went_nowhere = max(abs(message.dX), abs(message.dY), abs(message.dZ), abs(message.dPsi)) < _NO_MOVE
-        return went_nowhere or _leads_elsewhere(message, self.by[0].offset)
+        offset = self.by[0].offset
+        return (went_nowhere and not _is_tiny(offset)) or _leads_elsewhere(message, offset)
 
     def on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
         """Motors that stand end every move."""

@@ -279,7 +279,8 @@ class Control:
         before, number = self.active, self._situation.epoch + 1
         own = task if rules.lasts and not rules.is_hover else None
         hover = task if rules.is_hover else below
-        attempt = Attempt(own, number, hover, rules.keeps_below, pauses, rules.is_urgent)
+        is_stop = not rules.is_flight and not rules.keeps_below
+        attempt = Attempt(own, number, hover, rules.keeps_below, pauses, rules.is_urgent, is_stop)
         grant: Grant | None = None
         try:
             has_waited = await self._release(attempt, rules.wait)

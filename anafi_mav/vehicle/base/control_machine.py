@@ -81,6 +81,8 @@ class Attempt(Struct, Generic[TaskT], frozen=True):
     pauses: bool = False
     is_urgent: bool = False
     """Nothing replaces it before it has ended: the motors are being cut."""
+    is_stop: bool = False
+    """It stops the drone: its hovering mode, and its pause, count from a newer request on that replaces it."""
 
 
 class Situation(Struct, Generic[TaskT], frozen=True):
@@ -229,6 +231,8 @@ def _request(now: Situation[TaskT], about: Input[TaskT]) -> Step[TaskT]:
     after = replace(
         now, task=None, successor=None, pending=attempt, is_released=False, epoch=max(now.epoch + 1, attempt.number)
     )
+    if now.pending is not None and now.pending.is_stop:  # the drone may have obeyed: no older stream flies it on
+        after = replace(after, below=now.pending.below, is_paused=now.pending.pauses)
     return Step(after, _those(now.task, now.below, now.successor))
 
 
