@@ -62,6 +62,16 @@ def opened(node: RouterProcess) -> zenoh.Session:
     return zenoh.open(config)
 
 
+async def held(node: RouterProcess) -> None:
+    """Wait until the router names the gateway that holds system id 1.
+
+    Its telemetry may arrive before its token, and another gateway would claim the id at the same moment then.
+    """
+    with await asyncio.to_thread(opened, node) as session:
+        tokens = session.liveliness().declare_subscriber("anafi/1/drone/**", history=True)
+        await asyncio.to_thread(tokens.recv)
+
+
 def counted(w: World, name: str) -> int:
     return w.gateway.counters()[name]
 
@@ -198,6 +208,7 @@ async def test_killed_router_that_returns_brings_the_station_back() -> None:
 async def test_system_id_of_another_gateway_is_left_to_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     async with router() as node, world(endpoints=(node.url,)) as w, ground(node.url) as port:
         station = w.take(await FabricStation().join(port))
+        await held(node)
         file = tmp_path / "second.yaml"
         file.write_text(
             f"state: {tmp_path}/state\nendpoints: ['{node.url}']\nhttp: off\nvideo: off\n"
@@ -272,6 +283,7 @@ async def test_lost_link_of_a_gateway_gives_its_system_id_to_no_other(
         try:
             async with world(endpoints=(f"zenoh://127.0.0.1:{port}",)) as w, ground(node.url) as stations:
                 station = w.take(await FabricStation().join(stations))
+                await held(node)
                 monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))  # one gateway uses one state folder
                 async with world(endpoints=(node.url,)) as other:
                     await notified(other.client)
