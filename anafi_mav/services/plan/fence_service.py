@@ -10,6 +10,7 @@ import asyncio
 import itertools
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from anafi_mav import texts
@@ -57,6 +58,22 @@ DISABLE, ENABLE, DISABLE_FLOOR = 0.0, 1.0, 2.0
 """param1 of MAV_CMD_DO_FENCE_ENABLE."""
 
 
+@dataclass
+class _WayJudgement:
+    """Judgement of the whole way of one flight by one fence."""
+
+    flight: int
+    """By its `orders`."""
+    fence: int | None
+    """By a hash; None: there is none."""
+    is_first: bool
+    """It is the first fence of this flight: the check before the start was by it."""
+    points: Iterator[bool | None] = field(default_factory=lambda: iter(()))
+    """The judgement of a mission's way, a point at a time."""
+    is_inside: bool | None = None
+    """None while it is under way."""
+
+
 class FenceService(Service):
     """Service for the region in which the drone may be."""
 
@@ -69,14 +86,8 @@ class FenceService(Service):
         """When the drone last reported its position."""
         self._looked = self._mirrored = -math.inf
         self._breach_ms = 0
-        self._judged: tuple[int, int | None] | None = None
-        """The flight, by its `orders`, and the fence by which its whole way is or was judged; None: it had none."""
-        self._is_first = True
-        """That fence is the first of this flight."""
-        self._judging: Iterator[bool | None] = iter(())
-        """The judgement of the mission's way that is under way."""
-        self._is_inside: bool | None = None
-        """That judgement; None while it is under way."""
+        self._judgement: _WayJudgement | None = None
+        """Of the newest flight by the newest fence."""
         self._announced: tuple[Any, ...] | None = None
         """Content of the newest FENCE_STATUS."""
 
@@ -159,20 +170,21 @@ class FenceService(Service):
         vehicle, watch, mission = self.host.vehicle, self._watch, self.host.vehicle.mission
         if vehicle.control.active is mission and not mission.flying:
             return True  # it has not begun
-        flight = vehicle.control.epoch
-        if not watch.fence.zones:
-            self._judged = flight, None
-            return True
-        fence = hash((watch.items.identity, watch.types, watch.action is Reaction.NONE))
-        if self._judged != (flight, fence):
-            self._is_first = self._judged is None or self._judged[0] != flight
-            self._judged = flight, fence
-            self._is_inside = None if mission.flying else self._is_first
-            self._judging = mission.judge_way() if mission.flying else iter(())
-        if self._is_inside is None:
-            found = itertools.islice(self._judging, JUDGED_AT_ONCE)
-            self._is_inside = next((inside for inside in found if inside is not None), None)
-        return self._is_first if self._is_inside is None else self._is_inside
+        flight, judgement = vehicle.control.epoch, self._judgement
+        fence = hash((watch.items.identity, watch.types, watch.action is Reaction.NONE)) if watch.fence.zones else None
+        if judgement is None or judgement.flight != flight or judgement.fence != fence:
+            is_first = judgement is None or judgement.flight != flight
+            judgement = self._judgement = _WayJudgement(flight, fence, is_first)
+            if fence is None:
+                judgement.is_inside = True
+            elif mission.flying:
+                judgement.points = mission.judge_way()
+            else:
+                judgement.is_inside = is_first
+        if judgement.is_inside is None:
+            found = itertools.islice(judgement.points, JUDGED_AT_ONCE)
+            judgement.is_inside = next((inside for inside in found if inside is not None), None)
+        return judgement.is_first if judgement.is_inside is None else judgement.is_inside
 
     @property
     def _ends_inside(self) -> bool:
