@@ -239,7 +239,7 @@ async def test_stop_that_a_region_of_interest_replaces_ends_an_older_stream(gap:
             await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 5.0, 20.0)
             w.drone.faults.up = w.drone.faults.down = Impairment(delay=0.25)
             w.client.send_command(SET_MODE, *BRAKE)
-            await asyncio.sleep(gap)
+            await asyncio.sleep(gap)  # of the client, between its two commands
             mark = w.client.mark()
             w.client.send_command(ROI, 0, 0, 0, 0, frame=6, x=48.8795, y=2.3677, z=0.0)
             await w.client.wait("COMMAND_ACK", lambda ack: (ack.command, ack.result) == (ROI, ACCEPTED), since=mark)
@@ -255,7 +255,7 @@ async def test_second_region_of_interest_within_a_round_trip_replaces_the_first(
         w.drone.faults.up = w.drone.faults.down = Impairment(delay=0.2)
         began = on_command(w, ardrone3.StartPilotedPOIV2.NAME, lambda: None)
         w.client.send_command(ROI, 0, 0, 0, 0, frame=6, x=48.8795, y=2.3677, z=0.0)
-        await asyncio.sleep(0.1)
+        await asyncio.sleep(0.1)  # of the clients, between their two commands
         mark = other.mark()
         other.send_command(ROI, 0, 0, 0, 0, frame=6, x=48.8789, y=2.3690, z=0.0)
         await began

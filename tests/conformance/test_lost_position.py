@@ -1,4 +1,4 @@
-"""What clients are told of the position, the climb and the fix while the drone reports no position any more."""
+"""Position, climb and fix in what clients receive while the drone reports no position any more."""
 
 from __future__ import annotations
 

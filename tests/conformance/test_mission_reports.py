@@ -130,7 +130,7 @@ async def test_second_start_of_an_armed_vehicle_joins_the_first(
         mark = w.client.mark()
         for command in commands if first == "mode" else reversed(commands):
             w.client.send_command(*command)
-            await asyncio.sleep(after)
+            await asyncio.sleep(after)  # of the client, between its commands
         found = await until(w.client, mark, 2, 30.0)
         assert [result for _, result in found] == [ACCEPTED, ACCEPTED]
         assert len(w.commands("common.Mavlink.Start")) == 1
@@ -146,7 +146,7 @@ async def test_item_that_is_chosen_while_a_start_prepares_is_flown(
         await put(w, CORNERS)
         mark = w.client.mark()
         w.client.send_command(SET_MODE, *PX4_MISSION)
-        await asyncio.sleep(after)
+        await asyncio.sleep(after)  # of the client, between its commands
         ack = await w.client.command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, 2, 0, timeout=20.0)
         assert ack.result == ACCEPTED
         await state(w, COMPLETE, since=mark, timeout=60.0)
@@ -168,7 +168,7 @@ async def test_second_start_joins_the_one_under_way(
         assert (await w.client.command(SET_MODE, *mode)).result == ACCEPTED
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
         mark = w.client.mark()
-        await asyncio.sleep(after)
+        await asyncio.sleep(after)  # of the client, between its commands
         if by == "start":
             assert (await w.client.command(START, 0, 0, timeout=20.0)).result == ACCEPTED
         else:
@@ -277,7 +277,7 @@ async def test_fence_that_is_uploaded_while_a_start_prepares_is_not_entered(monk
         await w.take_off(10.0)
         await put(w, [way(0.0, 0.0, 10.0), way(60.0, 0.0, 10.0)])
         w.client.send_command(START, 0, 0)
-        await asyncio.sleep(0.7)
+        await asyncio.sleep(0.7)  # of the client: half of the time that the drone takes for the file
         assert (await upload(w.client, ZONE, FENCE)).type == 0
         await stays_out(w)
 

@@ -49,7 +49,7 @@ async def set_home(client: Client, place: tuple[float, float]) -> None:
 
 
 async def home_of(client: Client) -> tuple[float, float]:
-    """Where clients are told that home is."""
+    """Return the home that clients receive (deg)."""
     mark = client.mark()
     assert (await client.command(dialect.MAV_CMD_REQUEST_MESSAGE, 242)).result == ACCEPTED
     message = await client.wait("HOME_POSITION", since=mark)

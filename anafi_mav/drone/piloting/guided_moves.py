@@ -341,7 +341,6 @@ class ReturnHome:
     def _states_known(self, delivery: asyncio.Future[None], states: Expectation[bool]) -> None:
         """The drone has reported its states after an abort, or answers too late."""
         states.close()
-        states.future.exception()
         if delivery is self._abortion:
             self._moves.aborted()
 
