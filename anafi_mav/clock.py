@@ -43,11 +43,12 @@ class Alarm:
     Setting it again replaces the time set before.
     """
 
-    __slots__ = ("_call", "_handle", "at")
+    __slots__ = ("_handle", "at", "call")
 
     def __init__(self, call: Callable[[], None]) -> None:
         """`call` may set the alarm again."""
-        self._call = call
+        self.call = call
+        """The function that it calls."""
         self._handle: asyncio.TimerHandle | None = None
         self.at: float | None = None
         """When it calls (s, loop clock); None after a cancellation or the call."""
@@ -76,7 +77,7 @@ class Alarm:
 
     def _fire(self) -> None:
         self._handle = self.at = None
-        self._call()
+        self.call()
 
 
 class YieldingCall:

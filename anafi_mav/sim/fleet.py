@@ -1,6 +1,6 @@
 """Simulator of any number of drones in one process.
 
-One task advances the world of all.
+One timer advances the world of all.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 
+from anafi_mav.clock import Alarm
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim.drone import DroneSpec, SimulatedDrone
 from anafi_mav.sim.log import Log, LogFile
@@ -63,7 +64,13 @@ class Simulator:
         self._period = TURN if all(spec.telemetry_rate <= 0.5 / TURN for spec in specs) else FAST_TURN
         self.speed = speed
         self._file = None if log is None else LogFile(log)
-        self._task: asyncio.Task[None] | None = None
+        self._next_turn = Alarm(self._run)
+        self._stopped: asyncio.Future[None] | None = None
+        """Has the error that stopped the world, if one did; None before the start."""
+        self._last = self._due = 0.0
+        """Times of the last turn, and of the one that is due (s, loop clock)."""
+        self._debt = 0.0
+        """Simulated seconds by which the world is behind the clock."""
         self.lost_time = 0.0
         """Simulated seconds that were skipped because the process did not get to run."""
         chance = random.Random(seed)
@@ -122,13 +129,13 @@ class Simulator:
         except BaseException:
             await self.close()
             raise
-        self._task = asyncio.create_task(self._run(), name="simulated world")
+        self._stopped = asyncio.get_running_loop().create_future()
+        self._last = self._due = _clock()
+        self._wait_for_turn()
 
     async def close(self) -> None:
         """Stop time and close all sockets. Idempotent."""
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.wait([self._task])
+        self._next_turn.cancel()
         for drone in self.drones:
             await drone.close()
         if self._file is not None:
@@ -136,28 +143,35 @@ class Simulator:
 
     async def wait(self) -> None:
         """Return never; raise what stopped the world, if anything does."""
-        if self._task is not None:
-            await asyncio.shield(self._task)
+        if self._stopped is not None:
+            await asyncio.shield(self._stopped)
 
-    async def _run(self) -> None:
-        last = due = _clock()
-        debt = 0.0
-        while True:
-            if debt < STEP:
-                # From turn to turn on the clock, not from a late one on: else some would make two steps, others none.
-                due += self._period
-                if due < last:
-                    due = last + self._period
-            await asyncio.sleep(max(0.0, due - _clock()))
-            now = _clock()
-            debt += (now - last) * self._speed
-            last = now
-            if debt > MAX_CATCH_UP * self._speed:
-                self.lost_time += debt - MAX_CATCH_UP * self._speed
-                debt = MAX_CATCH_UP * self._speed
-            steps = min(round(debt / STEP), self._most_steps)
-            debt -= steps * STEP  # negative when the last step began early, by half of it at most
+    def _wait_for_turn(self) -> None:
+        """Set the timer to the next turn; at once while the world is behind."""
+        if self._debt < STEP:
+            # From turn to turn on the clock, not from a late one on: else some would make two steps, others none.
+            self._due += self._period
+            if self._due < self._last:
+                self._due = self._last + self._period
+        self._next_turn.set(self._due)
+
+    def _run(self) -> None:
+        """Make the turn that is due."""
+        now, speed = _clock(), self._speed
+        debt = self._debt + (now - self._last) * speed
+        self._last = now
+        if debt > MAX_CATCH_UP * speed:
+            self.lost_time += debt - MAX_CATCH_UP * speed
+            debt = MAX_CATCH_UP * speed
+        steps = min(round(debt / STEP), self._most_steps)
+        self._debt = debt - steps * STEP  # negative when the last step began early, by half of it at most
+        try:
             self._turn(now, steps)
+        except Exception as error:
+            assert self._stopped is not None, "it runs from the start on"
+            self._stopped.set_exception(error)
+            return
+        self._wait_for_turn()
 
     def advance(self, seconds: float) -> None:
         """Advance the simulated world by hand, before it has been started.

@@ -22,6 +22,9 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from anafi_mav.clock import Alarm
+from anafi_mav.sim import Simulator
+
 START = 1000.0
 """s: the monotonic clock at the start."""
 
@@ -31,13 +34,16 @@ EPOCH = 1_767_268_800.25
 LATE = 5e-7
 """s that a timer is later than asked for, unless it is the world's."""
 
-WORLD_TASK = "simulated world"
-"""Name of the task of `anafi_mav.sim.Simulator` that moves the drones."""
-
 PROBES = 3
 """Datagrams that travel before time moves: SYN, SYN-ACK and ACK each need the one before."""
 
 _now = START
+
+
+def is_worlds(callback: Callable[..., object]) -> bool:
+    """Whether a timer is the one that moves the drones of a simulator."""
+    alarm = getattr(callback, "__self__", None)
+    return isinstance(alarm, Alarm) and isinstance(getattr(alarm.call, "__self__", None), Simulator)
 
 
 def now() -> float:
@@ -99,8 +105,7 @@ class Loop(asyncio.SelectorEventLoop):
         return _now
 
     def call_at(self, when: float, callback: Callable[..., object], *args: Any, context: Any = None) -> Any:
-        task = asyncio.current_task(self)
-        if task is not None and task.get_name() == WORLD_TASK:
+        if is_worlds(callback):
             self.world_timers += 1
         else:
             when += LATE

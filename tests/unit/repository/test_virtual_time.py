@@ -8,7 +8,11 @@ import threading
 from collections.abc import Iterator
 
 import pytest
-from support.virtual_time import LATE, WORLD_TASK, Loop
+from support.virtual_time import LATE, Loop
+from support.world import loopback
+
+from anafi_mav.sim import DroneSpec, Simulator
+from anafi_mav.sim.fleet import TURN
 
 
 @pytest.fixture
@@ -35,22 +39,14 @@ def test_clock_stands_still_while_callbacks_compute(loop: Loop) -> None:
 
 
 def test_world_timer_precedes_others_of_the_same_instant(loop: Loop) -> None:
-    order: list[str] = []
+    async def time_of_the_world() -> float:
+        async with Simulator([DroneSpec(address=loopback())]) as simulator:
+            seen = loop.create_future()
+            loop.call_at(loop.time() + TURN + TURN, lambda: seen.set_result(simulator.drones[0].time))
+            return await seen
 
-    async def tick(name: str) -> None:
-        await asyncio.sleep(1.0)
-        order.append(name)
-        await asyncio.sleep(0)  # what follows from it
-        order.append(name)
-
-    async def both() -> None:
-        other = loop.create_task(tick("other"))
-        world = loop.create_task(tick("world"), name=WORLD_TASK)
-        await asyncio.gather(other, world)
-
-    loop.run_until_complete(both())
-    assert order == ["world", "world", "other", "other"]
-    assert loop.world_timers == 1
+    assert loop.run_until_complete(time_of_the_world()) == pytest.approx(2.0 * TURN)
+    assert loop.world_timers == 3
 
 
 def test_datagram_arrives_before_time_moves(loop: Loop) -> None:
