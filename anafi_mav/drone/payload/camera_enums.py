@@ -217,6 +217,7 @@ WordT = TypeVar("WordT", bound=enum.Enum)
 ParrotT = TypeVar("ParrotT", bound=OpenEnum)
 
 
+@lru_cache(maxsize=512, typed=True)
 def bare(value: OpenEnum) -> str:
     """Parrot's name of a value without what belongs to its list."""
     name = value.name

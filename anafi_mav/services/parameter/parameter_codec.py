@@ -38,20 +38,14 @@ class ParamType(enum.Enum):
     def __init__(self, mav: int, code: str, packed: int) -> None:
         self.mav = mav
         self.packed = packed
-        self._struct = struct.Struct("<" + code)
-
-    @property
-    def whole(self) -> bool:
+        self.whole = code != "f"
         """Values are integers."""
-        return self is not ParamType.REAL32
-
-    @property
-    def limits(self) -> tuple[float, float]:
-        """The smallest and the largest value that the type can hold."""
-        if not self.whole:
-            return -math.inf, math.inf
+        self._struct = struct.Struct("<" + code)
         bits = 8 * self._struct.size
-        return (0, 2**32 - 1) if self is ParamType.UINT32 else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+        self.limits: tuple[float, float] = (-math.inf, math.inf)
+        """The smallest and the largest value that the type can hold."""
+        if self.whole:
+            self.limits = (0, 2**bits - 1) if code == "I" else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
 
     def to_bytes(self, value: float) -> bytes:
         """The value as it lies in memory, little endian.

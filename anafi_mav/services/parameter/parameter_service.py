@@ -239,8 +239,11 @@ class ParameterService(Service):
             self._serial = self.host.drone.identity.serial
             self.host.vehicle.settings = FlightSettings()  # speeds and hand launch were set for another aircraft
         self._restore()
+        is_first = not self._lists
         if is_other:
             self._make_lists()
+        if is_first:
+            return  # the new lists hold the values of now
         for name, listed in self._lists.items():
             self._tell(name, listed.changed(range(len(listed))))
 
