@@ -125,6 +125,8 @@ class FabricEndpoint(Endpoint):
         self.claims = SystemClaims(self._connection.session_text, wanted)
         self._is_listed = False
         """True while all tokens that exist are known, as far as the router has named them."""
+        self._first_look: asyncio.Task[None] | None = None
+        """Looks at the router's tokens before the first claim."""
         self._stations: dict[str, _Station] = {}
         self._places = StationPlaces(url.options.max_clients)
         self._silent: set[str] = set()
@@ -154,6 +156,7 @@ class FabricEndpoint(Endpoint):
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
+        self._end_first_look()
         for station in tuple(self._stations):
             self._drop(station)
         self._close_lane()
@@ -212,9 +215,7 @@ class FabricEndpoint(Endpoint):
         elif isinstance(arrival, StateQuery):
             self._answer(arrival)
         elif isinstance(arrival, TokensListed):
-            self._is_listed = True
-            self._listed.set()
-            self._claim()
+            self._begin_claims()
         elif isinstance(arrival, LinkChange):
             self._linked(arrival)
 
@@ -227,7 +228,37 @@ class FabricEndpoint(Endpoint):
         else:
             logger.warning("%s: %s", self.url, change.problem)
             self.counters["reopened"] += 1
+            self._end_first_look()
             self._is_listed = False
+
+    def _begin_claims(self) -> None:
+        """Claim from now on, and the first time only after a look that finds all tokens.
+
+        The list that zenoh gives a new session can lack the token of a gateway that has had an id for long. Of two
+        claims that seem simultaneous the lower session id wins, so a newcomer that did not see it could take the id.
+        """
+        if not self._connection.is_up:
+            return  # a list of before: another follows the next link
+        if self.claims.is_settled or self.parsed.options.listen:
+            self._allow_claims()
+        elif self._first_look is None:
+            self._first_look = asyncio.get_running_loop().create_task(self._look_first())
+
+    async def _look_first(self) -> None:
+        if not await self._see_all_tokens():
+            logger.warning("%s: the router does not name all system ids that are held", self.url)
+        self._first_look = None
+        self._allow_claims()
+
+    def _end_first_look(self) -> None:
+        if self._first_look is not None:
+            self._first_look.cancel()
+            self._first_look = None
+
+    def _allow_claims(self) -> None:
+        self._is_listed = True
+        self._listed.set()
+        self._claim()
 
     def _token(self, change: TokenChange) -> None:
         key = self._connection.keys.parse(change.key)
