@@ -252,6 +252,8 @@ class Drone:
                     await startup_queries.ask(
                         self._commander, self.name, [*self.camera.details(), *self.storage.details()]
                     )
+                if (reason := self._end_behind_controller()) is not None:
+                    raise LinkLost(reason)
             except BaseException:
                 await self.close()
                 raise
@@ -318,6 +320,9 @@ class Drone:
     def _resume(self, session: ControllerSession) -> bool:
         """Go on with a session that was silent. False: it is still silent, or has ended."""
         if session is not self._fading or session.silent or session.lost.done():
+            return False
+        if (reason := self._end_behind_controller()) is not None:  # reported during the silence
+            session.end(reason)
             return False
         self._fading = None
         self._session = session
@@ -492,13 +497,21 @@ class Drone:
 
     def _controller_says(self, message: Message, now: float) -> None:
         """End the connection when the Skycontroller has lost its drone, or has another one."""
-        state = self.controller.state
-        if not self._complete or state.link is None or self._session is None:
+        if not self._complete or self._session is None:
             return
+        if (reason := self._end_behind_controller()) is not None:
+            self._session.end(reason)
+
+    def _end_behind_controller(self) -> str | None:
+        """Return why a connection through the Skycontroller is at its end; None: it goes on."""
+        state = self.controller.state
+        if state.link is None:
+            return None
         if state.link != Connection.CONNECTED:
-            self._session.end(f"the Skycontroller lost the drone: {spoken(state.link)}")
-        elif state.drone_serial and self._announced_serial not in ("", state.drone_serial):
-            self._session.end(f"the Skycontroller is connected to another drone, {state.drone_serial}")
+            return f"the Skycontroller lost the drone: {spoken(state.link)}"
+        if state.drone_serial and self._announced_serial not in ("", state.drone_serial):
+            return f"the Skycontroller is connected to another drone, {state.drone_serial}"
+        return None
 
     def _plan_says(self, message: common.MavlinkFilePlayingStateChanged, now: float) -> None:
         self.piloting.on_plan(message)

@@ -470,6 +470,37 @@ def sources(device: ScriptedDevice) -> list[Source]:
     return [m.source for m in device.got(skyctrl.SetPilotingSource)]
 
 
+def connected_to(serial: str) -> drone_manager.ConnectionState:
+    return drone_manager.ConnectionState(Connection.CONNECTED, serial, 0x0914, "ANAFI")
+
+
+async def test_drone_exchanged_in_a_silence_has_a_new_connection() -> None:
+    """The Skycontroller's report of another drone is the first that is heard again."""
+    other = "PI040416DA9H000002"
+    async with behind() as (drone, device):
+        device.script[skyctrl.AllStates] = lambda _: [connected_to(other), skyctrl.AllStatesChanged()]
+        await asyncio.sleep(0.1)  # until all states are acknowledged, and not repeated
+        device.session.mute = True
+        await asyncio.wait_for(asyncio.shield(drone.lost), 10.0)
+        attempt = asyncio.create_task(drone.connect())
+        await asyncio.sleep(0.1)  # until the ping that the silence began with is lost, too
+        device.session.mute = False
+        device.say(connected_to(other))
+        await attempt
+        assert drone.identity.serial == other
+        assert len(device.sessions) == 2
+
+
+async def test_drone_exchanged_while_its_states_are_read_is_not_connected() -> None:
+    async with behind() as (drone, device):
+        await drone.close()
+        states = device.script[common.AllStates]
+        device.script[common.AllStates] = lambda m: [connected_to("PI040416DA9H000002"), *states(m)]
+        with pytest.raises(LinkLost, match="another drone, PI040416DA9H000002"):
+            await drone.connect()
+        assert not drone.connected
+
+
 def under_way(command: ardrone3.MoveTo) -> list[Message]:
     fields = (getattr(command, name) for name in command.__struct_fields__)
     return [ardrone3.MoveToChanged(*fields, ardrone3.MoveToStatus.RUNNING)]
