@@ -242,9 +242,13 @@ class Controller(Element[ControllerState]):
             deliveries[-1].add_done_callback(self._is_back)
 
     def _is_back(self, delivery: asyncio.Future[None]) -> None:
-        """The Skycontroller has received what gives sticks and source back."""
-        if not self.taken:
+        """The Skycontroller has received what gives sticks and source back, or an Emergency took its place."""
+        if self.taken:
+            return
+        if delivery.exception() is None:
             self._stand_by(())
+        else:
+            self._watching.set_in(LOOK_EVERY)
 
     def _hand_back(self) -> tuple[Message, ...]:
         """Commands that give sticks and source back; what is grabbed by `grab` stays so."""
@@ -306,6 +310,9 @@ class Controller(Element[ControllerState]):
     def _look(self) -> None:
         """Is the motion over?"""
         if self._kept:
+            return
+        if not self.taken:  # the Skycontroller has not received that
+            self._send_back()
             return
         now = loop_time()
         if self._moving():

@@ -470,6 +470,20 @@ def sources(device: ScriptedDevice) -> list[Source]:
     return [m.source for m in device.got(skyctrl.SetPilotingSource)]
 
 
+async def test_motor_cut_leaves_the_sticks_to_the_pilot() -> None:
+    """An Emergency takes the place of what waits to be sent, also of what gives the sticks back."""
+    async with behind() as (drone, device):
+        device.script[ardrone3.Emergency] = lambda _: [ardrone3.FlyingStateChanged(FlyingState.EMERGENCY)]
+        drone.piloting.pilot(FORWARD)
+        await drone.expect(skyctrl.PilotingSource, lambda m: m.source == Source.CONTROLLER)
+        drone.controller.give_back()
+        await drone.piloting.emergency()
+        await device.until(skyctrl.SetPilotingSource, 2)
+        assert sources(device)[-1] is Source.SKY_CONTROLLER
+        await device.until(mapper.Grab, 2)
+        assert device.got(mapper.Grab)[-1].axes == 0
+
+
 def connected_to(serial: str) -> drone_manager.ConnectionState:
     return drone_manager.ConnectionState(Connection.CONNECTED, serial, 0x0914, "ANAFI")
 
