@@ -11,6 +11,7 @@ from support.fault_scenarios import ACCEPTED, FAILED, GOTO, LAND_CMD, RTL, goto,
 from support.world import HOME, RETURN, World, world
 
 from anafi_mav import geo
+from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.sim.world.quirks import Quirk
 
 
@@ -161,6 +162,16 @@ async def test_handshake_succeeds_once_the_kept_session_has_ended() -> None:
         (up,) = (e.t for e in w.drone.log if e.kind == "session" and e.name == "up" and e.t > began)
         assert 7.5 <= up - began <= 12.0
         await w.client.heartbeat(lambda beat: True, timeout=5.0)
+
+
+async def test_drone_that_is_not_heard_but_hears_the_gateway_notices_the_loss() -> None:
+    """Its failsafe begins as if neither heard the other: pings would keep the session, and the move, alive."""
+    async with world(speed=1.0, quirks=(Quirk.HANDSHAKE_REFUSED_8S.value,)) as w:
+        await w.take_off()
+        await flown_north(w)
+        w.drone.faults.down = Impairment(loss=1.0)
+        await w.drone.wait_log(lambda e: e.kind == "session" and e.name == "lost", 15.0)
+        await w.drone.wait_log(lambda e: w.drone.pose.ground_speed < 0.2, 10.0)
 
 
 @pytest.mark.parametrize("generation", [3, 4])

@@ -96,7 +96,7 @@ class Session(asyncio.DatagramProtocol):
         Arguments: the token of `send`; True when received, False when dropped after all retries (version 1).
         """
         self.on_silent: Callable[[str], None] = lambda reason: None
-        """Called when the peer is not heard any more; nothing but pings and answers is sent until it speaks."""
+        """Called when the peer is not heard any more; nothing but answers is sent until it speaks."""
         self.on_speaks: Callable[[], None] = lambda: None
         """Called when it is heard again, before its messages."""
         self._endpoint: asyncio.DatagramTransport | None = None

@@ -123,7 +123,7 @@ class Garbage(msgspec.Struct, frozen=True):
 class Silent(msgspec.Struct, frozen=True):
     """The peer is not heard any more.
 
-    Commands are dropped until it speaks; only pings and answers are sent.
+    Commands are dropped until it speaks, and only answers are sent.
     """
 
     reason: str
@@ -188,7 +188,8 @@ class Transport:
 
     A ping goes out when nothing was received for `ping_after` seconds, and again every `ping_after`. The link is
     down after three unanswered pings, or when nothing was received for `silence_limit` seconds. With `fades` it is
-    silent then: everything queued is dropped, and the session goes on when the peer speaks again.
+    silent then: everything queued is dropped, and the session goes on when the peer speaks again. Until then no pings
+    are sent: a peer that hears us, though we do not hear it, has to notice the loss, or its failsafe would never begin.
 
     Call `outgoing` after every `receive`, `send`, `cancel` and `expire`.
     """
@@ -545,9 +546,9 @@ class Transport:
             return None
         if self._pending:
             return self._last_received
-        deadline = self._ping_due
+        deadline = _NEVER
         if not self._silent:
-            deadline = min(deadline, self._last_received + self._silence_limit)
+            deadline = min(self._ping_due, self._last_received + self._silence_limit)
         for queue in self._queues.values():
             if queue.due < deadline:
                 deadline = queue.due
@@ -564,30 +565,28 @@ class Transport:
             if queue.flight and now >= queue.due:
                 self._give_up(queue)
         events = self._take_pending()
+        if self._silent:
+            return events
         late = now - self._ping_due
         if late >= STALL:
             # The host stalled, and what arrived meanwhile may not have been read yet: that is no silence of the peer's.
             self._last_received += late
         silence = now - self._last_received
-        if self._silent:
-            if now >= self._ping_due:
-                self._send_ping(now)
-        elif silence >= self._silence_limit:
-            self._lose(f"nothing received for {silence:.1f} s", now, events)
+        if silence >= self._silence_limit:
+            self._lose(f"nothing received for {silence:.1f} s", events)
         elif now >= self._ping_due:
             if self._unanswered >= MAX_UNANSWERED_PINGS:
-                self._lose(f"{self._unanswered} pings unanswered, nothing received for {silence:.1f} s", now, events)
+                self._lose(f"{self._unanswered} pings unanswered, nothing received for {silence:.1f} s", events)
             else:
                 self._send_ping(now)
         return events
 
-    def _lose(self, reason: str, now: float, events: list[Event]) -> None:
+    def _lose(self, reason: str, events: list[Event]) -> None:
         """The peer is not heard any more."""
         if not self._fades:
             self._go_down(reason, events)
             return
         self._silent = True
-        self._send_ping(now)
         events.append(Silent(reason))  # first: that the link is silent explains the others
         self.abandon("the link is silent")
         events.extend(self._take_pending())
