@@ -18,11 +18,13 @@ from support.fault_scenarios import (
     REJECTED,
     SET_MODE,
     TAKEOFF_CMD,
+    another_controller,
     heard,
     until,
     watched,
 )
 from support.mav import NAN, Client
+from support.params import write
 from support.world import ARMED, World, world
 
 from anafi_mav.arsdk.messages import ardrone3
@@ -139,6 +141,25 @@ async def test_disarm_stops_a_hand_launch() -> None:
         await w.client.wait("EXTENDED_SYS_STATE", lambda m: m.landed_state == dialect.MAV_LANDED_STATE_TAKEOFF, since=0)
         assert (await w.client.command(*DISARM)).result == ACCEPTED
         assert flown(w)[-1] == "landed"
+
+
+@pytest.mark.parametrize("command", [(LAND_CMD,), DISARM])
+@pytest.mark.parametrize("is_own", [True, False])
+async def test_motors_in_a_hand_that_ignore_a_stop_as_they_ramp_up_are_stopped(
+    command: tuple[int, ...], is_own: bool
+) -> None:
+    async with world(speed=1.0, quirks=(Quirk.RAMPING_IGNORES_LANDING.value,)) as w:
+        if is_own:
+            await write(w.client, "ANF_HAND_LAUNCH", 1, dialect.MAV_PARAM_TYPE_INT32)
+            w.client.send_command(ARM, 1)
+        else:
+            another_controller(w, ardrone3.UserTakeOff(1))
+        await w.client.wait("EXTENDED_SYS_STATE", lambda m: m.landed_state == dialect.MAV_LANDED_STATE_TAKEOFF)
+        mark = w.client.mark()
+        w.client.send_command(*command)
+        await state(w, "landed")
+        assert (command[0], ACCEPTED) in await until(w.client, mark, 2 if is_own else 1)
+        assert flown(w) == ["motor_ramping", "usertakeoff", "landed"]
 
 
 @pytest.mark.parametrize("air", [Impairment(), BAD_AIR])

@@ -232,6 +232,8 @@ class Motors:
         def judge(message: ardrone3.FlyingStateChanged) -> bool | None:
             if message.state in TAKEN_OFF:
                 send()
+            elif message.state == FlyingState.USERTAKEOFF:  # it may have ignored this one as its motors ramped up
+                self._commander.send_stop_if_connected(ardrone3.UserTakeOff(0))
             return True if message.state in _LANDING else None
 
         answer = self._commander.expect((ardrone3.FlyingStateChanged,), judge)
@@ -264,6 +266,8 @@ class Motors:
                 self._commander.send_stop(ardrone3.Landing())
                 if cut is not None:  # from here on it would fall
                     self._commander.withdraw(cut, CommandRejected("the drone has left the ground"))
+            elif message.state == FlyingState.USERTAKEOFF:  # it may have ignored this one as its motors ramped up
+                self._commander.send_stop_if_connected(ardrone3.UserTakeOff(0))
             return True if message.state in MOTORS_OFF else None
 
         answer = self._commander.expect((ardrone3.FlyingStateChanged,), judge)
