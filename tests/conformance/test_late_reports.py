@@ -34,6 +34,7 @@ from support.world import World, world
 
 from anafi_mav.arsdk.messages import ardrone3, common, rth
 from anafi_mav.sim.world.faults import Impairment
+from anafi_mav.sim.world.quirks import Quirk
 
 ROI, YAW, ALTITUDE = (
     dialect.MAV_CMD_DO_SET_ROI_LOCATION,
@@ -145,6 +146,28 @@ async def test_stop_ends_a_takeoff_of_another_controller_that_is_not_reported_ye
         ack = await w.client.command(*command)
         assert ack.result == ACCEPTED
         await flies(w, "landed", now())
+
+
+@pytest.mark.parametrize("command", [(LAND_CMD,), (ARM, 0), (ARM, 0, FORCED)])
+async def test_stop_ends_a_takeoff_that_ignores_the_landing_as_motors_ramp_up(command: tuple[int, ...]) -> None:
+    async with world(speed=1.0, quirks=(Quirk.RAMPING_IGNORES_LANDING.value,)) as w:
+        w.drone.faults.late = {FLYING: 0.3}
+        another_controller(w, ardrone3.TakeOff())
+        assert (await w.client.command(*command)).result == ACCEPTED
+        await flies(w, "landed")
+        assert w.drone.pose.up < 0.5
+        await watched(2.5)
+        another_controller(w, ardrone3.TakeOff())  # a flight that was not begun when the stop was commanded
+        await watched(5.0)
+        assert flown(w)[-1] == "hovering"
+
+
+async def test_takeoff_just_after_a_landing_was_commanded_on_the_ground_is_flown() -> None:
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(LAND_CMD)).result == ACCEPTED
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=4.0, timeout=15.0)).result == ACCEPTED
+        await w.at_height(4.0)
 
 
 async def test_land_is_sent_while_the_end_of_a_landing_is_not_reported_yet() -> None:

@@ -31,6 +31,10 @@ LAND_MEMORY = 3.0
 """s after a Landing was withdrawn in which the drone may land all the same, and after a landing was to be ended in
 which the reported landing may be over."""
 
+STANDS_FOR = 2.0
+"""s after a drone that is said to stand was commanded to land in which motors that start are against that: the take-off
+of another controller was not reported yet."""
+
 STOP_MOTORS_TIMEOUT = 15.0
 """s until propellers that turn near the ground stand still: the way down from half a metre is in it."""
 
@@ -72,21 +76,26 @@ class Motors:
         """Until when a Landing that was withdrawn may be reported to have begun."""
         self._doubtful_until = -math.inf
         """Until when the reported LANDING may be over: its end was asked for."""
+        self._stands_until = -math.inf
+        """Until when motors that no newer launch of ours has started are to stop again."""
 
     def link_lost(self) -> None:
         """Commands of before do not count for the next connection."""
-        self._may_land_until = self._doubtful_until = -math.inf
+        self._may_land_until = self._doubtful_until = self._stands_until = -math.inf
 
     def on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
-        """Stop motors that a withdrawn command has started after a touchdown."""
+        """Stop motors that start after a landing was commanded, by a withdrawn command or by another controller."""
         if message.state != FlyingState.LANDING:
             self._doubtful_until = -math.inf
         sent = self._sent.attribute(message, now)
-        if sent is None or not self._sent.is_unwanted(sent, now):
-            return
-        if message.state == FlyingState.MOTOR_RAMPING:
-            self._commander.send_stop_if_connected(ardrone3.UserTakeOff(0))
-        self._commander.send_stop_if_connected(ardrone3.Landing())
+        # What ramps up may ignore the Landing (`LAND_INSISTS`): the state that follows is answered as well.
+        is_against_landing = now < self._stands_until and not self.has_launched and message.state in TURNING | TAKEN_OFF
+        if is_against_landing and message.state in TURNING:
+            self._stands_until = now + STANDS_FOR
+        if is_against_landing or (sent is not None and self._sent.is_unwanted(sent, now)):
+            if message.state in TURNING:
+                self._commander.send_stop_if_connected(ardrone3.UserTakeOff(0))
+            self._commander.send_stop_if_connected(ardrone3.Landing())
 
     def landing_doubtful(self) -> None:
         """The landing is about to be ended: until a state is reported, LANDING proves nothing."""
@@ -193,6 +202,7 @@ class Motors:
         if self._lands and not self.about_to_fly:
             # What is reported may be old: another controller's take-off, or its end of a landing, is not reported yet.
             self._commander.deliver(ardrone3.Landing())
+            self._note_standing()
             return
         # Level at once, then nothing, from here on and not from the drone's answer on: a positive gaz would cancel
         # the landing.
@@ -203,11 +213,17 @@ class Motors:
             if self.about_to_fly:
                 await self._catch_take_off(timeout)
             if self._lands:
+                self._note_standing()
                 return
             self._end_hand_launch()
             await self._insist(timeout)
         finally:
             self._sticks.landings_asked -= 1
+
+    def _note_standing(self) -> None:
+        """A landing was commanded that has nothing to do, as far as the drone has reported."""
+        if self._flight.state.flying == FlyingState.LANDED:
+            self._stands_until = loop_time() + STANDS_FOR
 
     @property
     def _lands(self) -> bool:
