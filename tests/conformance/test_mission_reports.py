@@ -10,7 +10,17 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import LAND_CMD, PX4_HOLD, PX4_OFFBOARD, SET_MODE, another_controller, until, watched
+from support.fault_scenarios import (
+    LAND_CMD,
+    PX4_HOLD,
+    PX4_OFFBOARD,
+    SET_MODE,
+    another_controller,
+    on_command,
+    results,
+    until,
+    watched,
+)
 from support.fault_scenarios import RTL as RTL_CMD
 from support.missions import (
     ACTIVE,
@@ -45,6 +55,7 @@ ARM, START = dialect.MAV_CMD_COMPONENT_ARM_DISARM, dialect.MAV_CMD_MISSION_START
 PLAYING = common.MavlinkFilePlayingStateChanged.NAME
 EXECUTED = common.MissionItemExecuted.NAME
 PX4_MISSION = (1, 4, 4)
+CHOOSE = dialect.MAV_CMD_DO_SET_MISSION_CURRENT
 WAIT = Item(dialect.MAV_CMD_NAV_DELAY, 0.0, 0.0, p1=5.0, frame=2)
 
 
@@ -151,6 +162,37 @@ async def test_item_that_is_chosen_while_a_start_prepares_is_flown(
         assert ack.result == ACCEPTED
         await state(w, COMPLETE, since=mark, timeout=60.0)
         assert 1 not in reached(w, mark)
+
+
+async def test_present_item_that_is_chosen_again_replaces_another_choice(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first choice is still being uploaded while the drone flies on to the present item."""
+    async with world(speed=1.0, web=True) as w:
+        await put(w, [takeoff(6.0), *(way(60.0, 20.0 * number, 6.0) for number in range(3))])
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=0)
+        take_time(monkeypatch)
+        mark = w.client.mark()
+        w.client.send_command(CHOOSE, 3)
+        await asyncio.sleep(0.3)  # of the client, between its commands
+        w.client.send_command(CHOOSE, 1)
+        assert (await until(w.client, mark, 2))[1] == (CHOOSE, ACCEPTED)
+        assert (await w.client.wait("MISSION_CURRENT")).seq == 1
+
+
+async def test_choice_of_the_item_of_a_start_that_fails_is_kept() -> None:
+    async with world(speed=1.0, web=True) as w:
+        other = await w.connect(sysid=240)
+        await w.take_off(6.0)
+        await put(w, CORNERS)
+        w.drone.faults.unreported = frozenset({PLAYING})
+        w.client.send_command(CHOOSE, 0)
+        w.client.send_command(SET_MODE, *PX4_MISSION)
+        mark, begun = w.client.mark(), on_command(w, common.Start.NAME, lambda: None)
+        w.client.send_command(CHOOSE, 2)
+        await begun
+        assert (await other.command(CHOOSE, 2, timeout=60.0)).result == ACCEPTED
+        assert (CHOOSE, dialect.MAV_RESULT_FAILED) in results(w.client, mark)
+        assert (await w.client.wait("MISSION_CURRENT")).seq == 2
 
 
 @pytest.mark.parametrize("by", ["start", "current"])

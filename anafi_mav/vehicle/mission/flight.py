@@ -199,14 +199,18 @@ class MissionFlight(PlainTask):
         Without effect on the item that is flown: clients repeat the request, and each start stops the drone first.
         """
         await self.storing.over()
+        if (begun := self._beginning) is not None and begun.item == item and not begun.jumps:
+            self.outlet.mission_changed()  # the answer to a message
+            await self._start_over()
+            if self.machine.flying:
+                return  # from this item on: another choice would have cancelled this one
         if not self.there:
             raise Refused(texts.CURRENT_ITEM, texts.NO_MISSION)
         if not 0 <= item < len(self.machine.mission.items):
             raise Refused(texts.CURRENT_ITEM, texts.NO_SUCH_ITEM.fill(number=item + FIRST_LABEL), lasting=True)
         begun = self._beginning
-        begins_there = begun is not None and begun.item == item and not begun.jumps
-        if self.machine.is_at(item) or begins_there:
-            self.outlet.mission_changed()  # the answer to a message
+        if begun is None and self.machine.is_at(item):
+            self.outlet.mission_changed()
             return
         if self.machine.flying or begun is not None:
             await self.engage(by, item)
