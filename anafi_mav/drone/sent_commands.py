@@ -231,6 +231,10 @@ class SentCommands:
         sent = (one for slot in STARTS_MOTORS for one in self._slots[slot])
         return any(one.may_begin(now) and not one.is_ignored(now) for one in sent)
 
+    def has_failed_launch(self, now: float) -> bool:
+        """Return True while the drone may still execute a launch that it has ignored, as far as is known."""
+        return any(one.may_begin(now) and one.is_ignored(now) for one in self._slots[Slot.LAUNCH])
+
     def is_unwanted(self, sent: SentCommand, now: float) -> bool:
         """Return True when the effect of this command, which an event has reported, is to be undone.
 

@@ -772,6 +772,8 @@ class Vehicle(Aircraft):
         if not self.on_ground:
             self.takeoff.left_ground()
             if before in ON_GROUND:
+                if self.drone.piloting.may_launch_late:  # its command was answered with FAILED
+                    self.text(Severity.CRITICAL, texts.TAKEOFF_LATE)
                 if not self.drone.piloting.has_launched:
                     self.control.lose(texts.FOREIGN_TAKEOFF)  # a mode chosen before was not meant for this flight
                 self.offboard.left_ground()

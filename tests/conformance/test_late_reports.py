@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -160,6 +161,24 @@ async def test_stop_ends_a_takeoff_that_ignores_the_landing_as_motors_ramp_up(co
         another_controller(w, ardrone3.TakeOff())  # a flight that was not begun when the stop was commanded
         await watched(5.0)
         assert flown(w)[-1] == "hovering"
+
+
+async def test_takeoff_after_its_command_has_failed_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with world(speed=1.0) as w:
+        receive = w.drone.firmware.receive
+
+        def late(message: Any, at: float) -> None:
+            if isinstance(message, ardrone3.TakeOff):
+                asyncio.get_running_loop().call_later(6.0, receive, message, at)
+            else:
+                receive(message, at)
+
+        monkeypatch.setattr(w.drone.firmware, "receive", late)
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        ack = await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0, timeout=15.0)
+        assert ack.result == FAILED
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Takeoff begun late, or by another controller")
+        assert (await w.client.command(LAND_CMD, timeout=15.0)).result == ACCEPTED
 
 
 async def test_takeoff_just_after_a_landing_was_commanded_on_the_ground_is_flown() -> None:

@@ -131,6 +131,11 @@ class Motors:
         return executed or self._sent.has_started_motors(loop_time())
 
     @property
+    def may_launch_late(self) -> bool:
+        """True when a launch of ours that has failed may be what starts the motors now."""
+        return not self.has_launched and self._sent.has_failed_launch(loop_time())
+
+    @property
     def rises(self) -> bool:
         """True while the drone starts its motors or rises to its first hover, by a take-off of ours."""
         return self.has_launched and self._flight.state.flying in _RISING

@@ -156,6 +156,14 @@ class Piloting(PilotingSettings):
         return self._motors.has_launched
 
     @property
+    def may_launch_late(self) -> bool:
+        """True when a launch of this program that has failed may be what starts the motors now.
+
+        So may another controller be: no event names the command.
+        """
+        return self._motors.may_launch_late
+
+    @property
     def rises(self) -> bool:
         """True from the start of the motors to the first hover, by a take-off of this program."""
         return self._motors.rises
