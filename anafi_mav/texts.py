@@ -372,6 +372,7 @@ RETURN_HOVERS_REASON = Template("Return ended, hovering {at}: {reason}", at="at 
 AT_HOME = Reason("at home")
 AT_HEIGHT = ReasonTemplate("at {height:.0f} m", height=9999)
 RETURN_ABORTED = Template("Return aborted by system {system}: {reason}", system=255, reason="battery too hot")
+RETURN_STOPPED = Template("Return stopped by a command: {reason}", reason="battery too hot")
 NO_AUTOMATIC_RETURN = Template("No automatic return: battery {percent} %", percent=100)
 HOME_HARDLY_REACHABLE = OperatorText("Home hardly reachable: land now")
 HOME_UNREACHABLE = OperatorText("Home not reachable: land now")

@@ -1,4 +1,4 @@
-"""Repeated reminders to clients after one of them has ended the drone's own return.
+"""Repeated reminders to clients after the drone's own return has been ended.
 
 The drone does not return a second time for the same reason, so its reason is sent to the pilot at once and then at
 intervals.
@@ -35,9 +35,10 @@ _LAND_NOW = {
 
 
 class AbortedReturn:
-    """One return of the drone's own that a client has ended."""
+    """One return of the drone's own that was ended."""
 
-    def __init__(self, system: int, reason: ReturnReason | None) -> None:
+    def __init__(self, system: int | None, reason: ReturnReason | None) -> None:
+        """`system` of the client that has ended it; None: something else has, as a plan's start that crossed it."""
         self._system = system
         self._reason = reason
         self._next = -math.inf
@@ -63,7 +64,10 @@ class AbortedReturn:
     def reports(self, vehicle: Aircraft) -> list[OperatorText]:
         """Return the texts for the present state of the drone."""
         reason = "unknown" if self._reason is None else _SHORT.get(self._reason, spoken(self._reason))
-        said = [texts.RETURN_ABORTED.fill(system=self._system, reason=reason)]
+        if self._system is None:
+            said = [texts.RETURN_STOPPED.fill(reason=reason)]
+        else:
+            said = [texts.RETURN_ABORTED.fill(system=self._system, reason=reason)]
         if self._reason in _BATTERY:
             percent = vehicle.drone.battery.state.percent
             said.append(texts.NO_AUTOMATIC_RETURN.fill(percent="?" if percent is None else percent))

@@ -40,7 +40,7 @@ from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.aborted_return import AbortedReturn
 from anafi_mav.vehicle.base.aircraft import Aircraft, CommandedSpeeds
 from anafi_mav.vehicle.base.bounds import check_height
-from anafi_mav.vehicle.base.control_machine import DroneAct, State
+from anafi_mav.vehicle.base.control_machine import REST, DroneAct, State
 from anafi_mav.vehicle.base.flight_task import LAND, MOTOR_CUT, FlightTask, Hover, Needs, TaskRules, end_of_descent
 from anafi_mav.vehicle.base.flying import AIRBORNE, LANDING, ON_GROUND, TAKING_OFF
 from anafi_mav.vehicle.base.geo_point import GeoPoint
@@ -167,6 +167,8 @@ class LinkFacts:
     """The mode that a client last asked for by name or number."""
     lands_next: tuple[int, float] | None = None
     """A return has finished that the drone ends by landing: the epoch then, and until when it is due."""
+    own_return: ReturnReason | None = None
+    """Reason of the drone's own return under way."""
 
 
 @dataclass(frozen=True)
@@ -179,7 +181,7 @@ class FlightFacts:
     landing_ended_at: float = -math.inf
     """When a client last ended a landing (s)."""
     aborted_return: AbortedReturn | None = None
-    """The return of the drone's own that a client has ended, while that has to be repeated to all clients."""
+    """The return of the drone's own that was ended, while that has to be repeated to all clients."""
 
 
 class Vehicle(Aircraft):
@@ -708,6 +710,15 @@ class Vehicle(Aircraft):
         self.flight_facts = replace(self.flight_facts, aborted_return=aborted)
         aborted.report(self, self._clock.monotonic())
 
+    def _note_stopped_return(self, reason: ReturnReason) -> None:
+        """Let all clients be reminded of a return of the drone's own that no request under way has ended.
+
+        The start of a mission that crosses its beginning ends it, and another controller may.
+        """
+        aborted = AbortedReturn(None, reason)
+        if self.in_air and self.control.state in REST and aborted.lasts(self):
+            self.flight_facts = replace(self.flight_facts, aborted_return=aborted)
+
     def remind_of_aborted_return(self, now: float) -> None:
         """Remind every client of a return that one of them has ended, while its reason lasts."""
         aborted = self.flight_facts.aborted_return
@@ -879,7 +890,10 @@ class Vehicle(Aircraft):
         finished = home.rth == RthState.AVAILABLE and home.reason == ReturnReason.FINISHED
         lands = finished and home.ending == RthEndingBehavior.LANDING
         due = self.control.epoch, self._clock.monotonic() + LANDS_AFTER_RETURN
-        self.link_facts = replace(self.link_facts, lands_next=due if lands else None)
+        own, before = home.reason if home.returning_by_itself else None, self.link_facts.own_return
+        self.link_facts = replace(self.link_facts, lands_next=due if lands else None, own_return=own)
+        if before is not None and home.rth == RthState.AVAILABLE and home.reason == ReturnReason.STOPPED:
+            self._note_stopped_return(before)
         if self.returning:
             if self.mission.returns and not (self.returning_by_itself or self.return_end.active):
                 self.return_end.announce(self.return_end.command(), None)  # the mission's last item

@@ -46,6 +46,7 @@ from support.setpoints import VELOCITY_ONLY, local, streaming
 from support.world import ARMED, HOME, World, world
 
 from anafi_mav.arsdk.messages import ardrone3, common, piloting_style
+from anafi_mav.arsdk.messages.rth import StateReason
 from anafi_mav.drone.automatic.flight_plan import FlightPlan
 from anafi_mav.mavlink import dialect as newer
 from anafi_mav.sim.world.faults import Impairment
@@ -270,6 +271,22 @@ def sent(w: World) -> list[str]:
 
 def moves(entry: Any) -> bool:
     return not entry.name.endswith("PCMD") or any(entry.args[axis] for axis in ("roll", "pitch", "yaw", "gaz"))
+
+
+async def test_own_return_of_the_drone_that_the_start_of_a_mission_ends_is_reported() -> None:
+    async with world(speed=1.0, web=True) as w:
+        await w.take_off(8.0)
+        await put(w, CORNERS)
+        mark = w.client.mark()
+
+        def begin() -> None:  # just before the drone receives the start
+            assert w.drone.firmware.homing.request(StateReason.LOW_BATTERY, w.drone.firmware.pose, False)
+
+        begun = on_command(w, common.Start.NAME, begin)
+        assert (await w.client.command(SET_MODE, *PX4_MISSION, timeout=30.0)).result != ACCEPTED
+        await begun
+        await said(w, "Return stopped by a command: low battery", mark)
+        await said(w, "No automatic return: battery ", mark)
 
 
 async def test_mission_that_replaces_one_that_waits_for_arming_says_so() -> None:

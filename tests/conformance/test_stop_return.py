@@ -161,6 +161,7 @@ async def test_aborted_return_is_repeated_to_all_until_landed() -> None:
         assert await hold(other) == ACCEPTED
         for words in ("Return aborted by system 250: low battery", "No automatic return: battery ", "land now"):
             assert (await text(w.client, words, mark)).severity == CRITICAL
+        assert not [m for _, m in w.client.since(mark, "STATUSTEXT") if "Return stopped" in m.text]
         mark = w.client.mark()
         await text(w.client, "Return aborted by system 250: low battery", mark, timeout=20.0)
         await text(w.client, "No automatic return: battery ", mark)

@@ -45,8 +45,9 @@ def test_texts_about_a_continuing_landing_fit_one_statustext() -> None:
 
 
 @pytest.mark.parametrize("reason", [*ReturnReason, None])
-def test_texts_about_an_aborted_return_fit_one_text_each(reason: ReturnReason | None) -> None:
-    texts = AbortedReturn(255, reason).reports(aircraft())
+@pytest.mark.parametrize("system", [255, None])
+def test_texts_about_an_aborted_return_fit_one_text_each(system: int | None, reason: ReturnReason | None) -> None:
+    texts = AbortedReturn(system, reason).reports(aircraft())
     assert [text for text in texts if len(text) > CHUNK] == []
     assert texts[-1].endswith("land now")
 
