@@ -16,7 +16,7 @@ from support.flavours import both
 from support.ftp import ACK, NAK, TERMINATE, Ftp
 from support.gimbal import LEVEL, NAN, PITCHYAW, looks
 from support.mav import Client
-from support.params import write
+from support.params import read, send_set, write
 from support.plans import RALLY, begin_download, rally, upload
 from support.setpoints import COPTER_GUIDED, VELOCITY_ONLY, engage, local, motion, said, streaming, texts
 from support.world import HOLD, HOME, OPTIONS_PORT, World, world
@@ -499,3 +499,20 @@ async def test_parameter_of_a_secondary_is_written_and_its_flight_begins() -> No
         assert await result(student, ARM, 1) == ACCEPTED
         assert await result(student, TAKEOFF, x=0.0, y=0.0, z=5.0) == ACCEPTED
         assert await sent(student, control_request(student)) == FAILED
+
+
+async def test_parameter_write_that_waits_is_refused_once_another_station_is_the_operator() -> None:
+    async with world(options=[ON]) as w:
+        teacher, student = await stations(w, OPTIONS_PORT, OPTIONS_PORT)
+        before = await read(student, "ANF_RTH_ALT")
+        w.drone.faults.mute = True  # the first write waits for its answer
+        send_set(student, "ANF_RTH_ALT", 77.0, before.param_type)
+        await asyncio.sleep(0.2)
+        mark = student.mark()
+        send_set(student, "ANF_RTH_ALT", 88.0, before.param_type)
+        await asyncio.sleep(0.2)
+        assert await sent(teacher, control_request(teacher)) == ACCEPTED
+        w.drone.faults.mute = False
+        error = await student.wait("PARAM_ERROR", since=mark)
+        assert error.error == own.MAV_PARAM_ERROR_PERMISSION_DENIED
+        assert (await read(teacher, "ANF_RTH_ALT")).param_value == 77.0

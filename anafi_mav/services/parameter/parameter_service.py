@@ -439,6 +439,9 @@ class ParameterService(Service):
         before = listed.changes[index]
         lock = self._locks.setdefault(parameter.native or parameter.name, asyncio.Lock())
         async with lock:
+            if self.host.change_objection(inbound) is not None:  # another station has become the operator meanwhile
+                self._deny(inbound)
+                return
             try:
                 await parameter.write(self.host, value)
             except AnafiMavError as error:
