@@ -86,6 +86,9 @@ HANDSHAKE_AFTER = 4.0
 """s of silence before the first new handshake. libarsdk keeps a silent session for 8 s, and an earlier handshake could
 throw out one that was only fading."""
 
+UNHEARD_FOR = 4.0
+"""s for which a drone that is not heard is sent what ends its motion, and gives a Skycontroller's pilot the sticks."""
+
 CONTROLLER_TIMEOUT = 5.0
 """s that a Skycontroller may take to find its drone.
 
@@ -340,14 +343,22 @@ class Drone:
         A flight plan, a landing and a return are not stopped.
         """
         due, self._hover_due = self._hover_due, False
-        piloting = self.piloting.state
-        free = piloting.flying in (FlyingState.HOVERING, FlyingState.FLYING) and not self.home.state.returning
-        if due and free and piloting.plan != PlayingState.PLAYING:
+        if due and self._has_motion_to_stop:
             with contextlib.suppress(LinkLost):
                 self.piloting.hover()
 
+    @property
+    def _has_motion_to_stop(self) -> bool:
+        """True while the drone flies, and neither a flight plan, nor a landing nor a return."""
+        piloting = self.piloting.state
+        free = piloting.flying in (FlyingState.HOVERING, FlyingState.FLYING) and not self.home.state.returning
+        return free and piloting.plan != PlayingState.PLAYING
+
     def _on_silent(self, session: ControllerSession, reason: str) -> None:
-        """The drone is not heard. For all others the link is lost; the session may go on."""
+        """The drone is not heard. For all others the link is lost; the session may go on.
+
+        It may hear us: it is sent what ends motion, for `UNHEARD_FOR` s.
+        """
         self._note_loss(session, silent=True)
         if session is not self._session or not self._complete:
             session.end(reason)
@@ -356,7 +367,12 @@ class Drone:
         self._heard = asyncio.get_running_loop().create_future()
         # Where the pilot at a Skycontroller has control, nothing of ours flies, and a hover would be against him.
         self._hover_due = not self.controller.pilot_has_source
+        stops = self.piloting.stopping() if self._hover_due and self._has_motion_to_stop else ()
+        last = (*stops, *self.controller.hand_back_due)
         self._disconnected(reason, silent=True)
+        for message in last:
+            token = session.send(message, unheard=True)
+            asyncio.get_running_loop().call_later(UNHEARD_FOR, session.cancel, token)
 
     def _on_speaks(self, session: ControllerSession) -> None:
         if session is self._fading and not self._heard.done():

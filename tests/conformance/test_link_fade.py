@@ -171,7 +171,15 @@ async def test_drone_that_is_not_heard_but_hears_the_gateway_notices_the_loss() 
         await flown_north(w)
         w.drone.faults.down = Impairment(loss=1.0)
         await w.drone.wait_log(lambda e: e.kind == "session" and e.name == "lost", 15.0)
+
+
+async def test_drone_that_is_not_heard_but_hears_the_gateway_is_stopped() -> None:
+    async with world(speed=1.0, quirks=(Quirk.HANDSHAKE_REFUSED_8S.value,)) as w:
+        await w.take_off()
+        await flown_north(w)
+        w.drone.faults.down = Impairment(loss=1.0)
         await w.drone.wait_log(lambda e: w.drone.pose.ground_speed < 0.2, 10.0)
+        assert sessions(w) == ["up"]
 
 
 @pytest.mark.parametrize("generation", [3, 4])

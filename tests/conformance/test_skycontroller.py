@@ -268,6 +268,25 @@ async def test_pilots_stick_in_bad_air_takes_the_drone(generation: int, way: str
         assert pilot.grabbed_axes == 0
 
 
+async def test_pilot_gets_the_sticks_of_a_skycontroller_that_is_not_heard() -> None:
+    """It hears the gateway, so that it would keep the axes grabbed until it misses the gateway's answers."""
+    async with world(speed=1.0, skycontroller=3, quirks=("handshake-refused-8s",)) as w:
+        pilot = w.drone.skycontroller
+        assert pilot is not None
+        await to_the_pilot(w)
+        assert await goto(w, 200.0, 10.0) == ACCEPTED
+        if pilot.grabbed_axes == 0:
+            await w.drone.wait_log(lambda e: pilot.grabbed_axes != 0, 10.0)
+        w.drone.faults.down = Impairment(loss=1.0)
+        began = asyncio.get_running_loop().time()
+        await w.drone.wait_log(lambda e: pilot.source is Source.SKY_CONTROLLER and pilot.grabbed_axes == 0, 10.0)
+        assert asyncio.get_running_loop().time() - began < 3.5
+        assert not any(e.kind == "session" and e.name == "lost" for e in w.drone.log)
+        pilot.stick(PITCH_STICK, -60)
+        north = w.drone.pose.north
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] < north - 1.0, 10.0)
+
+
 @generations
 async def test_silence_while_pilot_flies_sends_nothing_against_him(generation: int) -> None:
     async with world(speed=1.0, skycontroller=generation) as w:

@@ -96,7 +96,10 @@ class Session(asyncio.DatagramProtocol):
         Arguments: the token of `send`; True when received, False when dropped after all retries (version 1).
         """
         self.on_silent: Callable[[str], None] = lambda reason: None
-        """Called when the peer is not heard any more; nothing but answers is sent until it speaks."""
+        """Called when the peer is not heard any more.
+
+        Nothing but answers, and what is sent `unheard`, leaves until it speaks.
+        """
         self.on_speaks: Callable[[], None] = lambda: None
         """Called when it is heard again, before its messages."""
         self._endpoint: asyncio.DatagramTransport | None = None
@@ -145,14 +148,22 @@ class Session(asyncio.DatagramProtocol):
         """See `Transport.counters`."""
         return self._transport.counters
 
-    def send(self, message: Message | UnknownMessage, rank: Rank = Rank.NORMAL, *, at_once: bool = False) -> int:
+    def send(
+        self,
+        message: Message | UnknownMessage,
+        rank: Rank = Rank.NORMAL,
+        *,
+        at_once: bool = False,
+        unheard: bool = False,
+    ) -> int:
         """Send a message at the end of this event-loop iteration; the token is for `cancel`.
 
         `at_once`: it leaves now with all that waits, or when the messages that are read together are handled.
+        `unheard`: see `Transport.send`.
 
         Raises `LocalProtocolError` when it cannot be encoded. On a link that is lost it does nothing.
         """
-        token = self._transport.send(message, self._loop.time(), rank)
+        token = self._transport.send(message, self._loop.time(), rank, unheard=unheard)
         if at_once and not self._is_reading:
             self._flush()
         else:

@@ -123,7 +123,7 @@ class Garbage(msgspec.Struct, frozen=True):
 class Silent(msgspec.Struct, frozen=True):
     """The peer is not heard any more.
 
-    Commands are dropped until it speaks, and only answers are sent.
+    Commands are dropped until it speaks, and only answers are sent, unless `send` says otherwise.
     """
 
     reason: str
@@ -354,13 +354,16 @@ class Transport:
 
     # -- sending
 
-    def send(self, message: Message | UnknownMessage, now: float, rank: Rank = Rank.NORMAL) -> int:
+    def send(
+        self, message: Message | UnknownMessage, now: float, rank: Rank = Rank.NORMAL, *, unheard: bool = False
+    ) -> int:
         """Queue a message; the token names it in `cancel`, `Delivered` and `Undelivered`.
 
         An unknown message travels in the acknowledged queue. A HIGH_PRIO message takes the place of everything that was
         not delivered, in the same queue: its own (12) is read by no Parrot program that we know.
         `rank` is of an acknowledged message. In version 1 each takes a round trip of its own, and a stop must not wait
         behind a list of settings that a client loads.
+        `unheard`: it is sent to a silent peer, too, which may hear us; the caller cancels it.
         Raises `LocalProtocolError` when it cannot be encoded or is too long for its queue. On a link that is down
         the message is counted and forgotten.
         """
@@ -370,7 +373,7 @@ class Transport:
         if len(data) > longest:
             raise LocalProtocolError(f"{type(message).__name__} has {len(data)} bytes, its queue takes {longest}")
         token = next(self._tokens)
-        if self._down or self._silent:
+        if self._down or (self._silent and not unheard):
             self.counters["dropped.down" if self._down else "dropped.silent"] += 1
         elif buffer is Buffer.NON_ACK:
             if len(self._noack) >= MAX_QUEUED_NOACK:

@@ -254,6 +254,11 @@ class Controller(Element[ControllerState]):
         """Commands that give sticks and source back; what is grabbed by `grab` stays so."""
         return (skyctrl.SetPilotingSource(Source.SKY_CONTROLLER), mapper.Grab(self._extra_buttons, self._extra_axes))
 
+    @property
+    def hand_back_due(self) -> Sequence[Message]:
+        """Commands that give the pilot sticks and source; empty while both are the pilot's."""
+        return self._hand_back() if self.taken else ()
+
     def stalled(self) -> None:
         """The host stalled while the axes were grabbed, and they were given back for us."""
         self._yield("gateway stalled")

@@ -341,6 +341,24 @@ class Piloting(PilotingSettings):
             self._returns.abort()
         self._sticks.centre()
 
+    def stopping(self) -> list[Message]:
+        """Return the commands that end the present motion, for a drone that is not heard.
+
+        Nothing that this program started ends by this call.
+        """
+        state, commands = self.state, list[Message]()
+        if self._moves.to is not None or state.move_to == MoveToStatus.RUNNING:
+            commands.append(ardrone3.CancelMoveTo())
+        if self._moves.by:
+            commands.append(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
+        if state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING):
+            commands.append(ardrone3.StopPilotedPOI())
+        if state.following not in (None, FollowMeMode.NONE):
+            commands.append(follow_me.Stop())
+        if state.animation not in (None, animation.Type.NONE):
+            commands.append(animation.Cancel())
+        return commands
+
     def _end_movement(self, why: str) -> None:
         """Cancel what the drone flies by itself, as far as known; a landing or return goes on."""
         state = self.state
