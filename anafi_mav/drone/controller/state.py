@@ -60,7 +60,7 @@ class ControllerState(msgspec.Struct, frozen=True):
     battery: BatteryStatus | None = None
     attitude: ControllerAttitude | None = None
     position: Position | None = None
-    """Place of the controller; altitude above mean sea level."""
+    """Place of the controller, None without a fix; altitude above mean sea level."""
     magnetometer: CalibrationStatus | None = None
     link: Connection | None = None
     """To the drone."""
@@ -100,6 +100,11 @@ def _battery(state: ControllerState, message: skyctrl.BatteryChanged) -> Control
 
 def _place(state: ControllerState, message: skyctrl.GpsPositionChanged) -> ControllerState:
     return replace(state, position=position(message.latitude, message.longitude, message.altitude))
+
+
+def _fix(state: ControllerState, message: skyctrl.GpsFixChanged) -> ControllerState:
+    """A place without a fix is an old one; the next one that is reported counts."""
+    return state if message.fixed else replace(state, position=None)
 
 
 def _connection(state: ControllerState, message: drone_manager.ConnectionState) -> ControllerState:
@@ -207,6 +212,7 @@ REDUCERS: Mapping[type[Message], Reducer] = {
     skyctrl.BatteryChanged: _battery,
     skyctrl.BatteryState: lambda state, message: replace(state, battery=message.state),
     skyctrl.AttitudeChanged: _attitude,
+    skyctrl.GpsFixChanged: _fix,
     skyctrl.GpsPositionChanged: _place,
     skyctrl.MagnetoCalibrationState: lambda state, message: replace(state, magnetometer=message.status),
     skyctrl.PilotingSource: lambda state, message: replace(state, source=message.source),

@@ -470,6 +470,16 @@ def sources(device: ScriptedDevice) -> list[Source]:
     return [m.source for m in device.got(skyctrl.SetPilotingSource)]
 
 
+async def test_place_of_a_controller_that_loses_its_fix_is_unknown() -> None:
+    async with behind() as (drone, device):
+        device.say(skyctrl.GpsPositionChanged(48.0, 2.0, 100.0, 0.0))
+        await drone.wait_until(lambda: drone.controller.state.position is not None, "a place")
+        device.say(skyctrl.GpsFixChanged(0))
+        await drone.wait_until(lambda: drone.controller.state.position is None, "no place", 2.0)
+        device.say(skyctrl.GpsPositionChanged(48.0, 2.1, 100.0, 0.0))
+        await drone.wait_until(lambda: drone.controller.state.position is not None, "a place")
+
+
 async def test_motor_cut_leaves_the_sticks_to_the_pilot() -> None:
     """An Emergency takes the place of what waits to be sent, also of what gives the sticks back."""
     async with behind() as (drone, device):
