@@ -572,6 +572,7 @@ class Drone:
             or piloting.rises
             or piloting.sticks_held
             or self._commander.begins
+            or self._commander.launches
             or piloting.state.plan == PlayingState.PLAYING
             or piloting.state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING)
             or piloting.state.following not in (None, FollowMeMode.NONE)

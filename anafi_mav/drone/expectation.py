@@ -174,6 +174,11 @@ class Commander:
         """An automatic flight waits for its confirmation."""
         return bool(self.sent.awaited(*AUTOMATIC))
 
+    @property
+    def launches(self) -> bool:
+        """A take-off or hand launch waits for its confirmation."""
+        return bool(self.sent.awaited(Slot.LAUNCH))
+
     def require_link(self) -> None:
         """Raise `LinkLost` without a link."""
         if self._wire is None:

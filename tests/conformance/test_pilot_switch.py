@@ -245,6 +245,22 @@ async def test_pilots_stick_during_a_takeoff_ends_its_climb(flavour: str, state:
         assert skycontroller(w).source is Source.SKY_CONTROLLER
 
 
+async def test_pilots_stick_is_seen_in_a_takeoff_that_is_reported_late() -> None:
+    """The axes stay grabbed until the drone answers, or the pilot's stick would be seen by the drone alone."""
+    async with world(speed=1.0, skycontroller=3) as w:
+        w.drone.faults.late = {ardrone3.FlyingStateChanged.NAME: 0.8}
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        mark = w.client.mark()
+        w.client.send_command(TAKEOFF, x=0.0, y=0.0, z=15.0)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "motor_ramping", 10.0)
+        await asyncio.sleep(0.6)
+        skycontroller(w).stick(PITCH_STICK, 40)
+        await said(w.client, "Skycontroller pilot has control: stick moved", mark)
+        skycontroller(w).stick(PITCH_STICK, 0)
+        await asyncio.sleep(8.0)
+        assert heard(w, "moveBy") == []
+
+
 async def test_takeoff_that_waits_for_arming_ends_with_the_pilots_stick() -> None:
     """The client arms afterwards: the policy is asked again before the drone lifts off."""
     async with world(speed=1.0, skycontroller=3) as w:
