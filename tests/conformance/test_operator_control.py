@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support import ext_params
 from support.fault_scenarios import ACCEPTED, DENIED, FAILED, watched
 from support.flavours import both
 from support.ftp import ACK, NAK, TERMINATE, Ftp
@@ -516,3 +517,24 @@ async def test_parameter_write_that_waits_is_refused_once_another_station_is_the
         error = await student.wait("PARAM_ERROR", since=mark)
         assert error.error == own.MAV_PARAM_ERROR_PERMISSION_DENIED
         assert (await read(teacher, "ANF_RTH_ALT")).param_value == 77.0
+
+
+async def test_camera_setting_that_waits_is_refused_once_another_station_is_the_operator() -> None:
+    async with world(options=[ON]) as w:
+        teacher, student = await stations(w, OPTIONS_PORT, OPTIONS_PORT)
+        before = ext_params.value_of(await ext_params.read(student, "CAM_EV"))
+        kind = dialect.MAV_PARAM_EXT_TYPE_REAL32
+        w.drone.faults.mute = True  # the first write waits for its answer
+        ext_params.send_set(student, "CAM_SATURATION", 1.0, kind)
+        await asyncio.sleep(0.2)
+        mark = student.mark()
+        ext_params.send_set(student, "CAM_EV", 1.0, kind)
+        await asyncio.sleep(0.2)
+        assert await sent(teacher, control_request(teacher)) == ACCEPTED
+        w.drone.faults.mute = False
+        final = ext_params.FINAL
+        ack = await student.wait(
+            "PARAM_EXT_ACK", lambda m: m.param_id == "CAM_EV" and m.param_result in final, since=mark, timeout=8.0
+        )
+        assert ack.param_result == dialect.PARAM_ACK_FAILED
+        assert ext_params.value_of(await ext_params.read(teacher, "CAM_EV")) == before

@@ -299,6 +299,9 @@ class ParamExtService(Service):
 
     async def _write(self, write: Write) -> None:
         entry = self._catalogue[write.name]
+        if self.host.change_objection(write.inbound) is not None:  # another station has become the operator meanwhile
+            self._deny(write.inbound)
+            return
         reason = self._refusal(entry.setting.guard)
         result = dialect.PARAM_ACK_FAILED
         if reason is None:
