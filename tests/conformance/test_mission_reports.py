@@ -180,6 +180,27 @@ async def test_present_item_that_is_chosen_again_replaces_another_choice(monkeyp
         assert (await w.client.wait("MISSION_CURRENT")).seq == 1
 
 
+@pytest.mark.parametrize("command", [(START, 0, 0), (CHOOSE, 0)])
+async def test_start_that_waits_for_another_does_not_fly_a_mission_uploaded_meanwhile(
+    monkeypatch: pytest.MonkeyPatch, command: tuple[int, ...]
+) -> None:
+    take_time(monkeypatch)
+    async with world(speed=1.0, web=True) as w:
+        other = await w.connect(sysid=240)
+        await w.take_off(6.0)
+        await put(w, CORNERS)
+        mark = other.mark()
+        w.client.send_command(START, 0, 0)
+        await asyncio.sleep(0.2)  # of the clients, between their commands
+        other.send_command(*command)
+        await asyncio.sleep(0.2)
+        await put(w, [takeoff(6.0), way(-10.0, 0.0, 6.0)])
+        assert await until(other, mark, 1) == [(command[0], dialect.MAV_RESULT_TEMPORARILY_REJECTED)]
+        await said(w, "another was uploaded meanwhile", mark)
+        await watched(3.0)
+        assert w.commands(common.Start.NAME) == []
+
+
 async def test_choice_of_the_item_of_a_start_that_fails_is_kept() -> None:
     async with world(speed=1.0, web=True) as w:
         other = await w.connect(sysid=240)

@@ -54,6 +54,7 @@ from anafi_mav.vehicle.mission.effects import (
 from anafi_mav.vehicle.mission.machine import PROOF, MissionMachine, State
 from anafi_mav.vehicle.mission.path import FilesOnDrone, check_path, lay_out, next_place, way_points
 from anafi_mav.vehicle.mission.payload_state import payload_after
+from anafi_mav.vehicle.mission.progress import Mission
 from anafi_mav.vehicle.mission.record import MissionRecord
 from anafi_mav.vehicle.mission.steps import fly_step
 from anafi_mav.vehicle.mission.store_wait import StoreWait
@@ -171,14 +172,16 @@ class MissionFlight(PlainTask):
         await check_path(self._vehicle, course.parts, warns=False)
 
     async def _start_over(self) -> None:
-        """Return when no start is under way.
+        """Return when no start is under way; raise `Refused` when the mission was replaced meanwhile.
 
         A second one would stop a drone that is about to take off.
         ArduCopter's operators choose Auto, arm, and then send MISSION_START.
         """
+        mission = self.machine.mission
         while self._beginning is not None:
             self._begun = self._begun or asyncio.Event()
             await self._begun.wait()
+        self._require_mission(mission)
 
     @property
     def _beginning(self) -> MissionAttempt | None:
@@ -517,7 +520,11 @@ class MissionFlight(PlainTask):
             raise Refused(texts.MISSION, reason)
 
     def _require_same(self, attempt: MissionAttempt) -> None:
-        if self.machine.mission is not attempt.mission:
+        self._require_mission(attempt.mission)
+
+    def _require_mission(self, mission: Mission) -> None:
+        """Raise `Refused` when another mission is stored."""
+        if self.machine.mission is not mission:
             why = texts.MISSION_REPLACED_MEANWHILE if self.there else texts.MISSION_CLEARED_MEANWHILE
             raise Refused(texts.MISSION, why)
 
