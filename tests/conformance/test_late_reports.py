@@ -110,6 +110,29 @@ async def test_hold_ends_a_climb_that_a_late_end_of_a_turn_precedes() -> None:
         assert w.drone.pose.up < up + 2.0
 
 
+@pytest.mark.parametrize("late", [1.5, 2.2])
+async def test_hold_ends_a_climb_that_the_late_end_of_an_equal_one_crosses(late: float) -> None:
+    """Nothing in that end tells the two apart but when it arrives: sooner than a drone climbs, or later."""
+    async with world(speed=1.0) as w:
+        await w.take_off(5.0)
+        w.drone.faults.gps = False
+        await w.client.wait("GPS_RAW_INT", lambda m: m.fix_type < 3)
+        w.drone.faults.late = {MOVED_BY: late}
+        began = now()
+        w.client.send_command(ALTITUDE, 11.0, 6)
+        await flies(w, "flying", began)
+        await flies(w, "hovering", now())
+        await asyncio.sleep(0.7)  # of the client, between its commands
+        mark = w.client.mark()
+        w.client.send_command(ALTITUDE, 17.0, 6)
+        await watched(late - 0.7 + 0.1)
+        assert ((ALTITUDE, ACCEPTED) in results(w.client, mark)) == (late > 2.0)
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        up = w.drone.pose.up
+        await watched(5.0)
+        assert w.drone.pose.up < min(up + 2.0, 16.0)
+
+
 @pytest.mark.parametrize("command", [(SET_MODE, *BRAKE), (dialect.MAV_CMD_DO_PAUSE_CONTINUE, 0), (RTL,)])
 async def test_unconfirmed_stop_does_not_return_the_drone_to_an_older_stream(command: tuple[float, ...]) -> None:
     async with world(speed=1.0, flavour="ardupilot") as w:

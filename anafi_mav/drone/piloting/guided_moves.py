@@ -18,7 +18,7 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState, FlyingStateChanged, O
 from anafi_mav.arsdk.messages.rth import RthState
 from anafi_mav.drone.element import Element, Position
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation, loop_time
-from anafi_mav.drone.piloting.moves import Displacement, Move, MoveEnd, Moves
+from anafi_mav.drone.piloting.moves import FASTEST, Displacement, Move, MoveEnd, Moves
 from anafi_mav.drone.piloting.state import PilotingState, in_state
 from anafi_mav.drone.piloting.stick_stream import StickStream
 from anafi_mav.drone.sent_commands import QUIET
@@ -41,10 +41,6 @@ MOVE_BY_SLOWEST = 0.5
 
 The drone chooses the speed; this is far below it.
 """
-
-FASTEST = 16.0
-"""m/s over ground, the Ai's top speed (anafi_ros paper, table I): stands for "no limit" where Parrot has no word for it
-and another limit is given."""
 
 _TAKES_OFF = frozenset({FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF, FlyingState.TAKINGOFF})
 _FLIES = frozenset({FlyingState.HOVERING, FlyingState.FLYING})

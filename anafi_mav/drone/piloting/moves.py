@@ -57,6 +57,11 @@ _TINY = 0.1, 0.05
 """m and rad within which a drone counts as there: a moveBy that asks for no more may go nowhere."""
 _SHORT = 1.0, 0.2
 """m and rad by which the end of a moveBy may differ from what was commanded."""
+FASTEST = 16.0
+"""m/s over ground, the Ai's top speed (anafi_ros paper, table I): stands for "no limit" where Parrot has no word for it
+and another limit is given."""
+_FASTEST_CLIMB, _FASTEST_TURN = 6.0, 3.5
+"""m/s and rad/s that no ANAFI exceeds: a moveBy takes longer than its offset at these."""
 
 
 class MoveEnd(enum.Enum):
@@ -92,7 +97,7 @@ class Move:
     `target` is set for a moveTo only; its altitude is above the take-off point. `offset` is set for a moveBy only.
     """
 
-    __slots__ = ("answer", "echo", "ended", "offset", "running", "target")
+    __slots__ = ("answer", "begun", "echo", "ended", "offset", "running", "target")
 
     def __init__(
         self, answer: Expectation[Any], target: Position | None = None, offset: Displacement | None = None
@@ -101,6 +106,8 @@ class Move:
         """The wait of the verb that started it."""
         self.target = target
         self.offset = offset
+        self.begun = asyncio.get_running_loop().time()
+        """When it was about to be sent, s."""
         self.echo: Position | None = None
         """The target as the drone reports it, where that differs from `target`."""
         self.running = False
@@ -185,6 +192,12 @@ def _is_tiny(offset: Displacement | None) -> bool:
         max(abs(offset.front), abs(offset.right), abs(offset.down)) <= length
         and abs(math.remainder(offset.turn, 2.0 * math.pi)) <= angle
     )
+
+
+def _shortest(offset: Displacement) -> float:
+    """Return the time (s) that every drone needs for a moveBy."""
+    over_ground = math.hypot(offset.front, offset.right) / FASTEST
+    return max(over_ground, abs(offset.down) / _FASTEST_CLIMB, abs(offset.turn) / _FASTEST_TURN)
 
 
 def _leads_elsewhere(message: ardrone3.MoveByEnd, offset: Displacement | None) -> bool:
@@ -401,7 +414,8 @@ class Moves:
         if not self.by or self._is_stray(message, now):
             return
         move = self.by.popleft()
-        if not self.by and (message.error == MoveByError.INTERRUPTED or _is_short(message, move.offset)):
+        is_doubtful = message.error == MoveByError.INTERRUPTED or _is_short(message, move.offset)
+        if not self.by and (is_doubtful or now < self._stray_until):
             # Nothing of ours has interrupted it: it may be the late end of an earlier one, and this one is flown on.
             self.inherited = True
         if message.error == MoveByError.OK:
@@ -414,8 +428,8 @@ class Moves:
     def _is_stray(self, message: ardrone3.MoveByEnd, now: float) -> bool:
         """Return True when this event belongs to a moveBy that was cancelled before the present one.
 
-        Nothing but a newer moveBy interrupts one, and a move that asks for more than a drone tells from nothing does
-        not succeed by staying.
+        Nothing but a newer moveBy interrupts one, a move that asks for more than a drone tells from nothing does not
+        succeed by staying, and none is flown faster than a drone flies.
         """
         if now >= self._stray_until:
             return False
@@ -424,8 +438,10 @@ class Moves:
         if message.error != MoveByError.OK:
             return False
         went_nowhere = max(abs(message.dX), abs(message.dY), abs(message.dZ), abs(message.dPsi)) < _NO_MOVE
-        offset = self.by[0].offset
-        return (went_nowhere and not _is_tiny(offset)) or _leads_elsewhere(message, offset)
+        move = self.by[0]
+        offset = move.offset
+        is_early = offset is not None and now < move.begun + _shortest(offset) and not _is_short(message, offset)
+        return is_early or (went_nowhere and not _is_tiny(offset)) or _leads_elsewhere(message, offset)
 
     def on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
         """Motors that stand end every move."""

@@ -627,6 +627,7 @@ async def test_zero_move_of_hover_confirms_no_newer_move(drone: Drone, device: S
         await older
     assert not newer.done()
     assert drone.piloting.moving
+    await asyncio.sleep(0.5)  # of the flight
     device.say(ardrone3.MoveByEnd(2.0, 0.0, 0.0, 0.0, MoveByError.OK))
     assert (await newer).front == 2.0
 

@@ -402,8 +402,9 @@ async def test_end_of_a_cancelled_move_by_leaves_the_next(drone: Drone, device: 
     device.say(
         ardrone3.MoveByEnd(3.0, 0, 0, 0, MoveByError.INTERRUPTED),  # the first
         ardrone3.MoveByEnd(0, 0, 0, 0, MoveByError.OK),  # the zero move that stopped it
-        ardrone3.MoveByEnd(0, 5.0, 0, 0, MoveByError.OK),
     )
+    await asyncio.sleep(0.5)  # of the flight
+    device.say(ardrone3.MoveByEnd(0, 5.0, 0, 0, MoveByError.OK))
     assert (await second).right == 5.0
 
 
