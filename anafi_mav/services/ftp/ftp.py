@@ -189,8 +189,8 @@ class _Session:
     """Sequence number of the request that created its file."""
     used: float = 0.0
     """Time of its client's last request."""
-    sent: float = 0.0
-    """Time of the last part of a burst."""
+    served: float = 0.0
+    """When it last sent a part of a burst, or waited for its file."""
     burst_seq: int = 0
     """Sequence number of the next part."""
     burst_offset: int = 0
@@ -368,15 +368,21 @@ class FtpServer:
             return None
         for number, session in client.sessions.items():
             if session.state is State.BURSTING:
-                session.sent = now
+                session.served = now
                 return self._part(number, session)
         return None
 
     def expire(self, now: float) -> None:
-        """Close the sessions that were not used, and have sent nothing, for `SESSION_TIMEOUT`."""
+        """Close the sessions that were not used, sent nothing and wait for nothing, for `SESSION_TIMEOUT`.
+
+        A slow drone may take longer than that for one answer, which is then still owed to the client.
+        """
         for who, client in list(self._clients.items()):
+            waiting = {wait.session for wait in client.waits}
             for number, session in list(client.sessions.items()):
-                if now - max(session.used, session.sent) >= SESSION_TIMEOUT:
+                if number in waiting:
+                    session.served = now
+                elif now - max(session.used, session.served) >= SESSION_TIMEOUT:
                     self._close(client, number, Event.EXPIRE)
             if not client.sessions and not client.waits and now - client.seen >= SESSION_TIMEOUT:
                 del self._clients[who]

@@ -471,7 +471,7 @@ def test_late_refusal_names_its_error_and_ends_the_opening() -> None:
     assert b.server.sessions == 1  # its client may try again
 
 
-@pytest.mark.parametrize("end", ["terminate", "reset", "expire", "forget", "another file"])
+@pytest.mark.parametrize("end", ["terminate", "reset", "forget", "another file"])
 def test_session_that_ends_abandons_what_waits(end: str) -> None:
     b = SlowBench()
     b.opened()
@@ -483,14 +483,27 @@ def test_session_that_ends_abandons_what_waits(end: str) -> None:
             b.again(request(Opcode.TERMINATE_SESSION, seq=6))
         case "reset":
             b.again(request(Opcode.RESET_SESSIONS, seq=6))
-        case "expire":
-            b.server.expire(b.now)
         case "forget":
             b.server.forget(lambda who: True)
         case _:
             assert Reply(b.again(request(Opcode.OPEN_FILE_RO, b"/fast", seq=6))).data == b"\5\0\0\0"
     assert abandoned == [end]
     assert b.finish(wait, b"123456789") == []
+
+
+def test_session_does_not_expire_while_its_client_is_owed_an_answer() -> None:
+    """The drone may take a minute for a list or a piece of a file, and the client waits for the answer."""
+    b = SlowBench()
+    opening = b.ask(request(Opcode.OPEN_FILE_RO, b"/slow"))
+    for now in (SESSION_TIMEOUT, 2.0 * SESSION_TIMEOUT):
+        b.server.expire(now)
+    assert [reply.opcode for reply in b.finish(opening, SlowSource())] == [ACK]
+    b.now = 2.5 * SESSION_TIMEOUT
+    b.server.expire(b.now)
+    (read,) = b.finish(b.ask(request(Opcode.READ_FILE, seq=4, size=9)), b"123456789")
+    assert read.data == b"123456789"
+    b.server.expire(3.5 * SESSION_TIMEOUT)
+    assert b.server.sessions == 0
 
 
 def test_file_being_opened_is_not_replaced_by_an_impatient_request() -> None:
