@@ -242,7 +242,7 @@ class Controller(Element[ControllerState]):
             deliveries[-1].add_done_callback(self._is_back)
 
     def _is_back(self, delivery: asyncio.Future[None]) -> None:
-        """The Skycontroller has received what gives sticks and source back, or an Emergency took its place."""
+        """Stand down once it is received; an Emergency may have taken its place."""
         if self.taken:
             return
         if delivery.exception() is None:
