@@ -38,7 +38,7 @@ class AbortedReturn:
     """One return of the drone's own that was ended."""
 
     def __init__(self, system: int | None, reason: ReturnReason | None) -> None:
-        """`system` of the client that has ended it; None: something else has, as a plan's start that crossed it."""
+        """`system` of the client that has ended it; None: another command has."""
         self._system = system
         self._reason = reason
         self._next = -math.inf

@@ -711,7 +711,7 @@ class Vehicle(Aircraft):
         aborted.report(self, self._clock.monotonic())
 
     def _note_stopped_return(self, reason: ReturnReason) -> None:
-        """Let all clients be reminded of a return of the drone's own that no request under way has ended.
+        """Remind all clients of an own return of the drone that no pending request has ended.
 
         The start of a mission that crosses its beginning ends it, and another controller may.
         """

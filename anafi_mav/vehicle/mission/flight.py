@@ -172,7 +172,7 @@ class MissionFlight(PlainTask):
         await check_path(self._vehicle, course.parts, warns=False)
 
     async def _start_over(self) -> None:
-        """Return when no start is under way; raise `Refused` when the mission was replaced meanwhile.
+        """Return when no start is under way; raise `Refused` if the mission was replaced.
 
         A second one would stop a drone that is about to take off.
         ArduCopter's operators choose Auto, arm, and then send MISSION_START.

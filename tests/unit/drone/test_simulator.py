@@ -295,7 +295,7 @@ async def test_the_link_is_lost_in_silence_and_found_again(drone: Drone, real: S
     assert drone.connected
     assert drone.moves_started == ()
     assert drone.piloting.state.in_air
-    # The session of before goes on; what flew is stopped, and nothing resumes.
+    # The session of before goes on; what flew is stopped, once more than in the silence, and nothing resumes.
     await real.wait_log(lambda entry: entry.name.endswith("moveBy"), since=reconnected)
     sent = commands(real, since=reconnected)
-    assert [name for name in sent if name != "PCMD"] == ["CancelMoveTo", "moveBy"]
+    assert [name for name in sent if name != "PCMD"] == ["CancelMoveTo", "CancelMoveTo", "moveBy"]
