@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, NamedTuple
 
 from anafi_mav import texts, units
@@ -70,6 +70,8 @@ class Goto(PlainTask):
     """m/s over ground, of this move only; None: the vehicle's cruise speed."""
     mode: FlightMode
     """Mode of the vehicle on the way, and at its end: Hold or Guided."""
+    cruise_orders: int = field(default=0, compare=False)
+    """The vehicle's when the speed was named: a newer command of the cruise speed replaces that."""
     rules: ClassVar[TaskRules] = GOTO
 
     def is_flown(self, piloting: Piloting) -> bool:
@@ -177,7 +179,7 @@ class GuidedFlight:
             if height is None and (height := vehicle.drone.piloting.state.altitude) is None:
                 raise Refused(texts.GOTO, texts.HEIGHT_UNKNOWN)
             self.check(place, ato, start=here)
-            return Goto(where, height, yaw, speed, mode)
+            return Goto(where, height, yaw, speed, mode, vehicle.commanded_speeds.cruise_orders)
 
         await self._fly(target, by)
 
@@ -225,6 +227,7 @@ class GuidedFlight:
     async def move(self, goto: Goto) -> None:
         """Let the drone begin the move of the active task; no await before the moveTo."""
         vehicle, rule = self._vehicle, self._vehicle.settings.move_heading
+        named = goto.speed if goto.cruise_orders == vehicle.commanded_speeds.cruise_orders else None
         keeps = goto.yaw is None and rule is MoveHeading.KEEP
         orientation, heading = None, None
         if not keeps:
@@ -234,7 +237,7 @@ class GuidedFlight:
             goto.place.longitude,
             goto.ato,
             heading_deg=heading,
-            horizontal_speed=vehicle.cruise_speed if goto.speed is None else goto.speed,
+            horizontal_speed=vehicle.cruise_speed if named is None else named,
             vertical_speed=vehicle.climb_speed,
             orientation=orientation,
         )

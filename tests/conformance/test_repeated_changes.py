@@ -6,7 +6,7 @@ import math
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import ACCEPTED
+from support.fault_scenarios import ACCEPTED, watched
 from support.flavours import both
 from support.mav import NAN, Client
 from support.missions import CORNERS, put
@@ -21,7 +21,7 @@ SPEED, SET_HOME, ENABLE = (
     dialect.MAV_CMD_DO_SET_HOME,
     dialect.MAV_CMD_DO_FENCE_ENABLE,
 )
-CHOOSE = dialect.MAV_CMD_DO_SET_MISSION_CURRENT
+PAUSE, CHOOSE = dialect.MAV_CMD_DO_PAUSE_CONTINUE, dialect.MAV_CMD_DO_SET_MISSION_CURRENT
 FAR = geo.destination(*HOME[:2], 150.0, 0.0)
 
 
@@ -118,6 +118,22 @@ async def test_speed_replaces_that_which_a_goto_has_named(flavour: str) -> None:
         await flies_at(w, 3.0)
         await change_speed(w.client, 7.0)
         await flies_at(w, 7.0)
+
+
+@both
+async def test_speed_that_is_changed_in_a_pause_replaces_that_which_the_goto_has_named(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
+        await w.take_off(10.0)
+        await goto(w, 8.0)
+        await flies_at(w, 8.0)
+        assert (await w.client.command(PAUSE, 0)).result == ACCEPTED
+        await change_speed(w.client, 2.0)
+        assert (await w.client.command(PAUSE, 1)).result == ACCEPTED
+        await flies_at(w, 2.0)
+        await watched(2.0)
+        assert math.hypot(w.drone.pose.vn, w.drone.pose.ve) < 3.0
+        await goto(w, 5.0)  # a newer one's own speed counts again
+        await flies_at(w, 5.0)
 
 
 async def test_speed_of_before_replaces_that_which_an_orbit_has_named() -> None:

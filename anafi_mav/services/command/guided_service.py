@@ -179,14 +179,13 @@ class GuidedService(Service):
         vehicle = self.host.vehicle
         if vehicle.mode in _OWN_SPEED:
             raise Refused(texts.SPEED, texts.FIXED_IN_MODE.fill(mode=vehicle.mode.value))
-        is_horizontal, speeds = kind in (_AIRSPEED, _GROUNDSPEED), vehicle.commanded_speeds
-        if is_horizontal:
+        speeds = vehicle.commanded_speeds
+        if kind in (_AIRSPEED, _GROUNDSPEED):
             vehicle.commanded_speeds = replace(speeds, cruise=wanted, cruise_orders=speeds.cruise_orders + 1)
         else:
             vehicle.commanded_speeds = replace(speeds, climb=wanted)
         if (goto := vehicle.guided.goto) is not None:
-            # The newer order replaces the speed that the move's own command has named.
-            await vehicle.guided.go(replace(goto, speed=None) if is_horizontal else goto, by=command.right)
+            await vehicle.guided.go(goto, by=command.right)
 
     async def _change_altitude(self, command: Command) -> None:
         """MAV_CMD_DO_CHANGE_ALTITUDE: param1 height in m, param2 MAV_FRAME.

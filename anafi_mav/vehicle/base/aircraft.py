@@ -84,7 +84,7 @@ class CommandedSpeeds:
     climb: float | None = None
     """m/s up and down."""
     cruise_orders: int = 0
-    """How often the speed over ground was commanded: an orbit with a speed of its own obeys the same one again."""
+    """How often the speed over ground was commanded: an orbit or goto with a speed of its own obeys each of them."""
 
 
 class Aircraft(Conditions):
