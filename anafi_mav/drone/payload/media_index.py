@@ -69,7 +69,8 @@ class MediaIndex:
         self._kept: tuple[Listing, object, float] | None = None
         """The listing, the drone's counters when it was made, and when that was."""
         self._changes = 0
-        self._fetching: asyncio.Task[Listing] | None = None
+        self._fetching: asyncio.Task[tuple[Listing, int]] | None = None
+        """Returns the listing, and `_changes` when it was requested."""
         self._listening: asyncio.Task[None] | None = None
         self._open = False
         """True while the drone's notifications are received."""
@@ -88,10 +89,17 @@ class MediaIndex:
     async def get(self, counters: object) -> Listing:
         """Return the listing, from the drone where it is not kept.
 
-        Simultaneous callers share one request.
+        Simultaneous callers share one request; one from before a change is followed by another.
         """
-        if (kept := self.kept(counters)) is not None:
-            return kept
+        changes = self._changes
+        while (kept := self.kept(counters)) is None:
+            listing, requested_at = await self._fetched(counters)
+            if requested_at >= changes:
+                return listing
+        return kept
+
+    async def _fetched(self, counters: object) -> tuple[Listing, int]:
+        """Return the result of the request under way, or of a new one."""
         if self._fetching is None or self._fetching.done():
             self._fetching = asyncio.get_running_loop().create_task(self._fetch(counters))
         fetching = self._fetching
@@ -116,7 +124,7 @@ class MediaIndex:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    async def _fetch(self, counters: object) -> Listing:
+    async def _fetch(self, counters: object) -> tuple[Listing, int]:
         if self._listening is None or self._listening.done():
             opened = asyncio.Event()
             self._listening = asyncio.get_running_loop().create_task(self._listen(opened))
@@ -134,7 +142,7 @@ class MediaIndex:
             listing = await asyncio.to_thread(_listing, items)
         if self._changes == changes:  # else it may be older than the change
             self._kept = (listing, counters, asyncio.get_running_loop().time())
-        return listing
+        return listing, changes
 
     async def _listen(self, opened: asyncio.Event) -> None:
         try:

@@ -200,6 +200,32 @@ async def test_long_list_is_sorted_in_a_thread() -> None:
     assert threading.get_ident() not in threads
 
 
+async def test_list_requested_after_a_deletion_is_not_an_older_one() -> None:
+    """A list that is on its way when a file is deleted still has the file."""
+    requests: asyncio.Queue[asyncio.Future[list[MediaItem]]] = asyncio.Queue()
+
+    class Client:
+        async def list(self, *, newest_first: bool = True) -> list[MediaItem]:
+            answer: asyncio.Future[list[MediaItem]] = asyncio.get_running_loop().create_future()
+            requests.put_nowait(answer)
+            return await answer
+
+        def listen(self) -> AbstractAsyncContextManager[AsyncIterator[object]]:
+            raise LinkLost("no notifications")
+
+    index = MediaIndex(Client())
+    before = asyncio.create_task(index.get(None))
+    first = await requests.get()
+    index.changed()
+    after = asyncio.create_task(index.get(None))
+    await asyncio.sleep(0)
+    first.set_result([MediaItem("1", resources=(Resource("1.JPG"),))])
+    assert (await before).file("1.JPG") is not None
+    second = await asyncio.wait_for(requests.get(), 5.0)
+    second.set_result([])
+    assert (await after).file("1.JPG") is None
+
+
 async def test_missing_md5_differs_from_failed_md5_request() -> None:
     answers = {
         "path": json_answer({"md5": "../../x"}),
