@@ -120,14 +120,15 @@ def _facts(file: Resource) -> dict[str, Any]:
         "duration": None if file.duration is None else file.duration / 1000.0,
         "place": None
         if place is None
-        else {"latitude": place.latitude, "longitude": place.longitude, "altitude_amsl": place.altitude},
+        else {"latitude": place.latitude, "longitude": place.longitude, "altitude_amsl": place.altitude_amsl},
     }
 
 
 def _place(file: Resource) -> str:
     if file.gps is None or not file.gps.is_known:
         return ""
-    return f"{file.gps.latitude:.6f} {file.gps.longitude:.6f}, {file.gps.altitude:.0f} m"
+    height = "" if file.gps.altitude_amsl is None else f", {file.gps.altitude_amsl:.0f} m"
+    return f"{file.gps.latitude:.6f} {file.gps.longitude:.6f}{height}"
 
 
 # -- the way to the drone

@@ -8,6 +8,7 @@ import fcntl
 import hashlib
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import aiohttp
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.ftp import Ftp
-from support.media import DAY, add_photo, add_video
+from support.media import DAY, SCENE, add_photo, add_video
 from support.product import program
 from support.world import World, world
 
@@ -146,6 +147,17 @@ async def test_delete_over_http_is_for_programs_of_this_computer() -> None:
         await drone.camera.stop_recording()
         assert (await ask(w, "DELETE", path))[0] == 200
         assert w.drone.firmware.payload.media.resource(photo.id) is None
+
+
+async def test_listed_place_without_a_height_has_none(capsys: pytest.CaptureFixture[str]) -> None:
+    """The drone reports 500 for each coordinate that it does not know."""
+    async with world(web=True) as w:
+        add_photo(w.drone, scene=replace(SCENE, altitude=500.0))
+        assert await list_media(arguments(w, "list", "--json")) == 0
+        (facts,) = json.loads(capsys.readouterr().out)
+        assert facts["place"] == {"latitude": SCENE.latitude, "longitude": SCENE.longitude, "altitude_amsl": None}
+        assert await list_media(arguments(w, "list")) == 0
+        assert "500 m" not in capsys.readouterr().out
 
 
 async def test_media_command_lists_downloads_and_deletes(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,11 +15,11 @@ TIME = 1795252272
 SCENE = Scene(latitude=48.8789, longitude=2.3677, altitude=85.0, heading=30.0, roll=1.0, pitch=-10.0)
 
 
-def add_photo(drone: SimulatedDrone, date: str = DATE) -> Resource:
+def add_photo(drone: SimulatedDrone, date: str = DATE, scene: Scene = SCENE) -> Resource:
     """A photo that the drone took earlier."""
     store = drone.firmware.payload.media
     media = store.begin(video=False, mode="SINGLE", date=date)
-    photo = store.develop(media, MediaKind.JPG, 1, SCENE, date)
+    photo = store.develop(media, MediaKind.JPG, 1, scene, date)
     store.add(media, [photo])
     return photo
 

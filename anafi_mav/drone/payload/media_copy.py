@@ -234,7 +234,7 @@ def sidecar(
         else {
             "latitude": place.latitude,
             "longitude": place.longitude,
-            "altitude_amsl": None if place.altitude == UNKNOWN else place.altitude,
+            "altitude_amsl": place.altitude_amsl,
             "source": source,
         },
         "camera_attitude": None if None in angles.values() else angles,

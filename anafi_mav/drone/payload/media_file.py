@@ -46,6 +46,11 @@ class Place(msgspec.Struct, frozen=True):
         """True when latitude and longitude are known."""
         return abs(self.latitude) <= 90.0 and abs(self.longitude) <= 180.0
 
+    @property
+    def altitude_amsl(self) -> float | None:
+        """m above mean sea level; None: unknown."""
+        return None if self.altitude == UNKNOWN else self.altitude
+
 
 class Resource(msgspec.Struct, frozen=True):
     """One file of a media."""
