@@ -132,6 +132,35 @@ async def test_region_follows_another_system_that_reports_its_position() -> None
         assert len(pois(w)) == count
 
 
+async def test_region_of_a_place_follows_no_system_of_an_older_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The newer command arrives between the drone's confirmation of the older one and its acknowledgement."""
+    async with world() as w:
+        await w.take_off(20.0)
+        other = await w.connect(7, 1)
+
+        def moves(to: tuple[float, float]) -> None:
+            place = (round(to[0] * 1e7), round(to[1] * 1e7), round(HOME[2] * 1e3), 0, 0, 0, 0, 0)
+            other.send(dialect.MAVLink_global_position_int_message(0, *place))
+
+        poi = w.gateway.systems[0].drone.poi
+        confirmed = poi.start
+
+        async def start(*place: Any) -> None:
+            await confirmed(*place)
+            if len(pois(w)) == 1:
+                assert (await w.client.command(ROI, x=NORTH[0], y=NORTH[1], z=HOME[2])).result == ACCEPTED
+
+        monkeypatch.setattr(poi, "start", start)
+        moves(EAST)
+        await next_truth(w)
+        await w.client.command(ROI_SYSTEM, 7.0)
+        await heads(w, 0.0)
+        moves(geo.destination(HOME[0], HOME[1], 0.0, 40.0))
+        for _ in range(10):
+            await next_truth(w)
+        assert len(pois(w)) == 2
+
+
 async def test_region_follows_another_drone_of_the_gateway() -> None:
     address, drones = loopback(), [loopback(), loopback()]
     config = Config(

@@ -133,23 +133,25 @@ class RegionOfInterest(PlainTask):
         if vehicle.control.active is vehicle.mission or vehicle.mode is FlightMode.MISSION:
             raise Refused(texts.ROI, texts.GIMBAL_OF_MISSION)
 
-    async def look_at(self, region: Region, where: GeoPoint, ato: float) -> None:
+    async def look_at(self, region: Region, where: GeoPoint, ato: float) -> Region | None:
         """Look at a place (height: m above take-off), with the gimbal locked on it.
 
-        It replaces what flies the drone, as every flight command. A region in force moves to the new place.
+        Returns the region that looks there: the one in force where it does so already. It replaces what flies the
+        drone, as every flight command. A region in force moves to the new place.
         """
         check_on_earth(where, texts.ROI)
         self._require_prepared(region)
         is_locked = self.is_locked_on(where, ato)
         self.forget_system()
         if is_locked:
-            return
+            return self._region
         if self._region is not None or region.by is None:
             self._region, self._prepared = region, None
             await self._start(region, where, ato)
         else:
             await self._begin_region(region, region.by, where, ato)
         region.is_confirmed = True
+        return region
 
     async def _begin_region(self, region: Region, by: By, where: GeoPoint, ato: float) -> None:
         """Acquire the drone for a region, and stop it."""
@@ -193,8 +195,8 @@ class RegionOfInterest(PlainTask):
     async def look_at_system(self, region: Region, system: float) -> None:
         """Look at another system, and follow it as far as it reports its position."""
         seen = self.position_of(system)
-        await self.look_at(region, seen.place, amsl_to_ato(self._host.vehicle, seen.amsl))
-        if self._region is not None:
+        looking = await self.look_at(region, seen.place, amsl_to_ato(self._host.vehicle, seen.amsl))
+        if looking is not None and self._region is looking:  # else a newer region, or none, has replaced it
             self._system, self._looked, self._is_lost = int(system), seen, False
 
     async def stop(self) -> None:
