@@ -11,7 +11,7 @@ from __future__ import annotations
 import asyncio
 from collections import OrderedDict
 from collections.abc import AsyncGenerator, AsyncIterator, Callable, Hashable
-from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from typing import Protocol
 
 from anafi_mav.drone.payload.media_file import Resource
@@ -215,10 +215,12 @@ class _Read:
             self._more.set()
 
     async def close(self) -> None:
-        """End it."""
+        """End it.
+
+        A cancellation of the caller meanwhile is the caller's: it must not be taken for the end of the read.
+        """
         self._task.cancel()
-        with suppress(asyncio.CancelledError):
-            await self._task
+        await asyncio.wait({self._task})
 
     async def _run(self) -> None:
         try:

@@ -236,3 +236,17 @@ async def test_reads_in_flight_share_a_rate(server: Server) -> None:
     flying, landed = False, loop.time()
     await reader.read(server.add("c", 4 * PIECE), 0, 4 * PIECE)
     assert loop.time() - landed < PIECE / media_reader.FLIGHT_RATE
+
+
+async def test_reader_that_is_cancelled_while_it_ends_another_read_ends() -> None:
+    """A take-off cancels a copy of files; it must not go on because an idle read was just being closed."""
+    server = Server()
+    reader = MediaReader(server)
+    for number in range(READS):
+        await reader.read(server.add(f"{number}.MP4"), 0, 10)
+    third = asyncio.create_task(reader.read(server.add("3.MP4"), 0, 10))
+    await asyncio.sleep(0)  # it ends the read that no reader waits for
+    third.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await third
+    await reader.close()
