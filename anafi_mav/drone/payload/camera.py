@@ -143,10 +143,13 @@ class Camera(Commanding[CamerasState]):
         if now.photo_available is False:
             raise CommandRejected("the camera cannot take a photo now")
         series = now.photo is not None and now.photo.mode in SERIES
+        has_begun = False
 
         def judge(update: CaptureUpdate) -> str | bool | AnafiMavError | None:
+            nonlocal has_begun
+            has_begun = has_begun or update.progress in BEGUN
             if update.progress is CaptureProgress.SAVED:
-                return update.media
+                return update.media if has_begun else None  # else of the photo before, reported late
             if update.progress is CaptureProgress.FAILED:
                 return CommandRejected(f"photo: {update.reason}")
             return True if (series or not until_saved) and update.progress in BEGUN else None

@@ -267,6 +267,19 @@ async def test_a_photo_is_done_when_it_is_stored(device: ScriptedDevice, drone: 
         await drone.camera.take_photo(timeout=0.2)
 
 
+@pytest.mark.parametrize("until_saved", [True, False])
+async def test_photo_that_is_reported_late_is_not_the_next_one(
+    device: ScriptedDevice, drone: Drone, until_saved: bool
+) -> None:
+    """The drone is ready for the next photo before it reports that it has stored the one before."""
+    device.script[old.TakePhoto] = lambda _: [
+        old.PhotoProgress(0, PROGRESS.PHOTO_SAVED, 1, "10000001"),
+        old.PhotoProgress(0, PROGRESS.ERROR_NO_STORAGE_SPACE, 0, ""),
+    ]
+    with pytest.raises(CommandRejected, match="no storage space"):
+        await drone.camera.take_photo(until_saved=until_saved)
+
+
 async def test_verbs_that_the_camera_reports_unavailable_are_rejected(drone: Drone) -> None:
     with pytest.raises(CommandRejected):
         await drone.camera.start_recording()
