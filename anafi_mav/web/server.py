@@ -151,6 +151,8 @@ class HttpServer:
         self._app.on_response_prepare.append(_add_headers)
         self._runner: web.AppRunner | None = None
         self._server: asyncio.Server | None = None
+        self._arriving: set[RequestHandler] = set()
+        """Accepted connections that aiohttp counts from the next event-loop iteration on."""
         self._silent: set[RequestHandler] = set()
         """Connections of the last `FIRST_REQUEST_LIMIT` that have sent no request."""
         self._pages: set[str] = set()
@@ -284,12 +286,16 @@ class HttpServer:
     def _accept(self) -> asyncio.Protocol:
         """Return the protocol of a new connection."""
         server = self._runner.server if self._runner is not None else None
-        if server is None or len(server.connections) >= MAX_CONNECTIONS:
+        if server is None or len(self._arriving.union(server.connections)) >= MAX_CONNECTIONS:
             self.refused_connections += 1
             return _Refusing()
         connection = server()
+        # asyncio accepts a backlog of connections in one iteration, and reports each to aiohttp in the next.
+        self._arriving.add(connection)
         self._silent.add(connection)
-        asyncio.get_running_loop().call_later(FIRST_REQUEST_LIMIT, self._end_silent, connection)
+        loop = asyncio.get_running_loop()
+        loop.call_soon(self._arriving.discard, connection)
+        loop.call_later(FIRST_REQUEST_LIMIT, self._end_silent, connection)
         return connection
 
     def _end_silent(self, connection: RequestHandler) -> None:

@@ -243,6 +243,17 @@ async def test_connection_over_the_limit_is_closed() -> None:
             other.close()
 
 
+async def test_connections_over_the_limit_at_once_are_closed() -> None:
+    """The event loop accepts all of them in one iteration."""
+    async with serving() as server:
+        held = [socket.create_connection(("127.0.0.1", server.port)) for _ in range(MAX_CONNECTIONS + 6)]
+        with contextlib.suppress(ConnectionError):  # a reset is as good as an end
+            assert await raw(server, b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n") == b""
+        assert server.refused_connections == 7
+        for client in held:
+            client.close()
+
+
 async def test_busy_port_is_named_with_its_key() -> None:
     async with serving() as first:
         with pytest.raises(ConfigError, match=rf"http\.port: 127\.0\.0\.1:{first.port} is in use"):
