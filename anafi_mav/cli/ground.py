@@ -52,7 +52,7 @@ def _parsed(option: str, text: str) -> EndpointUrl:
 async def _serve(fabric: EndpointUrl, stations: list[EndpointUrl]) -> None:
     ground = FabricGround(fabric, stations, SystemClock(), on_systems=_say_systems)
     stop = asyncio.Event()
-    interrupts.listen(lambda number: stop.set(), "SIGTERM")
+    interrupts.listen(lambda number: stop.set(), "SIGINT", "SIGTERM")
     await ground.start()
     try:
         for line in ground.lines():

@@ -12,6 +12,7 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
+from support.fabric import free_port
 from support.product import Process, program
 from support.world import loopback
 
@@ -158,6 +159,14 @@ async def test_ctrl_c_with_a_ready_simulator_ends_it_cleanly() -> None:
         await p.line(lambda line: line.startswith("ready"))
         assert await interrupted(p) == 0
         assert p.complaints == []
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+async def test_signal_with_a_ready_ground_process_ends_it_cleanly(number: int) -> None:
+    words = ("ground", "--zenoh", f"zenoh://127.0.0.1:{free_port()}", "--endpoint", "udpin://127.0.0.1:0")
+    async with program(sys.executable, "-m", "anafi_mav", *words) as p:
+        await p.line(lambda line: line.startswith("ready"))
+        assert await interrupted(p, number) == 0, str(p)
 
 
 async def test_ignored_ctrl_c_stays_ignored() -> None:
