@@ -38,6 +38,8 @@ LONGEST_LINE = 1_000_000
 LONGEST_PAUSE = 5.0
 """s: a longer gap, as between two flights, is shortened to this."""
 
+FROM_START = "a number of seconds, 0 or more"
+
 _Timed = tuple[float, int, TlogEntry | TraceEntry]
 """An entry with its time, and 1 for one of the trace."""
 
@@ -58,13 +60,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Play to the end or to Ctrl-C.
 
-    Raises `ConfigError` for a path without a recording, and `AnafiMavError` for a file that cannot be read or has no
-    frame.
+    Raises `ConfigError` for a path without a recording and a start after its end, and `AnafiMavError` for a file that
+    cannot be read or has no frame.
     """
     log.set_up()
     tlogs, traces = files_of(arguments.path)
     speed = options.speed(arguments.speed)
-    start = options.number("--start", arguments.start, "a number of seconds")
+    start = options.number("--start", arguments.start, FROM_START)
+    if start < 0:
+        raise ConfigError("--start", f"expected {FROM_START}, got {arguments.start}")
     endpoints = arguments.endpoint or [DEFAULT_ENDPOINT]
     count = interrupts.run(play(tlogs, traces if arguments.trace else [], endpoints, speed, start))
     say(f"{count} frames played")
@@ -177,6 +181,8 @@ async def _send(node: Node, tlogs: Sequence[Path], traces: Sequence[Path], speed
         reader.shutdown()
     if not vehicles.seen:
         raise AnafiMavError(f"{tlogs[0]}: no MAVLink frame: expected a tlog")
+    if first is not None and start > before - first:
+        raise ConfigError("--start", f"expected at most the {before - first:.0f} s of the recording, got {start:g}")
     return count
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import struct
 import sys
 from pathlib import Path
 
@@ -125,6 +126,24 @@ def test_replay_of_a_file_without_a_frame_fails(
     path.write_bytes(content)
     assert main(["replay", str(path), "--endpoint", "udpout://127.0.0.1:9"]) == 1
     assert capsys.readouterr().err == f"anafi-mav: {path}: no MAVLink frame: expected a tlog\n"
+
+
+@pytest.mark.parametrize(
+    ("start", "error"),
+    [
+        ("-5", "expected a number of seconds, 0 or more, got -5"),
+        ("9", "expected at most the 3 s of the recording, got 9"),
+    ],
+)
+def test_replay_from_outside_the_recording_is_refused(
+    start: str, error: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sender = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
+    beat = dialect.MAVLink_heartbeat_message(2, dialect.MAV_AUTOPILOT_PX4, 0, 0, 3, 3).pack(sender)
+    path = tmp_path / "flight.tlog"
+    path.write_bytes(b"".join(struct.pack(">Q", second * 1_000_000) + beat for second in range(100, 104)))
+    assert main(["replay", str(path), "--endpoint", "udpout://127.0.0.1:9", "--start", start]) == 2
+    assert capsys.readouterr().err == f"anafi-mav: --start: {error}\n"
 
 
 def test_parts_of_a_session_follow_each_other_by_number(tmp_path: Path) -> None:
