@@ -48,7 +48,7 @@ async def connect(
     left alone.
 
     Raises `LinkLost` when nothing answers or the connection is refused, `RemoteProtocolError` when what answers is no
-    drone, `CommandTimeout` when the drone does not report its states.
+    drone, `CommandTimeout` when the drone does not report its states, `LocalProtocolError` for a port that is none.
     """
     drone = Drone(
         address,

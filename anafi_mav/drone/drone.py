@@ -79,6 +79,8 @@ REBOOT_TIMEOUT = 15.0
 WAIT_TIMEOUT = 30.0
 """s that `wait_until` and `wait_for` wait unless the caller says otherwise: a take-off or landing takes about ten."""
 
+MAX_PORT = 65535
+
 CONTROLLER_PORTS = 100
 """A Skycontroller 3 has the TCP ports of its drone this much higher (Olympe, libarsdkctrl arsdk_device.c)."""
 
@@ -120,7 +122,11 @@ class Drone:
 
         With `handshake_port` None the port from discovery is used. `interface` binds every socket to that network
         interface. `name` is ours, for the log. With `serial` only the aircraft with that serial number is connected.
+        Raises `LocalProtocolError` for a port that is none.
         """
+        for port in (discovery_port, handshake_port, http_port, rtsp_port):
+            if port is not None and not 0 < port <= MAX_PORT:
+                raise LocalProtocolError(f"expected a port from 1 to {MAX_PORT}, got {port}")
         self.address = address
         self._wanted_serial = serial
         self.name = name or address

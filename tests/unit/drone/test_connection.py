@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from support.world import loopback
 
-from anafi_mav.drone import CommandTimeout, Drone, FlyingState, LinkLost, connect
+from anafi_mav.drone import CommandTimeout, Drone, FlyingState, LinkLost, LocalProtocolError, connect
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 
 HOME = (48.8789, 2.3677, 35.0)
@@ -214,3 +214,11 @@ async def test_wait_after_the_link_is_lost_raises(real: SimulatedDrone) -> None:
         pass
     with pytest.raises(LinkLost):
         await drone.wait_for(FlyingState.LANDED)
+
+
+@pytest.mark.parametrize("name", ["discovery_port", "http_port", "rtsp_port"])
+@pytest.mark.parametrize("port", [-1, 0, 70000])
+async def test_port_out_of_range_is_an_error_of_the_program(name: str, port: int) -> None:
+    with pytest.raises(LocalProtocolError, match=rf"expected a port from 1 to 65535, got {port}"):
+        async with connect(loopback(), **{name: port}):
+            pass
