@@ -232,7 +232,7 @@ class SentCommands:
         return any(one.may_begin(now) and not one.is_ignored(now) for one in sent)
 
     def has_failed_launch(self, now: float) -> bool:
-        """Return True while the drone may still execute a launch that it has ignored, as far as is known."""
+        """Return True while a launch that the drone seems to have ignored may still begin."""
         return any(one.may_begin(now) and one.is_ignored(now) for one in self._slots[Slot.LAUNCH])
 
     def is_unwanted(self, sent: SentCommand, now: float) -> bool:

@@ -84,7 +84,7 @@ class Motors:
         self._may_land_until = self._doubtful_until = self._stands_until = -math.inf
 
     def on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
-        """Stop motors that start after a landing was commanded, by a withdrawn command or by another controller."""
+        """Stop motors that a withdrawn command, or another controller, starts after a landing."""
         if message.state != FlyingState.LANDING:
             self._doubtful_until = -math.inf
         sent = self._sent.attribute(message, now)
