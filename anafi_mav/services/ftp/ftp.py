@@ -373,7 +373,7 @@ class FtpServer:
         return None
 
     def expire(self, now: float) -> None:
-        """Close the sessions that were not used, sent nothing and wait for nothing, for `SESSION_TIMEOUT`.
+        """Close the sessions without a request, a part sent or an answer due for `SESSION_TIMEOUT`.
 
         A slow drone may take longer than that for one answer, which is then still owed to the client.
         """
