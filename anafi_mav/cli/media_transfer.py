@@ -152,7 +152,9 @@ async def _connected(host: str, port: int, sysid: int | None, token: str) -> int
     try:
         listed = await rest.json("GET", "/drones")
     except LinkLost as error:
-        raise LinkLost(f"no gateway answers at {host}:{port} ({error.reason}); its port is `http.port`") from error
+        # The reason of a `Rest` names a drone's web server, which this is not.
+        problem = error.__cause__ or error.reason
+        raise LinkLost(f"no gateway answers at {host}:{port} ({problem}); its port is `http.port`") from error
     finally:
         await rest.close()
     drones = [one for one in listed if isinstance(one, dict)] if isinstance(listed, list) else []

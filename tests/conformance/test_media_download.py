@@ -15,6 +15,7 @@ from typing import Any
 import aiohttp
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fabric import free_port
 from support.ftp import Ftp
 from support.media import DAY, SCENE, add_photo, add_video
 from support.product import program
@@ -22,6 +23,7 @@ from support.world import World, world
 
 from anafi_mav.access_token import AccessToken, load_token
 from anafi_mav.arsdk.messages.mediastore import MediastoreState
+from anafi_mav.cli import main
 from anafi_mav.cli.media import add_arguments
 from anafi_mav.cli.media_transfer import delete_media, download_media, list_media
 from anafi_mav.config import MediaConfig
@@ -336,3 +338,11 @@ async def test_download_from_a_gateway_without_the_drone_is_refused() -> None:
         with pytest.raises(CommandRejected, match="no such file"):
             async for _ in client.read_from(item.resources[0]):
                 pass
+
+
+def test_media_command_without_a_gateway_names_it_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    """No drone is involved: the address is that of the gateway."""
+    assert main(["media", "list", "--gateway", f"127.0.0.1:{free_port()}"]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith("anafi-mav: no gateway answers at 127.0.0.1:")
+    assert "drone" not in error
