@@ -215,5 +215,6 @@ async def test_validation_flights_on_a_stalled_host_are_invalid() -> None:
             process.kill()
             await process.wait()
     assert process.returncode == 1
-    assert b"the flights are invalid: this machine was too slow for them and stood still for" in err
+    # By the sticks' times or by the pictures': which of the two, depends on the moments of the stops.
+    assert b"the flights are invalid: this machine was too slow for them" in err
     assert b"agrees" not in out
