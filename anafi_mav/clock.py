@@ -43,12 +43,11 @@ class Alarm:
     Setting it again replaces the time set before.
     """
 
-    __slots__ = ("_handle", "at", "call")
+    __slots__ = ("_call", "_handle", "at")
 
     def __init__(self, call: Callable[[], None]) -> None:
         """`call` may set the alarm again."""
-        self.call = call
-        """The function that it calls."""
+        self._call = call
         self._handle: asyncio.TimerHandle | None = None
         self.at: float | None = None
         """When it calls (s, loop clock); None after a cancellation or the call."""
@@ -77,7 +76,7 @@ class Alarm:
 
     def _fire(self) -> None:
         self._handle = self.at = None
-        self.call()
+        self._call()
 
 
 class YieldingCall:

@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 
-from anafi_mav.clock import Alarm
 from anafi_mav.errors import ConfigError
 from anafi_mav.sim.drone import DroneSpec, SimulatedDrone
 from anafi_mav.sim.log import Log, LogFile
@@ -64,7 +63,7 @@ class Simulator:
         self._period = TURN if all(spec.telemetry_rate <= 0.5 / TURN for spec in specs) else FAST_TURN
         self.speed = speed
         self._file = None if log is None else LogFile(log)
-        self._next_turn = Alarm(self._run)
+        self._next_turn: asyncio.TimerHandle | None = None
         self._stopped: asyncio.Future[None] | None = None
         """Has the error that stopped the world, if one did; None before the start."""
         self._last = self._due = 0.0
@@ -135,7 +134,9 @@ class Simulator:
 
     async def close(self) -> None:
         """Stop time and close all sockets. Idempotent."""
-        self._next_turn.cancel()
+        if self._next_turn is not None:
+            self._next_turn.cancel()
+            self._next_turn = None
         for drone in self.drones:
             await drone.close()
         if self._file is not None:
@@ -153,7 +154,7 @@ class Simulator:
             self._due += self._period
             if self._due < self._last:
                 self._due = self._last + self._period
-        self._next_turn.set(self._due)
+        self._next_turn = asyncio.get_running_loop().call_at(self._due, self._run)
 
     def _run(self) -> None:
         """Make the turn that is due."""

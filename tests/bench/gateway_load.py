@@ -149,7 +149,7 @@ async def measure(loop: _Loop, drones: int, endpoints: int, rounds: int, query: 
             raise SystemExit("not all drones are connected")
     await _pass(loop, round(8.0 / STEP))
     replay = Replay(gateway, loop, await _record(loop, gateway))
-    simulator._next_turn.cancel()
+    simulator._next_turn.cancel()  # type: ignore[union-attr]
     await replay.run()
     if profiled:
         profile = cProfile.Profile()

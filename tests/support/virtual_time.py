@@ -22,7 +22,6 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from anafi_mav.clock import Alarm
 from anafi_mav.sim import Simulator
 
 START = 1000.0
@@ -42,8 +41,7 @@ _now = START
 
 def is_worlds(callback: Callable[..., object]) -> bool:
     """Whether a timer is the one that moves the drones of a simulator."""
-    alarm = getattr(callback, "__self__", None)
-    return isinstance(alarm, Alarm) and isinstance(getattr(alarm.call, "__self__", None), Simulator)
+    return isinstance(getattr(callback, "__self__", None), Simulator)
 
 
 def now() -> float:
