@@ -106,27 +106,29 @@ async def test_region_is_locked_until_a_client_aims_the_gimbal() -> None:
         assert len(w.commands("ardrone3.Piloting.StopPilotedPOI")) == 1
 
 
+def report_place(system: Client, to: tuple[float, float]) -> None:
+    """Let another system report that it is at a place, at the height of home."""
+    place = (round(to[0] * 1e7), round(to[1] * 1e7), round(HOME[2] * 1e3), 0, 0, 0, 0, 0)
+    system.send(dialect.MAVLink_global_position_int_message(0, *place))
+
+
 async def test_region_follows_another_system_that_reports_its_position() -> None:
     async with world() as w:
         await w.take_off(20.0)
         other = await w.connect(7, 1)
 
-        def moves(to: tuple[float, float]) -> None:
-            place = (round(to[0] * 1e7), round(to[1] * 1e7), round(HOME[2] * 1e3), 0, 0, 0, 0, 0)
-            other.send(dialect.MAVLink_global_position_int_message(0, *place))
-
         assert (await w.client.command(ROI_SYSTEM, 7.0)).result == REJECTED
         assert (await w.client.command(ROI_SYSTEM, NAN)).result == REJECTED
-        moves(EAST)
+        report_place(other, EAST)
         assert (await w.client.command(ROI_SYSTEM, 7.0)).result == ACCEPTED
         await heads(w, 90.0)
-        moves(NORTH)
+        report_place(other, NORTH)
         await heads(w, 0.0)
         await looks(w, pitch_absolute=-math.degrees(math.atan2(20.0, 60.0)))
         await w.client.wait("STATUSTEXT", lambda m: m.text == "ROI kept: no position of system 7", timeout=8.0)
         assert (await w.client.command(NO_ROI)).result == ACCEPTED
         count = len(pois(w))
-        moves(EAST)
+        report_place(other, EAST)
         await next_truth(w)
         await next_truth(w)
         assert len(pois(w)) == count
@@ -138,10 +140,6 @@ async def test_region_of_a_place_follows_no_system_of_an_older_command(monkeypat
         await w.take_off(20.0)
         other = await w.connect(7, 1)
 
-        def moves(to: tuple[float, float]) -> None:
-            place = (round(to[0] * 1e7), round(to[1] * 1e7), round(HOME[2] * 1e3), 0, 0, 0, 0, 0)
-            other.send(dialect.MAVLink_global_position_int_message(0, *place))
-
         poi = w.gateway.systems[0].drone.poi
         confirmed = poi.start
 
@@ -151,11 +149,11 @@ async def test_region_of_a_place_follows_no_system_of_an_older_command(monkeypat
                 assert (await w.client.command(ROI, x=NORTH[0], y=NORTH[1], z=HOME[2])).result == ACCEPTED
 
         monkeypatch.setattr(poi, "start", start)
-        moves(EAST)
+        report_place(other, EAST)
         await next_truth(w)
         await w.client.command(ROI_SYSTEM, 7.0)
         await heads(w, 0.0)
-        moves(geo.destination(HOME[0], HOME[1], 0.0, 40.0))
+        report_place(other, geo.destination(HOME[0], HOME[1], 0.0, 40.0))
         for _ in range(10):
             await next_truth(w)
         assert len(pois(w)) == 2
