@@ -113,15 +113,17 @@ async def test_item_whose_report_crosses_a_hold_is_reached(model: str) -> None:
         assert reached(w) == [0, 1, 2, 3]
 
 
-def take_time(monkeypatch: pytest.MonkeyPatch, seconds: float = 1.0) -> None:
-    """Let the drone take its time for each file."""
-    upload_file = FlightPlan.upload
+def take_time(monkeypatch: pytest.MonkeyPatch, seconds: float = 1.0) -> asyncio.Event:
+    """Let the drone take its time for each file; return what is set once it has begun to."""
+    upload_file, has_begun = FlightPlan.upload, asyncio.Event()
 
     async def slowly(self: FlightPlan, plan: bytes) -> str:
+        has_begun.set()
         await asyncio.sleep(seconds)
         return await upload_file(self, plan)
 
     monkeypatch.setattr(FlightPlan, "upload", slowly)
+    return has_begun
 
 
 @pytest.mark.parametrize("flies", [False, True])
@@ -171,10 +173,10 @@ async def test_present_item_that_is_chosen_again_replaces_another_choice(monkeyp
         await put(w, [takeoff(6.0), *(way(60.0, 20.0 * number, 6.0) for number in range(3))])
         await start(w)
         await state(w, ACTIVE, seq=1, since=0)
-        take_time(monkeypatch)
+        has_begun = take_time(monkeypatch)
         mark = w.client.mark()
         w.client.send_command(CHOOSE, 3)
-        await asyncio.sleep(0.3)  # of the client, between its commands
+        await has_begun.wait()
         w.client.send_command(CHOOSE, 1)
         assert (await until(w.client, mark, 2))[1] == (CHOOSE, ACCEPTED)
         assert (await w.client.wait("MISSION_CURRENT")).seq == 1
@@ -184,16 +186,15 @@ async def test_present_item_that_is_chosen_again_replaces_another_choice(monkeyp
 async def test_start_that_waits_for_another_does_not_fly_a_mission_uploaded_meanwhile(
     monkeypatch: pytest.MonkeyPatch, command: tuple[int, ...]
 ) -> None:
-    take_time(monkeypatch)
+    has_begun = take_time(monkeypatch)
     async with world(speed=1.0, web=True) as w:
         other = await w.connect(sysid=240)
         await w.take_off(6.0)
         await put(w, CORNERS)
         mark = other.mark()
         w.client.send_command(START, 0, 0)
-        await asyncio.sleep(0.2)  # of the clients, between their commands
+        await has_begun.wait()
         other.send_command(*command)
-        await asyncio.sleep(0.2)
         await put(w, [takeoff(6.0), way(-10.0, 0.0, 6.0)])
         assert await until(other, mark, 1) == [(command[0], dialect.MAV_RESULT_TEMPORARILY_REJECTED)]
         await said(w, "another was uploaded meanwhile", mark)
@@ -352,12 +353,12 @@ async def stays_out(w: World) -> None:
 
 
 async def test_fence_that_is_uploaded_while_a_start_prepares_is_not_entered(monkeypatch: pytest.MonkeyPatch) -> None:
-    take_time(monkeypatch, 1.5)
+    has_begun = take_time(monkeypatch)
     async with world(speed=1.0, web=True) as w:
         await w.take_off(10.0)
         await put(w, [way(0.0, 0.0, 10.0), way(60.0, 0.0, 10.0)])
         w.client.send_command(START, 0, 0)
-        await asyncio.sleep(0.7)  # of the client: half of the time that the drone takes for the file
+        await has_begun.wait()
         assert (await upload(w.client, ZONE, FENCE)).type == 0
         await stays_out(w)
 

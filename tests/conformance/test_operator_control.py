@@ -508,10 +508,10 @@ async def test_parameter_write_that_waits_is_refused_once_another_station_is_the
         before = await read(student, "ANF_RTH_ALT")
         w.drone.faults.mute = True  # the first write waits for its answer
         send_set(student, "ANF_RTH_ALT", 77.0, before.param_type)
-        await asyncio.sleep(0.2)
+        await read(student, "ANF_RTH_ALT")  # once it is answered the write before it is under way
         mark = student.mark()
         send_set(student, "ANF_RTH_ALT", 88.0, before.param_type)
-        await asyncio.sleep(0.2)
+        await read(student, "ANF_RTH_ALT")
         assert await sent(teacher, control_request(teacher)) == ACCEPTED
         w.drone.faults.mute = False
         error = await student.wait("PARAM_ERROR", since=mark)
@@ -526,10 +526,9 @@ async def test_camera_setting_that_waits_is_refused_once_another_station_is_the_
         kind = dialect.MAV_PARAM_EXT_TYPE_REAL32
         w.drone.faults.mute = True  # the first write waits for its answer
         ext_params.send_set(student, "CAM_SATURATION", 1.0, kind)
-        await asyncio.sleep(0.2)
         mark = student.mark()
         ext_params.send_set(student, "CAM_EV", 1.0, kind)
-        await asyncio.sleep(0.2)
+        await ext_params.read(student, "CAM_EV")  # once it is answered both writes have arrived
         assert await sent(teacher, control_request(teacher)) == ACCEPTED
         w.drone.faults.mute = False
         final = ext_params.FINAL

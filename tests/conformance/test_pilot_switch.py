@@ -253,11 +253,11 @@ async def test_pilots_stick_is_seen_in_a_takeoff_that_is_reported_late() -> None
         mark = w.client.mark()
         w.client.send_command(TAKEOFF, x=0.0, y=0.0, z=15.0)
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "motor_ramping", 10.0)
-        await asyncio.sleep(0.6)
+        await watched(0.6)
         skycontroller(w).stick(PITCH_STICK, 40)
         await said(w.client, "Skycontroller pilot has control: stick moved", mark)
         skycontroller(w).stick(PITCH_STICK, 0)
-        await asyncio.sleep(8.0)
+        await watched(8.0)
         assert heard(w, "moveBy") == []
 
 

@@ -112,6 +112,13 @@ class ScriptedDevice:
         for event in events:
             self.session.send(event)
 
+    async def acknowledged(self, event: Message) -> None:
+        """Send an event, and wait until it and all before it are acknowledged."""
+        received = asyncio.Event()
+        token = self.session.send(event)
+        self.session.on_delivered = lambda one, has_arrived: received.set() if one == token and has_arrived else None
+        await asyncio.wait_for(received.wait(), 10.0)
+
     def got(self, kind: type[MessageT]) -> list[MessageT]:
         """The commands of this kind so far."""
         return [message for _, message in self.received if isinstance(message, kind)]

@@ -503,11 +503,10 @@ async def test_drone_exchanged_in_a_silence_has_a_new_connection() -> None:
     other = "PI040416DA9H000002"
     async with behind() as (drone, device):
         device.script[skyctrl.AllStates] = lambda _: [connected_to(other), skyctrl.AllStatesChanged()]
-        await asyncio.sleep(0.1)  # until all states are acknowledged, and not repeated
+        await device.acknowledged(skyctrl.BatteryChanged(60))  # nothing of before is repeated after the silence
         device.session.mute = True
         await asyncio.wait_for(asyncio.shield(drone.lost), 10.0)
         attempt = asyncio.create_task(drone.connect())
-        await asyncio.sleep(0.1)  # until the ping that the silence began with is lost, too
         device.session.mute = False
         device.say(connected_to(other))
         await attempt
