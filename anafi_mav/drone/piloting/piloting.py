@@ -349,7 +349,7 @@ class Piloting(PilotingSettings):
         state, commands = self.state, list[Message]()
         if self._moves.to is not None or state.move_to == MoveToStatus.RUNNING:
             commands.append(ardrone3.CancelMoveTo())
-        if self._moves.by:
+        if self._moves.by or self._moves.inherited:
             commands.append(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
         if state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING):
             commands.append(ardrone3.StopPilotedPOI())

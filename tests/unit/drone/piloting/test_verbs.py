@@ -408,6 +408,16 @@ async def test_end_of_a_cancelled_move_by_leaves_the_next(drone: Drone, device: 
     assert (await second).right == 5.0
 
 
+async def test_move_by_of_an_earlier_connection_is_among_what_ends_an_unheard_motion(device: ScriptedDevice) -> None:
+    """No event tells of it: it may be flown until a hover has cancelled it."""
+    states = [ardrone3.FlyingStateChanged(FlyingState.HOVERING), *STATES[1:], common.AllStatesChanged()]
+    device.script[common.AllStates] = lambda _: states
+    async with device.connected() as drone:
+        assert drone.piloting.stopping() == [ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0)]
+        drone.piloting.hover()
+        assert drone.piloting.stopping() == []
+
+
 async def test_timed_out_move_by_is_stopped(drone: Drone, device: ScriptedDevice) -> None:
     await flying(drone, device)
     with pytest.raises(CommandTimeout):
