@@ -87,7 +87,7 @@ class Ftp:
             mark, seq = self.client.mark(), self.seq
             self.send(BURST, session=opened.session, size=239, offset=len(content), seq=seq)
             while True:
-                part = await self._part(len(content), mark)
+                mark, part = await self._part(len(content), mark)
                 assert part.opcode == ACK, part
                 content += part.data
                 self.seq = part.seq + 1
@@ -104,12 +104,15 @@ class Ftp:
         assert reply.error == EOF
         return lines
 
-    async def _part(self, offset: int, mark: int) -> Reply:
-        """The part of a burst that begins at this offset."""
-        message = await self.client.wait(
+    async def _part(self, offset: int, mark: int) -> tuple[int, Reply]:
+        """The part of a burst that begins at this offset, behind where it stands in what was received.
+
+        Parts come in order: the next one stands later.
+        """
+        place = await self.client.place(
             "FILE_TRANSFER_PROTOCOL",
             lambda m: (taken_apart(m).req_opcode, taken_apart(m).offset) == (BURST, offset),
             since=mark,
             timeout=ANSWER_LIMIT,
         )
-        return taken_apart(message)
+        return place, taken_apart(self.client.received[place][1])

@@ -137,14 +137,25 @@ class Client:
         timeout: float = 5.0,
     ) -> Any:
         """The first message of a kind, or of several, from a mark (default: from now) on that `accept` likes."""
+        return self.received[await self.place(kind, accept, since=since, timeout=timeout)][1]
+
+    async def place(
+        self,
+        kind: str | tuple[str, ...],
+        accept: Callable[[Any], bool] = lambda message: True,
+        *,
+        since: int | None = None,
+        timeout: float = 5.0,
+    ) -> int:
+        """Where the message that `wait` returns stands in what was received."""
         kinds = (kind,) if isinstance(kind, str) else kind
         position = self.mark() if since is None else since
         start = position
         deadline = time.monotonic() + timeout
         while True:
             for place, one in enumerate(self.received.kinds[position:], position):
-                if one in kinds and accept(message := self.received[place][1]):
-                    return message
+                if one in kinds and accept(self.received[place][1]):
+                    return place
             position = self.mark()
             if not await self._news(kinds, deadline):
                 observed = {*kinds, "STATUSTEXT", "COMMAND_ACK"}
