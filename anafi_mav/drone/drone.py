@@ -219,8 +219,8 @@ class Drone:
         """The link was lost as another controller's handshake would end it."""
         self._dismissed: common.DisconnectionCause | None = None
         """Cause with which the drone announced the end of the connection."""
-        self._hover_due = False
-        """Motion that was under way when a silence began is to be stopped when the silence ends."""
+        self._hover_due: str | None = None
+        """Serial number of the aircraft whose motion is to be stopped when its silence ends; None: of none."""
         self._opening = False
         self._complete = False
         self._counters: Counter[str] = Counter()
@@ -346,10 +346,10 @@ class Drone:
     def _hover_after_silence(self) -> None:
         """Stop motion that continues from before a silence.
 
-        A flight plan, a landing and a return are not stopped.
+        A flight plan, a landing and a return are not stopped, and neither is another aircraft that answers there now.
         """
-        due, self._hover_due = self._hover_due, False
-        if due and self._has_motion_to_stop:
+        due, self._hover_due = self._hover_due, None
+        if due == self.identity.serial and self._has_motion_to_stop:
             with contextlib.suppress(LinkLost):
                 self.piloting.hover()
 
@@ -372,8 +372,9 @@ class Drone:
         self._fading = session
         self._heard = asyncio.get_running_loop().create_future()
         # Where the pilot at a Skycontroller has control, nothing of ours flies, and a hover would be against him.
-        self._hover_due = not self.controller.pilot_has_source
-        stops = self.piloting.stopping() if self._hover_due and self._has_motion_to_stop else ()
+        is_ours = not self.controller.pilot_has_source
+        self._hover_due = self.identity.serial if is_ours else None
+        stops = self.piloting.stopping() if is_ours and self._has_motion_to_stop else ()
         last = (*stops, *self.controller.hand_back_due)
         self._disconnected(reason, silent=True)
         for message in last:

@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 import pytest
+from support.world import loopback
 
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import alarms, ardrone3, rth
@@ -299,3 +300,29 @@ async def test_the_link_is_lost_in_silence_and_found_again(drone: Drone, real: S
     await real.wait_log(lambda entry: entry.name.endswith("moveBy"), since=reconnected)
     sent = commands(real, since=reconnected)
     assert [name for name in sent if name != "PCMD"] == ["CancelMoveTo", "CancelMoveTo", "moveBy"]
+
+
+@pytest.mark.parametrize("is_same", [True, False])
+async def test_hover_after_a_silence_is_for_the_aircraft_that_was_silent(is_same: bool) -> None:
+    """Each ANAFI has 192.168.42.1 in its own Wi-Fi: another one that flies there was not this program's to stop."""
+    address = loopback()
+
+    def aircraft(serial: str) -> Simulator:
+        spec = DroneSpec(address=address, home=HOME, serial=serial, http_port=None, rtsp_port=None)
+        return Simulator([spec], speed=5.0, seed=1)
+
+    drone = Drone(address)
+    async with aircraft("PI040416AA0A000001") as simulator:
+        await drone.connect()
+        await flying(drone)
+        simulator.drones[0].faults.mute = True
+        await asyncio.wait([drone.lost])
+    async with aircraft("PI040416AA0A000001" if is_same else "PI040416AA0A000002") as simulator:
+        real = simulator.drones[0]
+        real.firmware.receive(ardrone3.TakeOff(), now())  # another controller's command
+        await real.wait_log(lambda entry: entry.name == "flying" and entry.args["to"] == "hovering")
+        await drone.connect()
+        await real.wait_log(lambda entry: entry.name.endswith("AllSettings"))
+        await asyncio.sleep(0.2)  # of the first PCMDs
+        assert ("PCMD" in commands(real)) == is_same
+        await drone.close()
