@@ -14,7 +14,7 @@ from collections.abc import Callable
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, common, rth
 from anafi_mav.arsdk.messages import move as guided
-from anafi_mav.arsdk.messages.ardrone3 import FlyingState, FlyingStateChanged, OrientationMode
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState, FlyingStateChanged, MoveToStatus, OrientationMode
 from anafi_mav.arsdk.messages.rth import RthState
 from anafi_mav.drone.element import Element, Position
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation, loop_time
@@ -171,23 +171,38 @@ class GuidedMoves:
             limits.yaw_rate_dps,
         )
 
-    def stop(self, why: str) -> bool:
-        """Cancel our moveTo and moveBys; return True when a moveTo was cancelled.
+    def stop(self, why: str) -> None:
+        """Cancel our moveTo and moveBys.
 
         The cancellations go through the command queue in sequence, so a later move is not hit.
         """
         if self._moves.to is None and not self._moves.by:
-            return False
-        journey = self._moves.cancel_to(why)
-        if journey is not None:
-            self._commander.cancel(journey.answer.token)
-            self._commander.send_stop(ardrone3.CancelMoveTo())
-        moves = self._moves.cancel_by(why, loop_time())
-        for move in moves:
-            self._commander.cancel(move.answer.token)
-        if moves:
-            self._commander.send_stop(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
-        return journey is not None
+            return
+        commands = self.ends(of_others=False)
+        self.drop(why)
+        for command in commands:
+            self._commander.send_stop(command)
+
+    def ends(self, *, of_others: bool) -> list[Message]:
+        """Return the commands that end our moveTo and moveBys.
+
+        `of_others`: also those of another controller or an earlier connection, as far as the drone reports them. A
+        return goes on.
+        """
+        state, home, moves, commands = self._flight.state, self._home.state, self._moves, list[Message]()
+        is_other = state.move_to == MoveToStatus.RUNNING and not home.returning_by_itself
+        if moves.to is not None or (of_others and is_other):
+            commands.append(ardrone3.CancelMoveTo())
+        may_be_other = moves.inherited and state.flying in _FLIES and not home.returning
+        if moves.by or (of_others and may_be_other):
+            commands.append(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
+        return commands
+
+    def drop(self, why: str) -> None:
+        """Let our moveTo and moveBys end here, which `ends` ends in the drone."""
+        for move in (self._moves.cancel_to(why), *self._moves.cancel_by(why, loop_time())):
+            if move is not None:
+                self._commander.cancel(move.answer.token)
 
     def require_free(self) -> None:
         """Raise `CommandRejected` while the drone returns by itself or lands.

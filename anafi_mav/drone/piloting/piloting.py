@@ -37,8 +37,6 @@ from anafi_mav.drone.sent_commands import QUIET, Slot
 from anafi_mav.drone.status.home import Home
 from anafi_mav.errors import NotSupported
 
-_IN_FLIGHT = frozenset({FlyingState.HOVERING, FlyingState.FLYING})
-
 
 class Piloting(PilotingSettings):
     """The verbs that fly the drone. `pilot` and `hover` act at once; all others are coroutines.
@@ -342,15 +340,11 @@ class Piloting(PilotingSettings):
         self._sticks.centre()
 
     def stopping(self) -> list[Message]:
-        """Return the commands that end the present motion, for a drone that is not heard.
+        """Return the commands that end what the drone flies by itself, as far as known.
 
-        Nothing that this program started ends by this call.
+        A landing, a return and a flight plan go on. Nothing that this program started ends by this call.
         """
-        state, commands = self.state, list[Message]()
-        if self._moves.to is not None or state.move_to == MoveToStatus.RUNNING:
-            commands.append(ardrone3.CancelMoveTo())
-        if self._moves.by or self._moves.inherited:
-            commands.append(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
+        state, commands = self.state, self._guided.ends(of_others=True)
         if state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING):
             commands.append(ardrone3.StopPilotedPOI())
         if state.following not in (None, FollowMeMode.NONE):
@@ -361,19 +355,16 @@ class Piloting(PilotingSettings):
 
     def _end_movement(self, why: str) -> None:
         """Cancel what the drone flies by itself, as far as known; a landing or return goes on."""
-        state = self.state
-        cancelled = self._guided.stop(why)
-        if not self._home.state.returning_by_itself:
-            if state.move_to == MoveToStatus.RUNNING and not cancelled:
-                self._commander.send_stop(ardrone3.CancelMoveTo())
-            if self._moves.inherited and state.flying in _IN_FLIGHT and not self._home.state.returning:
+        commands = self.stopping()
+        self._guided.drop(why)
+        for command in commands:
+            if isinstance(command, ardrone3.MoveBy):
                 self._moves.expect_stray(loop_time())
-                self._commander.send_stop(ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0))
-        if state.poi in (PoiStatus.RUNNING, PoiStatus.PENDING):
-            self._commander.send_stop(ardrone3.StopPilotedPOI())
-        self._stop_following(state)
-        self._stop_animation(state)
-        if state.plan == PlayingState.PLAYING or self._commander.sent.is_executed(Slot.PLAN):
+            if isinstance(command, follow_me.Stop | animation.Cancel):
+                self._stop_once(command)
+            else:
+                self._commander.send_stop(command)
+        if self.state.plan == PlayingState.PLAYING or self._commander.sent.is_executed(Slot.PLAN):
             self._commander.send_stop(common.Pause())
 
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
