@@ -31,7 +31,7 @@ from support.fault_scenarios import (
 )
 from support.params import write
 from support.setpoints import POSITION_ONLY, VELOCITY_ONLY, local, streaming
-from support.world import World, world
+from support.world import ARMED, World, world
 
 from anafi_mav.arsdk.messages import ardrone3, common, rth
 from anafi_mav.sim.world.faults import Impairment
@@ -140,12 +140,37 @@ async def test_unconfirmed_stop_does_not_return_the_drone_to_an_older_stream(com
         await w.take_off(21.0)
         async with streaming(companion, FAR):
             await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 5.0, 20.0)
-            w.drone.faults.unreported = frozenset({MOVED_TO, rth.State.NAME})
+            w.drone.faults.unreported = frozenset({MOVED_TO, FLYING, rth.State.NAME})
             ack = await w.client.command(*command, timeout=10.0)
             moves = len(heard(w, "moveTo"))
             await watched(5.0)
         assert ack.result == FAILED
         assert len(heard(w, "moveTo")) == moves
+
+
+@pytest.mark.parametrize("lands", [False, True])
+async def test_hold_is_accepted_after_a_goto_whose_end_is_never_reported(lands: bool) -> None:
+    """The drone hovers, and has received the cancellation; after a landing no goto is left that could be flown."""
+    async with world(speed=1.0) as w:
+        await w.take_off(5.0)
+        assert await goto(w, 80.0, 5.0) == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 10.0, 20.0)
+        w.drone.faults.unreported = frozenset({MOVED_TO})
+        began = now()
+        if lands:
+            assert (await w.client.command(LAND_CMD)).result == ACCEPTED
+            await flies(w, "landed", began)
+            await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED)
+            await w.take_off(5.0)
+        else:
+            assert (await w.client.command(SET_MODE, *PX4_HOLD, timeout=10.0)).result == ACCEPTED
+            assert flown(w)[-1] == "hovering"
+        began = now()
+        assert (await w.client.command(SET_MODE, *PX4_HOLD, timeout=10.0)).result == ACCEPTED
+        assert now() - began < 0.5
+        stopped = w.drone.pose.north
+        await watched(3.0)
+        assert abs(w.drone.pose.north - stopped) < 1.0
 
 
 async def test_landing_that_is_reported_late_is_not_ended_by_an_older_stream() -> None:

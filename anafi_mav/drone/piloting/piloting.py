@@ -18,13 +18,15 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
+from msgspec.structs import replace
+
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import animation, ardrone3, common, follow_me, rth
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveToStatus, OrientationMode, PoiStatus
 from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.drone.element import Reducer
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation, loop_time
 from anafi_mav.drone.piloting.guided_moves import GuidedMoves, ReturnHome
 from anafi_mav.drone.piloting.landing import LandingEnd
 from anafi_mav.drone.piloting.motors import Motors
@@ -368,10 +370,14 @@ class Piloting(PilotingSettings):
             self._commander.send_stop(common.Pause())
 
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Hover, and return when the drone has confirmed the end of everything that was running."""
-        answers = []
+        """Hover, and return when the drone has confirmed the end of everything that was running.
+
+        A hover that lasts confirms that of a moveTo, too: the report of its end may be missing.
+        """
+        answers, move_to = [], None
         if (self._moves.to is not None and self._moves.to.running) or self.state.move_to == MoveToStatus.RUNNING:
-            answers.append(self._commander.expect((ardrone3.MoveToChanged,), _ends_move_to))
+            move_to = self._commander.expect((ardrone3.MoveToChanged,), _ends_move_to)
+            answers.append(move_to)
         if self._moves.by:
             answers.append(self._commander.expect((ardrone3.MoveByEnd,), lambda message: True))
         if self.state.plan == PlayingState.PLAYING:
@@ -387,6 +393,9 @@ class Piloting(PilotingSettings):
             self.hover()
             for answer in answers:
                 answer.expire_after(timeout, "hover")
+            if move_to is not None:
+                await self._commander.stops_delivered("hover", timeout)
+                await self._wait_for_hover(move_to)
             for answer in answers:
                 await answer.wait()
             # Of what was given up before it was confirmed no event may speak; but the order to stop has to arrive.
@@ -394,6 +403,24 @@ class Piloting(PilotingSettings):
         finally:
             for answer in answers:
                 answer.close()
+
+    async def _wait_for_hover(self, move_to: Expectation[bool]) -> None:
+        """Wait for the end of a moveTo that the drone has received the cancellation of.
+
+        It is over when the drone has hovered for `QUIET` without a report.
+        """
+        hover = self._commander.expect(
+            (ardrone3.FlyingStateChanged,), lambda message: True if message.state == FlyingState.HOVERING else None
+        )
+        try:
+            if self.state.flying != FlyingState.HOVERING:
+                await asyncio.wait({move_to.future, hover.future}, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait({move_to.future}, timeout=QUIET)
+        finally:
+            hover.close()
+        if not move_to.future.done() and self.state.flying == FlyingState.HOVERING:
+            self.set_state(replace(self.state, move_to=None))
+            move_to.succeed(True)
 
     def _stop_following(self, state: PilotingState) -> None:
         if state.following not in (None, FollowMeMode.NONE):

@@ -62,7 +62,7 @@ class PilotingState(msgspec.Struct, frozen=True):
     steady: bool | None = None
     """True when the drone lies or hovers still."""
     move_to: MoveToStatus | None = None
-    """Status of the last moveTo."""
+    """Status of the last moveTo; None also after one whose end was not reported."""
     move_target: Position | None = None
     """Target of that moveTo; altitude above the take-off point."""
     poi: PoiStatus | None = None
@@ -150,12 +150,19 @@ def _move_to(state: PilotingState, message: ardrone3.MoveToChanged) -> PilotingS
     return replace(state, move_to=message.status, move_target=target)
 
 
-REDUCERS: Mapping[type[Message], Reducer] = {
-    ardrone3.FlyingStateChanged: lambda state, message: replace(
+def _flying(state: PilotingState, message: ardrone3.FlyingStateChanged) -> PilotingState:
+    """Motors that stand end a moveTo, whose end may not be reported."""
+    is_over = message.state in MOTORS_OFF and state.move_to == MoveToStatus.RUNNING
+    return replace(
         state,
         flying=message.state,
         ready_for_hand_launch=state.ready_for_hand_launch and message.state == FlyingState.USERTAKEOFF,
-    ),
+        move_to=None if is_over else state.move_to,
+    )
+
+
+REDUCERS: Mapping[type[Message], Reducer] = {
+    ardrone3.FlyingStateChanged: _flying,
     ardrone3.UserTakeoffReady: lambda state, message: replace(state, ready_for_hand_launch=True),
     ardrone3.AttitudeChanged: _attitude,
     ardrone3.SpeedChanged: _velocity,
