@@ -133,6 +133,23 @@ async def test_hold_ends_a_climb_that_the_late_end_of_an_equal_one_crosses(late:
         assert w.drone.pose.up < min(up + 2.0, 16.0)
 
 
+@pytest.mark.parametrize("late", [1.3, 1.6])
+async def test_turn_is_not_accepted_by_the_late_end_of_a_like_one_before_it_can_be_over(late: float) -> None:
+    """It arrives after the time of the fastest drone, and before that of the rate which was commanded."""
+    async with world(speed=1.0) as w:
+        await w.take_off(5.0)
+        w.drone.faults.late = {MOVED_BY: late}
+        began = now()
+        w.client.send_command(YAW, 40, 30, 1, 1)
+        await flies(w, "flying", began)
+        await flies(w, "hovering", now())
+        mark, heading = w.client.mark(), w.drone.pose.yaw
+        w.client.send_command(YAW, 41, 30, 1, 1)
+        while (YAW, ACCEPTED) not in (found := results(w.client, mark)):
+            await until(w.client, mark, len(found) + 1)
+        assert math.degrees(w.drone.pose.yaw - heading) > 38.0
+
+
 @pytest.mark.parametrize("command", [(SET_MODE, *BRAKE), (dialect.MAV_CMD_DO_PAUSE_CONTINUE, 0), (RTL,)])
 async def test_unconfirmed_stop_does_not_return_the_drone_to_an_older_stream(command: tuple[float, ...]) -> None:
     async with world(speed=1.0, flavour="ardupilot") as w:

@@ -73,11 +73,13 @@ class GuidedMoves:
             raise LocalProtocolError("a relative move is not a number")
         self.require_free()
         command = self._move_by_command(front, right, down, turn, turn_rate_dps)
+        turn_rate = None if turn_rate_dps is None else turn_rate_dps * RAD_PER_DEG
         if timeout is None:
             timeout = MOVE_BY_MARGIN + (math.hypot(front, right, down) + abs(turn)) / MOVE_BY_SLOWEST
-            if turn_rate_dps is not None:
-                timeout += abs(turn) / (turn_rate_dps * RAD_PER_DEG)
-        move = Move(self._commander.expect((), _decided_elsewhere), offset=Displacement(front, right, down, turn))
+            if turn_rate is not None:
+                timeout += abs(turn) / turn_rate
+        offset = Displacement(front, right, down, turn)
+        move = Move(self._commander.expect((), _decided_elsewhere), offset=offset, turn_rate=turn_rate)
         self._sticks.let_go()
         self._commander.abort_pending("a move was asked for")
         self._moves.by.append(move)

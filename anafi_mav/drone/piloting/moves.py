@@ -94,18 +94,24 @@ class Displacement(msgspec.Struct, frozen=True):
 class Move:
     """A move under way.
 
-    `target` is set for a moveTo only; its altitude is above the take-off point. `offset` is set for a moveBy only.
+    `target` is set for a moveTo only; its altitude is above the take-off point. `offset` is set for a moveBy only, and
+    `turn_rate` (rad/s) if its turn has a limit.
     """
 
-    __slots__ = ("answer", "begun", "echo", "ended", "offset", "running", "target")
+    __slots__ = ("answer", "begun", "echo", "ended", "offset", "running", "target", "turn_rate")
 
     def __init__(
-        self, answer: Expectation[Any], target: Position | None = None, offset: Displacement | None = None
+        self,
+        answer: Expectation[Any],
+        target: Position | None = None,
+        offset: Displacement | None = None,
+        turn_rate: float | None = None,
     ) -> None:
         self.answer = answer
         """The wait of the verb that started it."""
         self.target = target
         self.offset = offset
+        self.turn_rate = _FASTEST_TURN if turn_rate is None else min(turn_rate, _FASTEST_TURN)
         self.begun = asyncio.get_running_loop().time()
         """When it was about to be sent, s."""
         self.echo: Position | None = None
@@ -131,6 +137,19 @@ class Move:
     def end(self, how: MoveEnd) -> None:
         if not self.ended.done():
             self.ended.set_result(how)
+
+    @property
+    def earliest_end(self) -> float:
+        """When a moveBy can be over at the earliest (s).
+
+        At the speed of the fastest drone, and as near to its end as counts as there.
+        """
+        if (offset := self.offset) is None:
+            return self.begun
+        length, angle = _TINY
+        over_ground = (math.hypot(offset.front, offset.right) - length) / FASTEST
+        climb, turn = (abs(offset.down) - length) / _FASTEST_CLIMB, (abs(offset.turn) - angle) / self.turn_rate
+        return self.begun + max(over_ground, climb, turn, 0.0)
 
     def is_to(self, message: ardrone3.MoveToChanged) -> bool:
         """Does this event speak of this move's target?"""
@@ -192,12 +211,6 @@ def _is_tiny(offset: Displacement | None) -> bool:
         max(abs(offset.front), abs(offset.right), abs(offset.down)) <= length
         and abs(math.remainder(offset.turn, 2.0 * math.pi)) <= angle
     )
-
-
-def _shortest(offset: Displacement) -> float:
-    """Return the time (s) that every drone needs for a moveBy."""
-    over_ground = math.hypot(offset.front, offset.right) / FASTEST
-    return max(over_ground, abs(offset.down) / _FASTEST_CLIMB, abs(offset.turn) / _FASTEST_TURN)
 
 
 def _leads_elsewhere(message: ardrone3.MoveByEnd, offset: Displacement | None) -> bool:
@@ -429,7 +442,7 @@ class Moves:
         """Return True when this event belongs to a moveBy that was cancelled before the present one.
 
         Nothing but a newer moveBy interrupts one, a move that asks for more than a drone tells from nothing does not
-        succeed by staying, and none is flown faster than a drone flies.
+        succeed by staying, and none is flown faster than a drone flies, or than it was to turn.
         """
         if now >= self._stray_until:
             return False
@@ -440,7 +453,7 @@ class Moves:
         went_nowhere = max(abs(message.dX), abs(message.dY), abs(message.dZ), abs(message.dPsi)) < _NO_MOVE
         move = self.by[0]
         offset = move.offset
-        is_early = offset is not None and now < move.begun + _shortest(offset) and not _is_short(message, offset)
+        is_early = now < move.earliest_end and not _is_short(message, offset)
         return is_early or (went_nowhere and not _is_tiny(offset)) or _leads_elsewhere(message, offset)
 
     def on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
