@@ -426,6 +426,13 @@ class CommandHistory:
         ended = effect is Effect.LAPSING and mode is not None and mode is not command.mode
         return None if effect is Effect.RETURN or ended or not newest.still_holds else newest.result
 
+    def was_cancelled(self, client: Hashable, id: int, now: float) -> bool:
+        """Return True when this client's newest action was this command, and has just ended with CANCELLED."""
+        newest = self._newest.get(client)
+        if newest is None or newest.command.id != id or newest.result != dialect.MAV_RESULT_CANCELLED:
+            return False
+        return is_in_window(newest, now)
+
     def begin(self, client: Hashable, command: Command) -> Execution:
         """Note that an action begins; this client's next one is compared with it."""
         self._newest.pop(client, None)  # so that the dictionary is in the order of use

@@ -23,15 +23,17 @@ from support.fault_scenarios import (
     watched,
 )
 from support.mav import NAN, Client
+from support.missions import put, way
 from support.world import HOME, RETURN, world
 
 from anafi_mav import geo
 from anafi_mav.mavlink import dialect
 
-MAV_CMD_DO_FLIGHTTERMINATION, PAUSE, STANDARD_MODE = (
+MAV_CMD_DO_FLIGHTTERMINATION, PAUSE, STANDARD_MODE, START = (
     dialect.MAV_CMD_DO_FLIGHTTERMINATION,
     dialect.MAV_CMD_DO_PAUSE_CONTINUE,
     dialect.MAV_CMD_DO_SET_STANDARD_MODE,
+    dialect.MAV_CMD_MISSION_START,
 )
 
 
@@ -128,3 +130,36 @@ async def test_stop_is_not_cancelled_by_another_client() -> None:
         assert await until(w.client, mark, 1) == [(PAUSE, ACCEPTED)]
         await watched(0.2)
         assert heard(w, "CancelMoveTo") == ["CancelMoveTo"]
+
+
+async def test_start_of_another_client_that_waits_for_a_cancelled_one_is_flown() -> None:
+    """The cancellation is repeated, as MAVLink allows, until its sender has seen its acknowledgement."""
+    async with world(speed=1.0, web=True) as w:
+        other = await w.connect(sysid=250)
+        await put(w, [way(40.0, 0.0, 6.0), way(40.0, 30.0, 6.0)])
+        await w.take_off()
+        deaf(w, 1.5)
+        mark, others = w.client.mark(), other.mark()
+        w.client.send_command(START)
+        await being_tried(w.client, mark, START)
+        other.send_command(START)
+        await being_tried(other, others, START)
+        for _ in range(3):
+            call_off(w.client, START)
+            await watched(0.1)
+        assert await until(w.client, mark, 1) == [(START, CANCELLED)]
+        assert await until(other, others, 1) == [(START, ACCEPTED)]
+        await w.drone.wait_log(lambda e: e.name == "plan" and e.args["state"] == "playing")
+
+
+async def test_goto_is_cancelled_by_another_client() -> None:
+    async with world(speed=1.0) as w:
+        other = await w.connect(sysid=250)
+        await w.take_off()
+        deaf(w, 1.5)
+        mark = w.client.mark()
+        place = geo.destination(*HOME[:2], 40.0, 0.0)
+        w.client.send_command(GOTO, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=10.0)
+        await being_tried(w.client, mark, GOTO)
+        call_off(other, GOTO)
+        assert await until(w.client, mark, 1) == [(GOTO, CANCELLED)]

@@ -354,17 +354,24 @@ class CommandService(Service):
             self._finish(*running.answer, dialect.MAV_RESULT_CANCELLED)
 
     def _cancel(self, inbound: Inbound) -> None:
-        """COMMAND_CANCEL: cancel any client's running action of that number.
+        """COMMAND_CANCEL: cancel the sender's running action of that number, or without one any client's.
 
         The action's sender gets CANCELLED. Without such an action nothing is sent (MAVLink command.md). An accepted
         command is not withdrawn, and an action that cannot honestly be cancelled continues to its own
-        acknowledgement.
+        acknowledgement. Another client may wait with the same command for the end of the sender's: that one continues,
+        also when the sender repeats its COMMAND_CANCEL.
         """
-        for task, running in tuple(self._running.items()):
-            if running.answer is None:
-                continue
-            command = running.answer[1].command
-            if command.id == inbound.message.command and command.is_revocable:
+        id, now = inbound.message.command, self.host.clock.monotonic()
+        alike = [
+            (task, running)
+            for task, running in self._running.items()
+            if running.answer is not None and running.answer[1].command.id == id
+        ]
+        own = [(task, running) for task, running in alike if running.client == inbound.client]
+        if not own and self._history.was_cancelled(inbound.client, id, now):
+            return
+        for task, running in own or alike:
+            if running.answer is not None and running.answer[1].command.is_revocable:
                 task.cancel()
 
     def _explain(self, error: AnafiMavError) -> int:
