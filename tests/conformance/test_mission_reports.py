@@ -218,6 +218,27 @@ async def test_choice_of_the_item_of_a_start_that_fails_is_kept() -> None:
         assert (await w.client.wait("MISSION_CURRENT")).seq == 2
 
 
+async def test_choice_of_the_item_of_a_start_that_fails_is_newer_than_a_start_that_waits_too() -> None:
+    async with world(speed=1.0, web=True) as w:
+        second, third = await w.connect(sysid=240), await w.connect(sysid=241)
+        await w.take_off(6.0)
+        await put(w, [takeoff(6.0), *(way(60.0, 20.0 * number, 6.0) for number in range(3))])
+        w.drone.faults.unreported = frozenset({PLAYING})
+        w.client.send_command(CHOOSE, 1)
+        w.client.send_command(SET_MODE, *PX4_MISSION)
+        begun = on_command(w, common.Start.NAME, lambda: None)
+        w.client.send_command(CHOOSE, 3)
+        await begun
+        mark = third.mark()
+        second.send_command(START)
+        await asyncio.sleep(0.1)  # between two clients
+        third.send_command(CHOOSE, 3)
+        await asyncio.sleep(0.1)
+        w.drone.faults.unreported = frozenset()
+        assert await until(third, mark, 1, 60.0) == [(CHOOSE, ACCEPTED)]
+        assert (await third.wait("MISSION_CURRENT")).seq == 3
+
+
 @pytest.mark.parametrize("by", ["start", "current"])
 @pytest.mark.parametrize("after", [0.3, 1.2, 1.6])
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])

@@ -179,9 +179,13 @@ class MissionFlight(PlainTask):
         """
         mission = self.machine.mission
         while self._beginning is not None:
-            self._begun = self._begun or asyncio.Event()
-            await self._begun.wait()
+            await self._start_ended()
         self._require_mission(mission)
+
+    async def _start_ended(self) -> None:
+        """Wait until the start under way has ended; a command that waits, too, may have begun another one then."""
+        self._begun = self._begun or asyncio.Event()
+        await self._begun.wait()
 
     @property
     def _beginning(self) -> MissionAttempt | None:
@@ -202,9 +206,11 @@ class MissionFlight(PlainTask):
         Without effect on the item that is flown: clients repeat the request, and each start stops the drone first.
         """
         await self.storing.over()
-        if (begun := self._beginning) is not None and begun.item == item and not begun.jumps:
+        mission = self.machine.mission
+        while (begun := self._beginning) is not None and begun.item == item and not begun.jumps:
             self.outlet.mission_changed()  # the answer to a message
-            await self._start_over()
+            await self._start_ended()
+            self._require_mission(mission)
             if self.machine.flying:
                 return  # from this item on: another choice would have cancelled this one
         if not self.there:
