@@ -232,8 +232,16 @@ class SentCommands:
         return any(one.may_begin(now) and not one.is_ignored(now) for one in sent)
 
     def has_failed_launch(self, now: float) -> bool:
-        """Return True while a launch that the drone seems to have ignored may still begin."""
-        return any(one.may_begin(now) and one.is_ignored(now) for one in self._slots[Slot.LAUNCH])
+        """Return True while a launch that the drone seems to have ignored or refused may still begin.
+
+        LANDED is taken for a refusal after motors that ramped up; both may be late events about an earlier launch.
+        """
+        launches = self._slots[Slot.LAUNCH]
+        is_refused = any(
+            one.phase is Phase.REFUSED and one.delivered and now < one.delivered_at + TAKE_OFF_MEMORY
+            for one in launches
+        )
+        return is_refused or any(one.may_begin(now) and one.is_ignored(now) for one in launches)
 
     def is_unwanted(self, sent: SentCommand, now: float) -> bool:
         """Return True when the effect of this command, which an event has reported, is to be undone.

@@ -246,6 +246,22 @@ async def test_takeoff_after_its_command_has_failed_is_reported(monkeypatch: pyt
         assert (await w.client.command(LAND_CMD, timeout=15.0)).result == ACCEPTED
 
 
+async def test_takeoff_that_late_reports_of_an_earlier_one_refuse_is_reported() -> None:
+    """The drone's states are 3 s old: those of the first, which a landing has ended, are taken for the second's."""
+    async with world(speed=1.0) as w:
+        w.drone.faults.late = {FLYING: 3.0}
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
+        await flies(w, "motor_ramping")
+        assert (await w.client.command(LAND_CMD)).result == ACCEPTED
+        mark = w.client.mark()
+        ack = await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=4.0, timeout=15.0)
+        await flies(w, "hovering")
+        await watched(3.5)  # until that is reported
+        texts = [m.text for _, m in w.client.since(mark, "STATUSTEXT")]
+        assert ack.result == ACCEPTED or "Takeoff begun late, or by another controller" in texts
+
+
 async def test_takeoff_just_after_a_landing_was_commanded_on_the_ground_is_flown() -> None:
     async with world(speed=1.0) as w:
         assert (await w.client.command(LAND_CMD)).result == ACCEPTED
