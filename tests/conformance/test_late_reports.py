@@ -34,6 +34,7 @@ from support.setpoints import POSITION_ONLY, VELOCITY_ONLY, local, streaming
 from support.world import ARMED, World, world
 
 from anafi_mav.arsdk.messages import ardrone3, common, rth
+from anafi_mav.sim import SimulatedDrone
 from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.sim.world.quirks import Quirk
 
@@ -318,10 +319,18 @@ async def test_takeoff_that_a_landing_has_prevented_is_not_accepted(delay: float
         assert (ack.result == ACCEPTED) == (w.drone.pose.up > 0.5)
 
 
-@pytest.mark.parametrize("is_after_hand_launch", [False, True])
-async def test_forced_disarm_cuts_no_motors_in_the_air(is_after_hand_launch: bool) -> None:
-    """By the fresh height: the flying state that is reported is two seconds old. `allow_kill` is off."""
-    async with world(speed=1.0) as w:
+@pytest.mark.parametrize(("is_after_hand_launch", "has_height"), [(False, True), (True, True), (False, False)])
+async def test_forced_disarm_cuts_no_motors_in_the_air(is_after_hand_launch: bool, has_height: bool) -> None:
+    """By the fresh height, which some firmware reports above the take-off point alone.
+
+    The flying state that is reported is two seconds old. `allow_kill` is off.
+    """
+
+    def before(drone: SimulatedDrone) -> None:
+        if not has_height:
+            drone.faults.unreported = frozenset({ardrone3.AltitudeAboveGroundChanged.NAME})
+
+    async with world(speed=1.0, before=before) as w:
         if is_after_hand_launch:
             await write(w.client, "ANF_HAND_LAUNCH", 1, 6)
             assert (await w.client.command(ARM, 1)).result == ACCEPTED

@@ -312,10 +312,11 @@ class Motors:
     def _is_high(self) -> bool:
         """True for a measured height at which no drone stands.
 
-        It is fresh while the flying state may be late. A drone that a hand holds for its launch has any height; a
-        launch of an earlier flight is no reason.
+        It is fresh while the flying state may be late. Without a height above the ground that above the take-off point
+        counts. A drone that a hand holds for its launch has any height; a launch of an earlier flight is no reason.
         """
-        height, launch = self._flight.state.height, self._sent.newest(Slot.LAUNCH)
+        state, launch = self._flight.state, self._sent.newest(Slot.LAUNCH)
+        height = state.altitude if state.height is None else state.height
         is_held = launch is not None and launch.undo is not None and launch.lasts(loop_time())
         return height is not None and height >= STANDS_BELOW and not is_held
 
