@@ -5,10 +5,13 @@ from __future__ import annotations
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.cameras import PHOTO, enter, request
 from support.fault_scenarios import ACCEPTED
-from support.mav import NAN
-from support.world import HOME, World, world
+from support.mav import NAN, Client
+from support.world import HOME, World, loopback, world
 
 from anafi_mav.arsdk.messages import ardrone3
+from anafi_mav.config import Config, DroneConfig
+from anafi_mav.gateway import Gateway
+from anafi_mav.sim import DroneSpec, Simulator
 
 HIGH_LATENCY, HL_FAILURE_GPS = dialect.MAV_CMD_CONTROL_HIGH_LATENCY, dialect.HL_FAILURE_FLAG_GPS
 UNKNOWN = 2**31 - 1
@@ -54,6 +57,29 @@ async def test_high_latency_message_reports_a_lost_fix() -> None:
         message = await far.wait("HIGH_LATENCY2", lambda m: m.failure_flags & HL_FAILURE_GPS, timeout=30.0)
         assert abs(message.latitude / 1e7 - HOME[0]) < 1e-3
         assert message.eph == 255
+
+
+async def test_high_latency_message_is_sent_before_the_first_fix() -> None:
+    drone, address = loopback(), loopback()
+    endpoints = (f"tcpin://{address}:5760",)
+    config = Config(endpoints=endpoints, drones=(DroneConfig(name="alpha", sysid=1, address=drone),), http=False)
+    spec = DroneSpec(address=drone, home=HOME, http_port=None)
+    async with Simulator([spec], seed=1) as simulator:
+        simulator.drones[0].faults.unreported = frozenset({LOCATION})
+        async with Gateway(config) as gateway:
+            far = await Client().connect(5760, address)
+            assert await gateway.ready(10.0), gateway.lines()
+            await far.heartbeat(lambda beat: True, since=0)
+            assert (await far.command(HIGH_LATENCY, 1)).result == ACCEPTED
+            message = await far.wait("HIGH_LATENCY2", timeout=8.0)
+            assert (message.latitude, message.longitude, message.eph) == (0, 0, 255)
+            assert message.failure_flags & HL_FAILURE_GPS
+            mark = far.mark()
+            simulator.drones[0].faults.unreported = frozenset()
+            message = await far.wait("HIGH_LATENCY2", lambda m: m.eph < 255, since=mark, timeout=15.0)
+            assert abs(message.latitude / 1e7 - HOME[0]) < 1e-3
+            assert not message.failure_flags & HL_FAILURE_GPS
+            await far.close()
 
 
 async def test_high_latency_message_on_request_has_the_climb() -> None:

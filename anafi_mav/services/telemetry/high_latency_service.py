@@ -47,8 +47,10 @@ _FAILURES: Mapping[int, int] = {
 
 
 def failures(vehicle: Vehicle) -> int:
-    """Return the HL_FAILURE_FLAG bits of components that are enabled and not healthy."""
+    """Return the HL_FAILURE_FLAG bits of what is enabled and not healthy, and of a missing fix."""
     _, enabled, healthy = sensor_bits(vehicle)
+    if vehicle.place is None:  # also of a drone that does not list its sensors
+        enabled |= dialect.MAV_SYS_STATUS_SENSOR_GPS
     return sum(flag for bit, flag in _FAILURES.items() if enabled & bit and not healthy & bit)
 
 
@@ -73,17 +75,18 @@ def _base_mode(vehicle: Vehicle) -> int:
 def high_latency(
     vehicle: Vehicle, times: Times, climb: float, last_place: GeoPoint | None = None
 ) -> dialect.MAVLink_message | None:
-    """Return HIGH_LATENCY2; None before a first GPS fix.
+    """Return HIGH_LATENCY2; None while attitude or speed is unknown.
 
-    `last_place` stands for a position that is lost: HL_FAILURE_FLAG_GPS and unknown accuracies report that, and without
-    the message a client would go on showing that place, an old mode and an old battery.
+    Without the message a client sees no vehicle, or goes on showing an old mode and an old battery. So `last_place`
+    stands for a position that is lost, and latitude, longitude and altitude are 0 before the first fix, as PX4 and
+    ArduPilot send them. HL_FAILURE_FLAG_GPS and unknown accuracies report both.
     `climb` is the fastest climb or descent since the last message (m/s). Without a target the drone's own position is
     sent as the target. Throttle, airspeed and wind are not reported and have no "unknown": 0.
     """
     pose, gps = reported_pose(vehicle), vehicle.drone.gps.state
-    place, height = pose.place or last_place, pose.amsl(vehicle)
-    if place is None or height is None or pose.attitude is None or pose.velocity is None:
+    if pose.attitude is None or pose.velocity is None:
         return None
+    place, height = pose.place or last_place or GeoPoint(0.0, 0.0), pose.amsl(vehicle) or 0.0
     horizontal = [a for a in (gps.latitude_accuracy, gps.longitude_accuracy) if a is not None and pose.place]
     vertical = gps.altitude_accuracy if pose.place else None
     heading = _half_degrees(pose.attitude.yaw)
