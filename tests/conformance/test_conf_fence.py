@@ -309,6 +309,24 @@ async def test_conf_076_floor_does_not_count_where_a_return_ends_below_it() -> N
         assert w.drone.pose.up > 5.0
 
 
+@pytest.mark.parametrize("action", ["return", "land"])
+async def test_conf_076_breach_during_a_takeoff_is_acted_upon_when_the_drone_hovers(action: str) -> None:
+    """The fence that the drone is not in is uploaded while it leaves the ground."""
+    async with world(speed=1.0) as w:
+        await put(w, ACTION["px4"], NUMBER["px4"][action])
+        mark = w.client.mark()
+        assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == ACCEPTED
+        w.client.send_command(dialect.MAV_CMD_NAV_TAKEOFF, x=0.0, y=0.0, z=15.0)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "takingoff", 10.0)
+        assert (await upload(w.client, square(geo.destination(*PLACE, 60.0, 0.0), 25.0), FENCE)).type == TAKEN
+        await said(w.client, " m beyond ", since=mark, timeout=10.0)
+        mode = {"return": w.modes.returning, "land": w.modes.land}[action]
+        await w.client.heartbeat(lambda beat: beat.custom_mode == mode, since=mark, timeout=10.0)
+        if action == "land":
+            await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
+        assert max(e.args["up"] for e in w.drone.log if e.kind == "pose") < 10.0
+
+
 async def test_conf_076_return_that_the_drone_cannot_fly_becomes_a_hold() -> None:
     """The goto that leads out of the fence is not flown on."""
     async with world(speed=1.0) as w:

@@ -24,6 +24,7 @@ from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.plan.fence_mirror import FenceMirror
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.stream import MessageStream, Times
+from anafi_mav.vehicle.base.flying import TAKING_OFF
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, reason_of
@@ -144,6 +145,7 @@ class FenceService(Service):
     def _sight(self, now: float) -> Sight:
         vehicle, drone = self.host.vehicle, self.host.drone
         state, place, home, mode = drone.piloting.state, vehicle.place, vehicle.home, vehicle.mode
+        flying_state = vehicle.flying_state
         velocity = (0.0, 0.0) if state.velocity is None else (state.velocity.north, state.velocity.east)
         # A plan and an orbit turn before a fence that was there when they began.
         turns = mode in (FlightMode.MISSION, FlightMode.ORBIT) and self._has_judged_way()
@@ -155,10 +157,11 @@ class FenceService(Service):
             state.altitude,
             None if state.max_altitude is None else state.max_altitude.current,
             home,
-            airborne=not vehicle.on_ground and vehicle.flying_state is not None,
+            airborne=not vehicle.on_ground and flying_state is not None,
             flying=vehicle.in_air and mode is not FlightMode.RETURN,
             steering=not own_way and (state.plan != PlayingState.PLAYING or vehicle.mission.flying),
             orders=vehicle.control.epoch,
+            takes_off=flying_state in TAKING_OFF,
         )
 
     def _has_judged_way(self) -> bool:

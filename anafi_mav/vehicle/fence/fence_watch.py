@@ -6,7 +6,8 @@ No I/O.
 
 An action is carried out once each time the vehicle reaches a boundary; a client that then acquires the vehicle may
 fly it back. Zones, floor and ceiling are separate boundaries: beyond one of them the others hold. For a vehicle that
-returns or lands, commanded or not, there is a warning and nothing else.
+returns or lands, commanded or not, there is a warning and nothing else. For one that takes off there is a warning, and
+the action once it hovers, unless something newer is commanded.
 """
 
 from __future__ import annotations
@@ -183,6 +184,7 @@ class Sight(msgspec.Struct, frozen=True):
 
     An action of ours that is still the newest need not be repeated.
     """
+    takes_off: bool = False
 
 
 @dataclass(frozen=True)
@@ -213,13 +215,15 @@ class _Side:
         """The vehicle's `orders` count when our action was carried out."""
         self.retry_at: float | None = None
         """When an action that failed is tried again."""
+        self.delayed: int | None = None
+        """The vehicle's `orders` count when a take-off delayed our action."""
         self._calm_since: float | None = None
         """Time since when nothing ahead was seen."""
 
     @property
     def rests(self) -> bool:
         """True when nothing is left of an earlier breach or action."""
-        return self.state is State.INSIDE and self.orders is None and self.retry_at is None
+        return self.state is State.INSIDE and self.orders is None and self.retry_at is None and self.delayed is None
 
     def see(self, event: Event | None, verdict: FenceFinding | None, now: float) -> State:
         """Take an observation, or None without one; return the state before."""
@@ -235,7 +239,7 @@ class _Side:
             return before
         self.state, self.verdict = TRANSITIONS[before].get(event, before), verdict
         if verdict is None:
-            self.orders = self.retry_at = None
+            self.orders = self.retry_at = self.delayed = None
         return before
 
 
@@ -397,6 +401,9 @@ class FenceWatch:
             return Reaction.WARN if crossed and side is not self._acting else None
         if side.retry_at is not None:
             return self._act(side, verdict, sight) if now >= side.retry_at else None
+        if side.delayed is not None and not sight.takes_off:
+            delayed, side.delayed = side.delayed, None
+            return self._act(side, verdict, sight) if sight.flying and sight.orders == delayed else None
         if before is State.OUTSIDE:
             return None
         if before is State.LEAVING and side.orders == sight.orders:
@@ -408,6 +415,7 @@ class FenceWatch:
         side.retry_at = None
         if not sight.flying or verdict.breach is Breach.CEILING or self.action is Reaction.WARN:
             side.orders = sight.orders
+            side.delayed = sight.orders if sight.takes_off and self.action is not Reaction.WARN else None
             return Reaction.WARN
         self._acting = side
         return self.action
@@ -416,7 +424,7 @@ class FenceWatch:
         """Note that the action was carried out; `orders` is the vehicle's count after it."""
         self._acting = None
         for side in self._sides.values():
-            side.orders, side.retry_at = orders, None
+            side.orders, side.retry_at, side.delayed = orders, None, None
 
     def failed(self, now: float, *, replaced: bool = False) -> None:
         """The action was not carried out: it is tried again while the vehicle is outside.

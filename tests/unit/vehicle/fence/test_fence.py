@@ -483,6 +483,33 @@ def test_return_or_landing_outside_is_reported_and_continues() -> None:
     assert watch.breaches == 1
 
 
+def test_breach_during_a_takeoff_is_acted_upon_when_the_drone_hovers() -> None:
+    watch = watching(Reaction.LAND)
+    assert watch.look(sight(110.0, flying=False, takes_off=True), 0.0) is Reaction.WARN
+    assert watch.look(sight(110.0, flying=False, takes_off=True), 1.0) is None
+    assert watch.look(sight(110.0), 2.0) is Reaction.LAND
+    watch.done(orders=2)
+    assert watch.look(sight(110.0, orders=2), 3.0) is None
+    assert watch.rests is False
+    assert watch.breaches == 1
+
+
+@pytest.mark.parametrize("newer", [{"orders": 2}, {"flying": False}])
+def test_breach_during_a_takeoff_ends_with_a_newer_command_or_a_landing(newer: dict[str, Any]) -> None:
+    watch = watching(Reaction.LAND)
+    assert watch.look(sight(110.0, flying=False, takes_off=True), 0.0) is Reaction.WARN
+    assert watch.look(sight(110.0, **newer), 1.0) is None
+    assert watch.look(sight(110.0, orders=2), 2.0) is None
+
+
+def test_breach_during_a_takeoff_that_drifts_back_is_none() -> None:
+    watch = watching(Reaction.LAND)
+    assert watch.look(sight(110.0, flying=False, takes_off=True), 0.0) is Reaction.WARN
+    for now in (1.0, 1.0 + CALM):
+        assert watch.look(sight(0.0), now) is None
+    assert watch.state is State.INSIDE
+
+
 def test_on_the_ground_there_is_no_breach() -> None:
     watch = watching()
     assert watch.look(sight(500.0, airborne=False, flying=False), 0.0) is None
