@@ -101,7 +101,10 @@ from anafi_mav.arsdk.messages.rth import State as ReturnStateChanged
 from anafi_mav.arsdk.messages.rth import StateReason as ReturnReason
 from anafi_mav.arsdk.messages.rth import TakeoffLocation as TakeoffLocation
 from anafi_mav.arsdk.messages.skyctrl import AttitudeChanged as ControllerAttitudeChanged
+from anafi_mav.arsdk.messages.skyctrl import BatteryState as ControllerBatteryChanged
+from anafi_mav.arsdk.messages.skyctrl import BatteryStatus as ControllerBatteryStatus
 from anafi_mav.arsdk.messages.skyctrl import PilotingSource as PilotingSource
+from anafi_mav.arsdk.messages.skyctrl import Shutdown as ControllerShutdown
 from anafi_mav.arsdk.messages.thermal import ColorizationMode as ColorizationMode
 from anafi_mav.arsdk.messages.thermal import PaletteMode as PaletteMode
 from anafi_mav.arsdk.messages.thermal import Range as ThermalSensitivity
@@ -136,6 +139,9 @@ __all__ = [
     "BlockerKind",
     "CalibrationAxis",
     "ControllerAttitudeChanged",
+    "ControllerBatteryChanged",
+    "ControllerBatteryStatus",
+    "ControllerShutdown",
     "FlightId",
     "FlightPlanComponent",
     "FlightPlanIndicator",

@@ -17,8 +17,8 @@ from support.plans import FENCE, square, upload
 from support.setpoints import COPTER_GUIDED, VELOCITY_ONLY, local, motion, said, streaming, texts
 from support.world import HOME, World, world
 
-from anafi_mav.arsdk.messages import alarms
-from anafi_mav.arsdk.messages.skyctrl import Source
+from anafi_mav.arsdk.messages import alarms, skyctrl
+from anafi_mav.arsdk.messages.skyctrl import BatteryStatus, Source
 from anafi_mav.sim.world.faults import Impairment
 
 PITCH_STICK = 3
@@ -319,3 +319,25 @@ async def test_end_of_gateway_while_pilot_flies_sends_nothing_against_him() -> N
         await w.gateway.close()
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > north + 3.0, 20.0)
         assert heard(w, *ACTS) == before
+
+
+async def test_low_battery_and_end_of_a_skycontroller_are_reported() -> None:
+    async with world(skycontroller=3) as w:
+        pilot = w.drone.skycontroller
+        assert pilot is not None
+        assert pilot.send is not None
+        pilot.send(skyctrl.BatteryChanged(14))
+        low, critical = BatteryStatus.DISCHARGING_LOW, BatteryStatus.DISCHARGING_CRITICAL
+        for status, severity, word in (
+            (low, dialect.MAV_SEVERITY_WARNING, "low"),
+            (critical, dialect.MAV_SEVERITY_CRITICAL, "critical"),
+        ):
+            mark = w.client.mark()
+            pilot.send(skyctrl.BatteryState(status))
+            text = f"Skycontroller battery {word} (14 %)"
+            message = await w.client.wait("STATUSTEXT", lambda m, text=text: m.text == text, since=mark)
+            assert message.severity == severity
+        mark = w.client.mark()
+        pilot.send(skyctrl.Shutdown(skyctrl.ShutdownReason.LOW_BATTERY))
+        text = "Skycontroller switches off: low battery"
+        await w.client.wait("STATUSTEXT", lambda m: m.text == text, since=mark)

@@ -1,4 +1,4 @@
-"""Warnings of the drone as texts for operators, sent when a warning begins or changes.
+"""Warnings of drone and Skycontroller as texts, sent when a warning begins or changes.
 
 They are not repeated. Parrot's three levels become severities: WARNING is a warning, CRITICAL is critical; an action
 that the drone is about to take by itself, and that cannot be prevented, is an alert, motors that were cut in the air
@@ -17,6 +17,9 @@ from anafi_mav.drone.events import (
     AutoTriggerReason,
     BatteryAlert,
     BatteryAlertChanged,
+    ControllerBatteryChanged,
+    ControllerBatteryStatus,
+    ControllerShutdown,
     FlyingState,
     FlyingStateChanged,
     ForcedLandingReason,
@@ -36,6 +39,12 @@ from anafi_mav.vehicle.base.subscriptions import Subscriptions
 _LEVELS: Mapping[int, Severity] = {1: Severity.WARNING, 2: Severity.CRITICAL}
 """WarningLevel and AlertLevel have the same numbers."""
 
+_CONTROLLER_LEVELS = {
+    ControllerBatteryStatus.DISCHARGING_LOW: (Severity.WARNING, "low"),
+    ControllerBatteryStatus.DISCHARGING_CRITICAL: (Severity.CRITICAL, "critical"),
+}
+"""A Skycontroller works for a few minutes when it is low, and switches off when it is critical (skyctrl.xml 4-8-3)."""
+
 _COVERED = (AlertState.NONE, AlertState.CRITICAL_BATTERY, AlertState.LOW_BATTERY, AlertState.ALMOST_EMPTY_BATTERY)
 """Alerts that say nothing, or what `BatteryState.levels` says."""
 
@@ -51,6 +60,12 @@ def _battery(alert: BatteryAlert, level: AlertLevel, percent: int | None) -> Ope
     if percent is None:
         return texts.BATTERY_LEVEL.fill(level=word)
     return texts.BATTERY_PERCENT.fill(level=word, percent=percent)
+
+
+def _controller_battery(word: str, percent: int | None) -> OperatorText:
+    if percent is None:
+        return texts.CONTROLLER_BATTERY.fill(level=word)
+    return texts.CONTROLLER_PERCENT.fill(level=word, percent=percent)
 
 
 def standing(drone: Drone) -> Iterator[tuple[Hashable, Severity, OperatorText]]:
@@ -76,6 +91,10 @@ def standing(drone: Drone) -> Iterator[tuple[Hashable, Severity, OperatorText]]:
         if level > AlertLevel.NONE:
             severity = _LEVELS.get(level, Severity.CRITICAL)
             yield ("battery", alert, level), severity, _battery(alert, level, battery.percent)
+    controller = drone.controller.state
+    if controller.battery in _CONTROLLER_LEVELS:
+        severity, word = _CONTROLLER_LEVELS[controller.battery]
+        yield ("controller", word), severity, _controller_battery(word, controller.battery_percent)
     for name, degree in (("Wind", alerts.wind), ("Vibration", alerts.vibration), ("Icing", alerts.icing)):
         if degree is not None and degree > WarningLevel.OK:
             yield (
@@ -104,7 +123,14 @@ def standing(drone: Drone) -> Iterator[tuple[Hashable, Severity, OperatorText]]:
 
 
 _RELEVANT: frozenset[type[Message]] = frozenset(
-    {*Alerts.REDUCERS, *Calibration.REDUCERS, *Home.REDUCERS, BatteryAlertChanged, FlyingStateChanged}
+    {
+        *Alerts.REDUCERS,
+        *Calibration.REDUCERS,
+        *Home.REDUCERS,
+        BatteryAlertChanged,
+        ControllerBatteryChanged,
+        FlyingStateChanged,
+    }
 )
 """Of the battery its alerts alone: its voltage comes every second and warns of nothing."""
 
@@ -121,7 +147,11 @@ class WarningService(Service):
         self._tell()
 
     def subscriptions(self) -> Subscriptions:
-        return dict.fromkeys(_RELEVANT, lambda message, now: self._tell())
+        return {**dict.fromkeys(_RELEVANT, lambda message, now: self._tell()), ControllerShutdown: self._shut_down}
+
+    def _shut_down(self, message: ControllerShutdown, now: float) -> None:
+        """Report a Skycontroller that is about to leave: the drone's link ends with it."""
+        self.host.text(Severity.CRITICAL, texts.CONTROLLER_SHUTDOWN.fill(reason=spoken(message.reason)))
 
     def _tell(self) -> None:
         holding = list(standing(self.host.drone))
