@@ -757,7 +757,7 @@ POSITION_FOUND = OperatorText("Position known again")
 
 ACCESS_DENIED = Template("Message refused: access of endpoint is {access}", access="observe")
 COMMAND_LATE = OperatorText("Command refused: too old on arrival")
-INPUT_LATE = OperatorText("Setpoint or sticks dropped: too old on arrival")
+INPUT_LATE = OperatorText("Setpoint, sticks or target dropped: too old")
 SYSTEM_ID_TAKEN = Template("System id {sysid}: another gateway has it on fabric", sysid=250)
 
 # == Link to the drone ==

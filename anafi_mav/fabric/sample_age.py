@@ -19,8 +19,8 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.frames import ReceivedFrame
 
 INPUT_LIMIT = 0.3
-"""s after which setpoints, sticks and gimbal rates are too old: longer than a network takes, shorter than the 0.5 s
-after which their silence stops the drone."""
+"""s after which setpoints, sticks, targets and gimbal rates are too old: longer than a network takes, shorter than the
+0.5 s after which their silence stops the drone."""
 
 LIMIT = 2.0
 """s after which everything is too old: its sender has given it up or sends it again."""
@@ -47,6 +47,8 @@ INPUTS = frozenset(
         dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT,
         dialect.MAVLINK_MSG_ID_MANUAL_CONTROL,
         dialect.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE,
+        dialect.MAVLINK_MSG_ID_FOLLOW_TARGET,
+        dialect.MAVLINK_MSG_ID_MOUNT_CONTROL,
         dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_ATTITUDE,
         dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_PITCHYAW,
         dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_MANUAL_CONTROL,

@@ -125,6 +125,10 @@ def test_frame_beyond_its_limit_is_late(frame: ReceivedFrame, age: float | None,
         dialect.MAVLink_gimbal_manager_set_pitchyaw_message(1, 1, 0, 0, 0, 0, 0.1, 0),
         dialect.MAVLink_gimbal_manager_set_attitude_message(1, 1, 0, 0, [1, 0, 0, 0], 0, 0.1, 0),
         dialect.MAVLink_gimbal_manager_set_manual_control_message(1, 1, 0, 0, 0, 0, 0.1, 0),
+        dialect.MAVLink_mount_control_message(1, 1, -3000, 0, 0, 0),
+        dialect.MAVLink_follow_target_message(
+            0, 0, 0, 0, 0.0, *[[0.0] * 3] * 2, [1.0, 0.0, 0.0, 0.0], *[[0.0] * 3] * 2, 0
+        ),
     ],
 )
 def test_each_message_that_moves_is_late_after_three_tenths(message: dialect.MAVLink_message) -> None:
