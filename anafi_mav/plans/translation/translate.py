@@ -103,7 +103,7 @@ def examine(items: Sequence[Item], version: Version) -> TranslationReport:
         return TranslationReport(tuple(faults), (), ())
     place = next((item.params for item in items if TABLE[item.command].place and item.params[4]), None)
     latitude, longitude = (0.0, 0.0) if place is None else (place[4] or 0.0, place[5] or 0.0)
-    start = Start(latitude, longitude, 0.0, flying=_way_up(items, 0) is None, takeoff_amsl=0.0, is_assumed=True)
+    start = Start(latitude, longitude, 0.0, flying=not _way_up(items, 0, {}), takeoff_amsl=0.0, is_assumed=True)
     try:
         flight = _fly(items, version, start, Cursor(0, (), ItemSettings()))
     except TranslationRefused as error:  # by what came before it on the way, which is not what stands before it
@@ -328,7 +328,7 @@ def _fly(items: Sequence[Item], version: Version, start: Start, cursor: Cursor) 
     index, visits, busy, lively = cursor.item, 0, 0, 0
     """`busy`: what has been flown and photographed by then, and `lively`: when it became more."""
     if not start.flying and items:
-        _rise(writer, items, index)
+        _rise(writer, items, _way_up(items, index, jumps), index)
     while index < len(items) and writer.written < MAX_LINES and visits < MAX_VISITS:
         item, writer.item = items[index], index
         row = TABLE[item.command]
@@ -359,15 +359,30 @@ def _fly(items: Sequence[Item], version: Version, start: Start, cursor: Cursor) 
     )
 
 
-def _way_up(items: Sequence[Item], first: int) -> int | None:
-    """The item that says how high to rise from the ground; None: there is nowhere to fly to."""
-    for number in range(first, len(items)):
-        row = TABLE[items[number].command]
-        if items[number].command == mav_enums.MAV_CMD_NAV_TAKEOFF or row.place:
-            return number
+def _way_up(items: Sequence[Item], first: int, jumps: Mapping[int, int]) -> Sequence[int]:
+    """Return the items flown up to the one that says how high to rise from the ground.
+
+    They begin with `first`. Empty when there is nowhere to fly to. Jumps are followed as in flight, each once.
+    """
+    way: list[int] = []
+    followed: set[int] = set()
+    number = first
+    while number < len(items):
+        here, item, row = number, items[number], TABLE[items[number].command]
+        way.append(here)
+        if item.command == mav_enums.MAV_CMD_NAV_TAKEOFF or row.place:
+            return way
         if row.ends:
-            return None
-    return None
+            return ()
+        number += 1
+        if item.command == DO_JUMP:
+            often = item.params[1] or 0.0
+            if here not in followed and (often == _ENDLESS or jumps.get(here, 0) < often):
+                number = int(item.params[0] or 0.0)
+            elif often == _ENDLESS:
+                return ()
+            followed.add(here)
+    return ()
 
 
 def _height_named(item: Item, height: float) -> str:
@@ -382,17 +397,18 @@ def _height_named(item: Item, height: float) -> str:
     return f"{height:g} m above take-off"
 
 
-def _rise(writer: FlightPlanWriter, items: Sequence[Item], first: int) -> None:
+def _rise(writer: FlightPlanWriter, items: Sequence[Item], way: Sequence[int], first: int) -> None:
     """Write the take-off from the ground.
 
-    Without an item that takes off, the drone climbs straight up to the height of the first way point.
+    Without an item that takes off, the drone climbs straight up to the height of the first way point. `way` leads
+    there from `first`.
     """
     writer.item = first
-    number = _way_up(items, first)
-    if number is None:
+    if not way:
         raise PlanError("mission", "no place to fly to from the ground", first)
+    number = way[-1]
     if items[number].command == mav_enums.MAV_CMD_NAV_TAKEOFF:
-        if any(TABLE[item.command].moves for item in items[first:number]):
+        if any(TABLE[items[before].command].moves for before in way[:-1]):
             writer.say("the drone takes off first")
         writer.take_off(None)
         return

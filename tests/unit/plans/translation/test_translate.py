@@ -229,6 +229,24 @@ def test_jumps_are_written_out() -> None:
     assert examine(items, 1).stepped == ()
 
 
+@pytest.mark.parametrize(
+    ("often", "jumps", "height"),
+    [(2.0, {}, 20.0), (2.0, {3: 1}, 20.0), (2.0, {3: 2}, 90.0), (-1.0, {3: 9}, 20.0), (0.0, {}, 90.0)],
+)
+def test_start_at_a_jump_climbs_to_the_way_point_that_is_flown_to(
+    often: float, jumps: dict[int, int], height: float
+) -> None:
+    items = [take_off(15.0), waypoint(1, 0), waypoint(2, 0), action(DO_JUMP, 1.0, often), waypoint(3, 0, 90.0)]
+    first = lines(translate(items, 1, GROUND, 3, jumps))[1].split()
+    assert (first[0], float(first[-1])) == ("3", height)
+
+
+def test_start_at_a_jump_to_the_return_rises_nowhere() -> None:
+    items = [waypoint(1, 0), action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH), action(DO_JUMP, 1.0, 1.0)]
+    with pytest.raises(PlanError, match="no place to fly to"):
+        translate(items, 1, GROUND, 2)
+
+
 def test_a_jump_without_end_is_flown_file_after_file() -> None:
     items = [
         take_off(20.0),
