@@ -645,6 +645,7 @@ CAMERA_SAVING = Reason("camera is saving photos")
 # == Ground stations ==
 
 STATION_BACK = OperatorText("Ground station is back")
+NO_STATION = Reason("no ground station (ANF_GCS_LOSS)")
 STATION_LOST = Template("No ground station for {seconds:g} s", seconds=999.5)
 STATION_LOST_STATE = Template("No ground station for {seconds:g} s: {state}", seconds=99.5, state=RETURNS)
 STATION_LOST_FAILED = Template("Station loss: {action} failed: {error}", action="return", error=BELOW)

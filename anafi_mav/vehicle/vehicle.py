@@ -61,7 +61,7 @@ from anafi_mav.vehicle.guided_flight import GOTO, GuidedFlight
 from anafi_mav.vehicle.hold_rule import APART, HoldRule
 from anafi_mav.vehicle.initiator import Initiator, Initiators
 from anafi_mav.vehicle.joystick_override import Override
-from anafi_mav.vehicle.link_loss import LossPolicy
+from anafi_mav.vehicle.link_loss import GcsWatch, LossAction, LossPolicy
 from anafi_mav.vehicle.manual_flight import ManualFlight
 from anafi_mav.vehicle.mission.flight import MissionFlight
 from anafi_mav.vehicle.offboard.flight import OffboardFlight
@@ -199,6 +199,7 @@ class Vehicle(Aircraft):
         super().__init__(drone, clock, text=text, changed=changed)
         self.gcs_loss = LossPolicy()
         """Reaction to the loss of all ground stations (a parameter)."""
+        self.stations = GcsWatch()
         self.rally = RallyPoints()
         self.link_facts = LinkFacts()
         self.flight_facts = FlightFacts()
@@ -227,6 +228,12 @@ class Vehicle(Aircraft):
     @property
     def armed(self) -> bool:
         return self._is_armed_in(self.flying_state)
+
+    def prearm_problems(self) -> list[OperatorText]:
+        problems = super().prearm_problems()
+        if self.stations.lost and self.gcs_loss.action is not LossAction.NOTHING and self.on_ground:
+            problems.append(texts.NO_STATION)
+        return problems
 
     def _is_armed_in(self, state: FlyingState | None) -> bool:
         return (state is not None and state not in ON_GROUND) or self.takeoff.armed

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.clock import everybodys
-from support.fault_scenarios import ACCEPTED, REJECTED, RTL, SET_MODE, deaf, goto, heard, return_by_itself, watched
+from support.fault_scenarios import ACCEPTED, ARM, REJECTED, RTL, SET_MODE, deaf, goto, heard, return_by_itself, watched
 from support.mav import Client
 from support.missions import said
 from support.params import write
@@ -200,6 +200,28 @@ async def test_return_of_a_station_loss_that_failed_yields_to_a_later_command() 
         assert await goto(w, 200.0, 10.0) == ACCEPTED
         await asyncio.sleep(15.0)
         assert heard(w, "return_to_home") == []
+
+
+async def test_drone_whose_stations_were_lost_on_the_ground_does_not_take_off() -> None:
+    """No action would follow in the air: the loss has been reported."""
+    prearm, beat = dialect.MAV_SYS_STATUS_PREARM_CHECK, dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+    async with world() as w:
+        await write(w.client, "ANF_GCS_LOSS", 2, dialect.MAV_PARAM_TYPE_INT32)
+        await write(w.client, "ANF_GCS_LOSS_T", 2.0)
+        w.client.send(beat)
+        mark = w.client.mark()
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "No ground station for 2 s", since=mark, timeout=10.0)
+        await w.client.wait("SYS_STATUS", lambda m: not m.onboard_control_sensors_health & prearm, timeout=3.0)
+        mark = w.client.mark()
+        assert (await w.client.command(ARM, 1)).result == REJECTED
+        text = "PreArm: no ground station (ANF_GCS_LOSS)"
+        await w.client.wait("STATUSTEXT", lambda m: m.text == text, since=mark)
+        w.client.send(beat)
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Ground station is back", since=mark)
+        await w.client.wait("SYS_STATUS", lambda m: m.onboard_control_sensors_health & prearm, timeout=3.0)
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "No ground station for 2 s", since=mark, timeout=10.0)
+        await write(w.client, "ANF_GCS_LOSS", 0, dialect.MAV_PARAM_TYPE_INT32)
+        await w.take_off(5.0)
 
 
 async def test_stall_of_the_host_is_no_silence_of_the_ground_station() -> None:

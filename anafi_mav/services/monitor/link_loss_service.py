@@ -38,8 +38,11 @@ class LinkLossService(Service):
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._watch = GcsWatch()
         self._later: LaterAction | None = None
+
+    @property
+    def _watch(self) -> GcsWatch:
+        return self.host.vehicle.stations
 
     def link_up(self) -> None:
         self._watch.restart(self.host.clock.monotonic())

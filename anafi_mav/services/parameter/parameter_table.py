@@ -581,7 +581,8 @@ GCS_LOSS = Parameter(
     polled=True,
     group=GATEWAY,
     long="Only after a ground station has been heard. Behind a Skycontroller without an active flight task of the "
-    "gateway, only a text is sent. The time restarts when the drone's link is restored.",
+    "gateway, only a text is sent. The time restarts when the drone's link is restored. While they are lost, a drone "
+    "on the ground is not armed.",
     default=float(LossAction.NOTHING),
     source="gateway",
 )

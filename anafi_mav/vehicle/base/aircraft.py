@@ -258,9 +258,10 @@ class Aircraft(Conditions):
     def prearm_problems(self) -> list[OperatorText]:
         """Return the reasons why the drone would not take off, in sentences; empty without any."""
         problems: list[OperatorText] = []
-        if self.flying_state is None:
+        state = self.flying_state
+        if state is None:
             problems.append(texts.FLYING_STATE_UNKNOWN)
-        if self.flying_state == FlyingState.EMERGENCY:
+        if state == FlyingState.EMERGENCY:
             problems.append(texts.EMERGENCY_STOP)
         problems += map(texts.from_below, self.drone.takeoff_blockers())
         if (problem := self.fence_problem) is not None:
