@@ -115,7 +115,7 @@ def _place(point: Any, number: int, source: str) -> tuple[float, float]:
     """Both formats have the longitude first."""
     try:
         longitude, latitude, *_height = (float(value) for value in point)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         longitude = latitude = math.nan
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
         raise PlanError(source, f"point {number} of its line is no place")

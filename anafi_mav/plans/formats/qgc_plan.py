@@ -8,7 +8,7 @@ QGroundControl MissionItem.cc, SimpleMissionItem.cc, GeoFenceController.cc, Tran
 from __future__ import annotations
 
 import json
-import math
+import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -42,6 +42,9 @@ VERSION, MISSION_VERSION, LIST_VERSION = 1, 2, 2
 _SIMPLE_KEYS = frozenset({"type", "frame", "command", "autoContinue", "doJumpId", "params", "coordinate"})
 _MISSION_KEYS = frozenset({"items", "plannedHomePosition", "cruiseSpeed", "hoverSpeed", "version"})
 _FILE_KEYS = frozenset({"fileType", "version", "mission", "geoFence", "rallyPoints"})
+
+LARGEST = sys.float_info.max
+"""Largest number that a float holds. JSON has larger whole ones."""
 
 _TRANSECTS = ("survey", "CorridorScan")
 """Kinds of items that store what is flown."""
@@ -141,7 +144,7 @@ class _Reader:
         elif name == "StructureScan":
             try:
                 self._items += structure_scan.items_of(stored)
-            except (KeyError, TypeError, ValueError, IndexError) as error:
+            except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
                 raise _Trouble(f"the structure scan cannot be understood: {error}") from error
         else:
             raise _Trouble(f"items of type {name!r} are not for a multicopter, or not known")
@@ -222,7 +225,7 @@ def _sequence(value: Any, what: str) -> list[Any]:
 
 
 def _number(value: Any, what: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST:
         raise _Trouble(f"{what}: {str(value)[:20]} is no number")
     return float(value)
 

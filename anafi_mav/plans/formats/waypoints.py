@@ -35,6 +35,9 @@ HEADER = "QGC WPL 110"
 
 COLUMNS = 12
 
+LONGEST = 20
+"""Digits of a whole number. Python converts no more than 4300."""
+
 UNSET = "NaN"
 """As .NET spells it. Mission Planner drops a line with any other spelling and loads the others (its FlightPlanner.cs
 reads each with double.Parse, and shows "Line invalid"), Python's readers take all."""
@@ -60,7 +63,7 @@ def _row(number: int, words: list[str], source: str) -> Item:
     whole = []
     for column, name, top in ((2, "frame", 0xFF), (3, "command", 0xFFFF), (11, "autocontinue", 1)):
         word = words[column]
-        if not (word.isascii() and word.isdigit() and int(word) <= top):
+        if not (word.isascii() and word.isdigit() and len(word) <= LONGEST and int(word) <= top):
             raise PlanError(source, f"{word[:20]!r} is no {name}", number)
         whole.append(int(word))
     numbers = [_number(word, number, source) for word in words[4:11]]

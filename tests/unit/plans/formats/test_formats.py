@@ -150,6 +150,7 @@ WRONG: dict[str, tuple[Any, str]] = {
     "a param": (encoded(document(simple(1, 16), simple(2, 16, params=["1"] * 7))), "item 1: params: 1 is no number"),
     "its command": (encoded(document(simple(1, 70000))), "item 0: 70000 is no command"),
     "its frame": (encoded(document(simple(1, 16, frame=-1))), "item 0: -1 is no frame"),
+    "a huge param": (encoded(document(simple(1, 16, 10**400))), "item 0: params: 10000000000000000000 is no number"),
     "a jump": (
         encoded(document(simple(1, 16), simple(2, 177, 9))),
         "item 1: it jumps to doJumpId 9, which",
@@ -163,6 +164,10 @@ WRONG: dict[str, tuple[Any, str]] = {
         "item 0: items of type 'fwLandingPattern' are not for a multicopter",
     ),
     "a scan": (encoded(document({**structure_scan(), "polygon": [[1, 2]]})), "item 0: the structure scan"),
+    "a scan's corner": (
+        encoded(document({**structure_scan(), "polygon": [[10**400, 2]] * 3})),
+        "item 0: the structure scan",
+    ),
     "a scan's layers": (encoded(document({**structure_scan(), "Layers": 10**6})), "item 0: the structure scan"),
     "a fence": (encoded(document(geoFence={"version": 1})), "the fence is of version 1, not 2"),
     "a corner": (
@@ -184,6 +189,10 @@ WRONG: dict[str, tuple[Any, str]] = {
     "nothing": (b"", "it is empty"),
     "columns": (b"QGC WPL 110\n0\t1\t0\t16\t0\n", "item 0: 5 columns, expected 12"),
     "a command": (b"QGC WPL 110\n0\t1\t0\tx\t0\t0\t0\t0\t0\t0\t0\t1\n", "item 0: 'x' is no command"),
+    "a huge command": (
+        b"QGC WPL 110\n0\t1\t0\t" + b"9" * 5000 + b"\t0\t0\t0\t0\t0\t0\t0\t1\n",
+        "item 0: '99999999999999999999' is no command",
+    ),
     "a number": (b"QGC WPL 110\n0\t1\t0\t16\tinf\t0\t0\t0\t0\t0\t0\t1\n", "item 0: 'inf' is no number"),
     "a fence of a file": (
         b"QGC WPL 110\n0\t1\t0\t5001\t3\t0\t0\t0\t1\t1\t0\t1\n",
