@@ -55,7 +55,8 @@ FENCE_ACTION = Parameter(
     values={number: action.value.capitalize() for number, action in PX4_ACTIONS.items()},
     polled=True,
     group=GROUP,
-    long="0: only a text is sent. A motor cut requires allow_kill.",
+    long="Nothing: a breach is in FENCE_STATUS and SYS_STATUS only, and no target is refused. A motor cut requires "
+    "allow_kill.",
     default=float(_NUMBERS[Reaction.HOLD]),
     source="gateway",
 )
