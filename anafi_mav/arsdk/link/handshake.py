@@ -25,6 +25,8 @@ C2D_PORT = 2233
 MAX_JSON = 4096
 """Longest text accepted. Parrot's own are about 150 bytes; its publisher composes them in 255."""
 
+MAX_MODEL_ID = 0xFFFF
+
 REJECTED = -1
 """`status` of a refusal (arsdk-ng arsdk_backend_net_reject_peer_conn)."""
 
@@ -173,8 +175,12 @@ def _parse(data: bytes, what: str) -> dict[str, Any] | None:
 
 
 def _text(members: dict[str, Any], key: str) -> str:
+    r"""Return a text that has an encoding.
+
+    JSON may escape half of a character, like `\ud800`, of which UTF-8 has no bytes.
+    """
     value = members.get(key)
-    return value if isinstance(value, str) else ""
+    return value.encode(errors="replace").decode() if isinstance(value, str) else ""
 
 
 def _number(members: dict[str, Any], key: str, default: int) -> int:
@@ -196,7 +202,9 @@ def _port(members: dict[str, Any], key: str, what: str) -> int:
 
 
 def _model_id(value: object) -> int:
+    """Return a model number, of which Parrot has 16 bits; 0 for what is none."""
     try:
-        return int(value, 16) if isinstance(value, str) else 0
+        number = int(value, 16) if isinstance(value, str) else 0
     except ValueError:
         return 0
+    return number if 0 <= number <= MAX_MODEL_ID else 0

@@ -86,9 +86,16 @@ def test_invalid_handshake_reply_raises_remote_error(parse: object, text: bytes)
 
 
 def test_invalid_model_number_is_an_unknown_model() -> None:
-    for model in ("null", '"anafi"', "2324", '""'):
+    for model in ("null", '"anafi"', "2324", '""', '"-0x0914"', '"0x10914"', f'"0x{"9" * 4000}"'):
         info = handshake.parse_discovery(b'{"model.id": %s, "port": 1}' % model.encode())
         assert info == DeviceInfo(0, "", 1, "")
+
+
+def test_half_a_character_in_handshake_json_is_replaced() -> None:
+    device = handshake.parse_discovery(b'{"serial": "PI04\\ud8000001", "name": "\\udc00\\ud83d\\ude80", "port": 1}')
+    assert device == DeviceInfo(0, "PI04?0001", 1, "?\N{ROCKET}")
+    request = handshake.parse_request(b'{"controller_name": "\\ud800", "device_id": "\\udfff", "d2c_port": 1}')
+    assert request == ConnectRequest("?", "", 1, "?")
 
 
 @pytest.mark.parametrize("seed", range(4))
