@@ -47,6 +47,9 @@ UNAVAILABLE = 503
 PARTIAL = 206
 """Status of an answer with one range of a file (RFC 9110 §15.3.7)."""
 
+UNREADABLE = (ValueError, RecursionError)
+"""Errors of msgspec for what is no JSON: also `UnicodeDecodeError`, for a text in it that is no UTF-8."""
+
 _CONTENT_RANGE = re.compile(r"bytes ([0-9]{1,18})-[0-9]{1,18}/([0-9]{1,18})")
 
 
@@ -103,7 +106,7 @@ class Rest:
             return None
         try:
             return msgspec.json.decode(body)
-        except (msgspec.DecodeError, RecursionError) as error:
+        except UNREADABLE as error:
             raise RemoteProtocolError(f"{method} {path}: the drone answers no JSON: {error}") from error
 
     async def read(
@@ -213,10 +216,12 @@ async def _refusal(what: str, response: aiohttp.ClientResponse) -> str:
     if response.status == NOT_INDEXED:
         return NOT_INDEXED_YET
     reason = ""
-    with suppress(aiohttp.ClientError, asyncio.TimeoutError, msgspec.DecodeError, AttributeError):
+    with suppress(aiohttp.ClientError, asyncio.TimeoutError, AttributeError, *UNREADABLE):
         answer = msgspec.json.decode(await response.content.read(1 << 12))
         reason = f": {answer['error']}" if isinstance(answer, dict) and "error" in answer else ""
-    return f"{what}: HTTP {response.status} {response.reason or ''}".rstrip() + reason
+    # aiohttp keeps bytes of the status line that are no UTF-8 as halves of characters, which have no encoding.
+    status = (response.reason or "").encode(errors="replace").decode()
+    return f"{what}: HTTP {response.status} {status}".rstrip() + reason
 
 
 class _Translated:

@@ -29,7 +29,7 @@ from anafi_mav.drone.payload.media_file import fetch, file_name
 from anafi_mav.drone.payload.media_index import Listing as Listing
 from anafi_mav.drone.payload.media_index import MediaIndex
 from anafi_mav.drone.payload.media_reader import MediaReader, OpenedFile
-from anafi_mav.drone.rest import NotFound, Rest
+from anafi_mav.drone.rest import UNREADABLE, NotFound, Rest
 from anafi_mav.drone.settings import Commanding
 from anafi_mav.errors import RemoteProtocolError
 
@@ -119,12 +119,12 @@ def _items(body: bytes) -> tuple[tuple[MediaItem, ...], int]:
     items, dropped = [], 0
     try:
         parts = msgspec.json.decode(body, type=list[msgspec.Raw])
-    except (msgspec.DecodeError, RecursionError) as error:
+    except UNREADABLE as error:
         raise RemoteProtocolError("the drone's list of media is not readable") from error
     for part in parts:
         try:
             received = _ITEM.decode(part)
-        except (msgspec.DecodeError, RecursionError):
+        except UNREADABLE:
             dropped += 1
         else:
             items.append(_usable(received))
@@ -230,7 +230,7 @@ async def _notifications(socket: aiohttp.ClientWebSocketResponse) -> AsyncIterat
             continue
         try:
             yield msgspec.json.decode(frame.data, type=Notification)
-        except (msgspec.DecodeError, RecursionError) as error:
+        except UNREADABLE as error:
             log.debug("unreadable notification: %s", error)
 
 

@@ -244,6 +244,35 @@ async def test_missing_md5_differs_from_failed_md5_request() -> None:
                 await drone.media.known_md5(Resource(name))
 
 
+async def test_media_whose_text_is_no_utf_8_is_left_out() -> None:
+    listed = b'[{"media_id": "1"}, {"media_id": "2", "run_id": "\xe9"}, {"media_id": "3"}]'
+    async with serving(medias=web.Response(body=listed), f5=web.Response(body=b'"\xe9"')) as (drone, _):
+        assert [item.media_id for item in await drone.media.list()] == ["1", "3"]
+        with pytest.raises(RemoteProtocolError):
+            await drone.media.get("5")
+
+
+@pytest.mark.parametrize("body", [b'{"error": "refus\xe9"}', b"[" * 4096, b'{"error": %s' % (b"[" * 4096)])
+async def test_refusal_with_an_unreadable_body_is_a_refusal(body: bytes) -> None:
+    async with serving(medias=web.Response(status=403, body=body)) as (drone, _):
+        with pytest.raises(CommandRejected, match="HTTP 403"):
+            await drone.media.list()
+
+
+async def test_status_line_that_is_no_utf_8_is_replaced() -> None:
+    async def refuse(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.readuntil(b"\r\n\r\n")
+        writer.write(b"HTTP/1.1 403 Refus\xe9\r\nContent-Length: 0\r\nConnection: close\r\n\r\n")
+        writer.close()
+
+    async with await asyncio.start_server(refuse, "127.0.0.1", 0) as server:
+        rest = Rest("127.0.0.1", server.sockets[0].getsockname()[1])
+        with pytest.raises(CommandRejected) as refusal:
+            await rest.json("GET", "/")
+        await rest.close()
+    assert str(refusal.value) == "GET /: HTTP 403 Refus?"
+
+
 @pytest.mark.parametrize("body", [b"{", b"\xff\xfe", b"[" * 100_000, b'"text"', b"null"])
 async def test_answers_that_are_no_list(body: bytes) -> None:
     async with serving(medias=web.Response(body=body)) as (drone, _):
