@@ -40,7 +40,7 @@ from anafi_mav.drone.automatic.poi import Poi
 from anafi_mav.drone.controller.controller import MODELS as CONTROLLERS
 from anafi_mav.drone.controller.controller import Controller, is_motion
 from anafi_mav.drone.element import Element, Reducer, defer
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time, require_number
 from anafi_mav.drone.features import Feature, Support, features
 from anafi_mav.drone.payload.camera import Camera
 from anafi_mav.drone.payload.gimbal import Gimbal
@@ -703,6 +703,7 @@ class Drone:
         `LinkLost` or `CommandTimeout` when the command was not acknowledged. When this is cancelled, the command is
         not sent again.
         """
+        require_number(timeout)
         if not self.connected:
             raise LinkLost("not connected")
         self._require_standing("rebooted")
@@ -813,6 +814,7 @@ class Drone:
         The condition is evaluated now and after each message. Raises `CommandTimeout` about `what` after `timeout` s,
         `LinkLost`, and what the condition raises.
         """
+        require_number(timeout)
         self._commander.require_link()
         if condition():
             return

@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 import weakref
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Generic, Protocol, TypeVar
@@ -19,7 +20,7 @@ from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.link.transport import Rank
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.drone.sent_commands import AUTOMATIC, QUIET, Event, Phase, SentCommand, SentCommands, Slot
-from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, LocalProtocolError
 
 logger = logging.getLogger(__name__)
 message_log = logging.getLogger("anafi_mav.message")
@@ -32,6 +33,16 @@ BLOCKED = 0
 ANSWER_TIMEOUT = 5.0
 """s. A drone answers within tens of milliseconds, over a bad link within a few retransmissions of 150 ms; Parrot's
 own SDK waits 10 s, too long for a ground station that repeats its command every second."""
+
+
+def require_number(timeout: float | None) -> None:
+    """Raise `LocalProtocolError` for a timeout of NaN.
+
+    NaN is neither before nor after another time: in asyncio's heap of timers it would hold back those of others, among
+    them the one that centres the sticks.
+    """
+    if timeout is not None and math.isnan(timeout):
+        raise LocalProtocolError(f"expected a timeout in s, got {timeout}")
 
 
 def loop_time() -> float:
@@ -93,7 +104,15 @@ class Expectation(Generic[T]):
             self.future.set_exception(error)
 
     def expire_after(self, seconds: float, what: str) -> None:
-        """(Re)start the clock: the wait fails with `CommandTimeout` about `what` after this time."""
+        """(Re)start the clock: the wait fails with `CommandTimeout` about `what` after this time.
+
+        Raises `LocalProtocolError` for NaN, and stops listening.
+        """
+        try:
+            require_number(seconds)
+        except LocalProtocolError:
+            self.close()
+            raise
         if self._timer is not None:
             self._timer.cancel()
         self._timer = self.future.get_loop().call_later(seconds, self._expire, what, seconds)
@@ -415,8 +434,8 @@ class Commander:
     ) -> None:
         """Send the command whose answer is expected, at once. `stops` and `is_setting`: see `send`."""
         try:
+            expectation.expire_after(timeout, command.NAME)
             expectation.token = self.send(command, stops=stops, is_setting=is_setting, at_once=True)
         except BaseException:
             expectation.close()
             raise
-        expectation.expire_after(timeout, command.NAME)

@@ -17,7 +17,7 @@ from anafi_mav.arsdk.messages import move as guided
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, FlyingStateChanged, MoveToStatus, OrientationMode
 from anafi_mav.arsdk.messages.rth import RthState
 from anafi_mav.drone.element import Element, Position
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation, loop_time
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation, loop_time, require_number
 from anafi_mav.drone.piloting.moves import FASTEST, Displacement, Move, MoveEnd, Moves
 from anafi_mav.drone.piloting.state import PilotingState, in_state
 from anafi_mav.drone.piloting.stick_stream import StickStream
@@ -71,6 +71,7 @@ class GuidedMoves:
     ) -> Displacement:
         if not math.isfinite(front + right + down + turn):
             raise LocalProtocolError("a relative move is not a number")
+        require_number(timeout)
         self.require_free()
         command = self._move_by_command(front, right, down, turn, turn_rate_dps)
         turn_rate = None if turn_rate_dps is None else turn_rate_dps * RAD_PER_DEG
@@ -121,6 +122,7 @@ class GuidedMoves:
             latitude + longitude + altitude + (heading_deg or 0.0) + (horizontal_speed or 0.0) + (vertical_speed or 0.0)
         ):
             raise LocalProtocolError("a target is not a number")
+        require_number(timeout)
         if orientation is None:
             orientation = OrientationMode.NONE if heading_deg is None else OrientationMode.HEADING_DURING
         if (heading_deg is not None) != (orientation in _WITH_HEADING):

@@ -22,6 +22,7 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.video.rtp_h264 import CLOCK_RATE, Picture
 from anafi_mav.arsdk.video.video_metadata import FrameMetadata
 from anafi_mav.drone.element import Element, Reducer
+from anafi_mav.drone.expectation import require_number
 from anafi_mav.drone.piloting.state import Attitude
 from anafi_mav.drone.video.route import VideoRoute
 from anafi_mav.drone.video.stream import Shown, VideoStream
@@ -178,6 +179,7 @@ class Video(Element[VideoState]):
         Raises `CommandRejected` when another stream is being watched, `NotSupported` when the drone has no such
         stream, `CommandTimeout` when no picture comes, `LinkLost`.
         """
+        require_number(timeout)
         if self._route is None:
             raise LinkLost("not connected")
         if self._users and title is not None and title != self._wanted:
@@ -239,6 +241,7 @@ class Video(Element[VideoState]):
 
     async def next_frame(self, timeout: float = STALE) -> VideoFrame:
         """Return the metadata of the next picture. Raises `CommandTimeout` when none arrives."""
+        require_number(timeout)
         came: asyncio.Future[VideoFrame] = asyncio.get_running_loop().create_future()
         undo = self.subscribe(lambda frame: None if came.done() else came.set_result(frame))
         try:

@@ -234,6 +234,24 @@ async def test_expect_accepts_the_next_matching_message(drone: Drone, device: Sc
 # -- up and down
 
 
+async def test_timeout_of_nan_raises_and_sends_nothing(drone: Drone, device: ScriptedDevice) -> None:
+    """In asyncio's heap of timers NaN would hold back those of others, as the one that centres the sticks."""
+    await flying(drone, device)
+    before = len(device.received)
+    for call in (
+        drone.piloting.land(timeout=math.nan),
+        drone.piloting.move_by(1.0, 0.0, 0.0, 0.0, timeout=math.nan),
+        drone.piloting.move_to(48.8, 2.3, 5.0, timeout=math.nan),
+        drone.wait_for(FlyingState.LANDED, timeout=math.nan),
+        drone.expect(ardrone3.FlyingStateChanged, timeout=math.nan),
+        drone.video.next_frame(timeout=math.nan),
+    ):
+        with pytest.raises(LocalProtocolError, match="timeout"):
+            await call
+    await asyncio.sleep(SHORT)
+    assert device.received[before:] == []
+
+
 async def test_take_off_waits_through_the_ramping_for_takingoff(drone: Drone, device: ScriptedDevice) -> None:
     take_off = asyncio.ensure_future(drone.piloting.take_off(timeout=SHORT))
     await device.until(ardrone3.TakeOff)
