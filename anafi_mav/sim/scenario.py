@@ -42,15 +42,17 @@ Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 Seconds = Annotated[float, Meta(ge=0.0, le=1e6)]
 Percent = Annotated[int, Meta(ge=0, le=100)]
 Motor = Annotated[int, Meta(ge=1, le=4)]
+Height = Annotated[float, Meta(ge=-1e4, le=1e4)]
+Distance = Annotated[float, Meta(ge=0.0, le=1e6)]
 
 
 class When(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """All of it must be true."""
 
     state: str | None = None
-    height_above: float | None = None
+    height_above: Height | None = None
     """m above take-off"""
-    distance_beyond: Annotated[float, Meta(ge=0.0)] | None = None
+    distance_beyond: Distance | None = None
     """m from where the simulated world has its origin, which is where the drone stood first"""
     battery_below: Percent | None = None
 
@@ -90,7 +92,7 @@ class ScenarioStep(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rena
     link: LinkConditions | UnsetType = UNSET
     battery: Percent | UnsetType | None = UNSET
     motor_error: str | UnsetType = UNSET
-    motors: list[Motor] | UnsetType = UNSET
+    motors: Annotated[list[Motor], Meta(min_length=1)] | UnsetType = UNSET
     vibration: str | UnsetType = UNSET
     calibration_required: bool | UnsetType = UNSET
     refuse_take_off: list[str] | UnsetType = UNSET
@@ -278,6 +280,12 @@ def _check(path: str, step: ScenarioStep) -> None:
     actions = [name for name in step.__struct_fields__ if name not in _TRIGGERS]
     if all(getattr(step, name) is UNSET for name in actions):
         raise ConfigError(path, f"expected something to happen: {', '.join(actions)}")
+    if step.motors is not UNSET and step.motor_error is UNSET:
+        raise ConfigError(f"{path}.motors", "expected only with motor_error")
+    if step.link == LinkConditions():
+        raise ConfigError(f"{path}.link", "expected up, down or both")
+    if step.throw is False:
+        raise ConfigError(f"{path}.throw", "expected true")
     for name, known in (("motor_error", _MOTOR_ERRORS), ("vibration", _LEVELS)):
         value = getattr(step, name)
         _one_of(f"{path}.{name}", None if value is UNSET else value, known)
