@@ -26,6 +26,9 @@ from anafi_mav.sim.world import quirks
 from anafi_mav.sim.world.model import MODELS
 from anafi_mav.sim.world.wind import CALM, WindSpec
 
+MAX_SEED = 2**32 - 1
+"""Also of a configuration."""
+
 MAX_COUNT = 254
 """Drones of one process: the hosts of one /24, where their addresses live."""
 
@@ -133,7 +136,7 @@ def _from_options(arguments: argparse.Namespace) -> Fleet:
         if version not in (1, 2, 3):
             raise ConfigError("--protocol", f"expected 1, 2 or 3, got {version}")
         versions = (version, version)
-    seed = None if arguments.seed is None else integer("--seed", arguments.seed, "a whole number")
+    seed = None if arguments.seed is None else _seed(arguments.seed)
     try:
         first = DroneSpec(
             model=arguments.model,
@@ -158,6 +161,15 @@ def _from_options(arguments: argparse.Namespace) -> Fleet:
         raise ConfigError("--count", f"expected room for {count} addresses from {first.address} on") from None
     paths = {} if arguments.scenario is None else dict.fromkeys(addresses, str(arguments.scenario))
     return Fleet([replace(first, address=address) for address in addresses], speed, seed, paths)
+
+
+def _seed(text: str) -> int:
+    """As in a configuration: of a negative seed Python would use the amount, so that -1 is 1."""
+    wanted = f"a whole number from 0 to {MAX_SEED}"
+    seed = integer("--seed", text, wanted)
+    if not 0 <= seed <= MAX_SEED:
+        raise ConfigError("--seed", f"expected {wanted}, got {seed}")
+    return seed
 
 
 def _flag(key_path: str) -> str:
