@@ -22,6 +22,7 @@ HTML = "text/html"
 FILES: Final = {
     "/": ("index.html", HTML),
     "/live.css": ("live.css", "text/css"),
+    "/answers.js": ("answers.js", "text/javascript"),
     "/live.js": ("live.js", "text/javascript"),
     "/drone.js": ("drone.js", "text/javascript"),
     "/picture.js": ("picture.js", "text/javascript"),

@@ -7,6 +7,7 @@ const PERIOD = 1000; // ms between two looks at drone and picture
 const sysid = Number(location.pathname.split("/").pop());
 const video = document.getElementById("picture");
 const picture = new LivePicture(video, sysid);
+const answers = new Answers("/drones");
 
 function show(drone) {
   document.title = `${drone.name} – anafi-mav`;
@@ -28,9 +29,7 @@ function problem(drone) {
 async function refresh() {
   let text;
   try {
-    const answer = await fetch("/drones");
-    if (!answer.ok) throw new Error(`status ${answer.status}`);
-    const drone = (await answer.json()).find((one) => one.sysid === sysid);
+    const drone = (await answers.next()).find((one) => one.sysid === sysid);
     if (drone === undefined || !drone.connected) {
       if (picture.session !== null) picture.close();
     } else {
@@ -39,7 +38,7 @@ async function refresh() {
     if (drone !== undefined) show(drone);
     text = problem(drone);
   } catch (error) {
-    text = `The gateway does not answer (${error.message}).`;
+    text = answers.missed(error);
   }
   document.getElementById("problem").textContent = text;
   setTimeout(refresh, PERIOD);

@@ -5,6 +5,7 @@
 const PERIOD = 1000; // ms
 
 const rows = new Map(); // system id -> list item
+const answers = new Answers("/drones");
 
 function row(drone) {
   let item = rows.get(drone.sysid);
@@ -35,12 +36,10 @@ function show(drones) {
 async function refresh() {
   const problem = document.getElementById("problem");
   try {
-    const answer = await fetch("/drones");
-    if (!answer.ok) throw new Error(`status ${answer.status}`);
-    show(await answer.json());
+    show(await answers.next());
     problem.textContent = "";
   } catch (error) {
-    problem.textContent = `The gateway does not answer (${error.message}).`;
+    problem.textContent = answers.missed(error);
   }
   setTimeout(refresh, PERIOD);
 }

@@ -3,6 +3,7 @@
 // The live picture of one drone by WebRTC (WHEP) in a <video> of the page.
 
 const PICTURE_RETRY = 2000; // ms after a failure
+const PICTURE_LIMIT = 15000; // ms until the gateway answers; it waits 8 s for the drone's first picture
 const PICTURE_SILENCE = 5000; // ms without a decoded picture after which the session is made again
 
 class LivePicture {
@@ -48,6 +49,7 @@ class LivePicture {
         method: "POST",
         headers: { "Content-Type": "application/sdp" },
         body: connection.localDescription.sdp,
+        signal: AbortSignal.timeout(PICTURE_LIMIT),
       });
       const text = await answer.text();
       if (answer.status !== 201) throw new Error(text.trim() || `status ${answer.status}`);

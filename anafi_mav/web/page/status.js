@@ -5,6 +5,7 @@
 const PERIOD = 1000; // ms
 
 const cards = new Map(); // system id -> {item, picture, video, open}
+const answers = new Answers("/status.json");
 
 function element(kind, text, name = "") {
   const made = document.createElement(kind);
@@ -123,14 +124,12 @@ function show(status) {
 async function refresh() {
   const problem = document.getElementById("problem");
   try {
-    const answer = await fetch("/status.json");
-    if (!answer.ok) throw new Error(`status ${answer.status}`);
-    const status = await answer.json();
+    const status = await answers.next();
     show(status);
     for (const drone of status.drones) await showDrone(drone);
     problem.textContent = "";
   } catch (error) {
-    problem.textContent = `The gateway does not answer (${error.message}).`;
+    problem.textContent = answers.missed(error);
   }
   setTimeout(refresh, PERIOD);
 }
