@@ -463,7 +463,7 @@ class Drone:
             except LinkLost as error:
                 log.warning("%s: no web server: %s", self.name, error)
             else:
-                await self._rest.aim(address, port, local=True)
+                await self._rest.aim(address, port, is_behind_mux=True)
         else:
             shift = CONTROLLER_PORTS if self.controller.present else 0
             await self._rest.aim(self.address, self._http_port + shift)

@@ -11,9 +11,9 @@ from __future__ import annotations
 import asyncio
 import re
 import socket
-from collections.abc import AsyncIterator, Mapping
-from contextlib import asynccontextmanager, suppress
-from typing import Any
+from collections.abc import AsyncGenerator, AsyncIterator, Mapping
+from contextlib import aclosing, asynccontextmanager, suppress
+from typing import Any, NamedTuple
 
 import aiohttp
 import msgspec
@@ -50,7 +50,22 @@ PARTIAL = 206
 UNREADABLE = (ValueError, RecursionError)
 """Errors of msgspec for what is no JSON: also `UnicodeDecodeError`, for a text in it that is no UTF-8."""
 
-_CONTENT_RANGE = re.compile(r"bytes ([0-9]{1,18})-[0-9]{1,18}/([0-9]{1,18})")
+MUX_RANGE = 1 << 19
+"""Bytes of a file that are requested at a time behind a Skycontroller's mux.
+
+It passes on what the drone sends, whether it is read or not: a whole video would fill the gateway's memory, and the
+radio of a flying drone.
+"""
+
+_CONTENT_RANGE = re.compile(r"bytes ([0-9]{1,18})-([0-9]{1,18})/([0-9]{1,18})")
+
+
+class _Range(NamedTuple):
+    """Bytes of a file in an answer."""
+
+    start: int
+    end: int | None
+    """Behind the last byte; None: the rest of the file."""
 
 
 class NotFound(CommandRejected):
@@ -79,17 +94,21 @@ class Rest:
         self.port = port
         self._local_address = local_address
         self._interface = interface
-        self._local = False
+        self._is_behind_mux = False
         self._client: aiohttp.ClientSession | None = None
 
     @property
     def base(self) -> str:
         return f"http://{self.address}:{self.port}{self._prefix}"
 
-    async def aim(self, address: str, port: int, *, local: bool = False) -> None:
-        """Ask there from now on. `local`: on this machine, where no interface has to be named."""
+    async def aim(self, address: str, port: int, *, is_behind_mux: bool = False) -> None:
+        """Ask there from now on.
+
+        `is_behind_mux`: the address is on this machine, where no interface has to be named, and leads through the mux
+        of a Skycontroller.
+        """
         await self.close()
-        self.address, self.port, self._local = address, port, local
+        self.address, self.port, self._is_behind_mux = address, port, is_behind_mux
 
     async def close(self) -> None:
         """End everything that is open. Idempotent."""
@@ -138,24 +157,50 @@ class Rest:
 
     @asynccontextmanager
     async def open_file(self, path: str, offset: int, size: int) -> AsyncIterator[tuple[int, AsyncIterator[bytes]]]:
-        """Read a file of `size` bytes (0.
-
-        Unknown) from `offset` on: where the answer begins, and its pieces.
+        """Open a file of `size` bytes (0: unknown) at `offset`; yield where the answer begins, and its pieces.
 
         It begins at 0 when the web server has no ranges (RFC 9110 §14.2). Raises `RemoteProtocolError` when the file
         has another size by now. The caller counts the bytes: an answer may end too early.
         """
-        headers = {"Range": f"bytes={offset}-", "Accept-Encoding": "identity"} if offset else None
+        end = offset + MUX_RANGE if self._is_behind_mux and offset + MUX_RANGE < size else None
+        async with self._open_range(path, offset, end, size) as (found, pieces):
+            if end is None or found.end is None:
+                yield found.start, pieces
+            else:
+                async with aclosing(self._following_ranges(path, pieces, found.end, size)) as all_pieces:
+                    yield found.start, all_pieces
+
+    async def _following_ranges(
+        self, path: str, pieces: AsyncIterator[bytes], offset: int, size: int
+    ) -> AsyncGenerator[bytes, None]:
+        """Yield the pieces of an open range, then those of the ranges behind it, each requested when it is read."""
+        async for piece in pieces:
+            yield piece
+        while offset < size:
+            async with self._open_range(path, offset, min(offset + MUX_RANGE, size), size) as (found, pieces):
+                async for piece in pieces:
+                    yield piece
+            offset = size if found.end is None else found.end
+
+    @asynccontextmanager
+    async def _open_range(
+        self, path: str, offset: int, end: int | None, size: int
+    ) -> AsyncIterator[tuple[_Range, AsyncIterator[bytes]]]:
+        """Open the bytes from `offset` to before `end` (None: the end of the file); yield what is answered."""
+        headers = None
+        if offset or end is not None:
+            last = "" if end is None else str(end - 1)
+            headers = {"Range": f"bytes={offset}-{last}", "Accept-Encoding": "identity"}
         async with self._request("GET", path, headers=headers) as response:
-            start, total = 0, response.content_length
+            found, total = _Range(0, None), response.content_length
             if response.status == PARTIAL:
-                found = _CONTENT_RANGE.fullmatch(response.headers.get("Content-Range", ""))
-                if found is None or int(found[1]) != offset:
+                part = _CONTENT_RANGE.fullmatch(response.headers.get("Content-Range", ""))
+                if part is None or int(part[1]) != offset or int(part[2]) < offset:
                     raise RemoteProtocolError(f"GET {path}: not the range that begins at {offset}")
-                start, total = offset, int(found[2])
+                found, total = _Range(offset, int(part[2]) + 1), int(part[3])
             if size and total is not None and total != size:
                 raise RemoteProtocolError(f"GET {path}: expected {size} bytes, the file has {total}")
-            yield start, response.content.iter_any()
+            yield found, response.content.iter_any()
 
     @asynccontextmanager
     async def _request(
@@ -192,7 +237,7 @@ class Rest:
     def _session(self) -> aiohttp.ClientSession:
         if self._client is None or self._client.closed:
             options: dict[str, Any] = {"limit_per_host": CONNECTIONS, "socket_factory": self._make_socket}
-            if self._local_address is not None and not self._local:
+            if self._local_address is not None and not self._is_behind_mux:
                 options["local_addr"] = (self._local_address, 0)
             timeout = aiohttp.ClientTimeout(total=None, sock_connect=ANSWER_TIMEOUT, sock_read=ANSWER_TIMEOUT)
             connector = aiohttp.TCPConnector(**options)
@@ -204,7 +249,7 @@ class Rest:
         sock = socket.socket(family, kind, protocol)
         try:
             sock.setblocking(False)
-            bind_to_interface(sock, None if self._local else self._interface)
+            bind_to_interface(sock, None if self._is_behind_mux else self._interface)
             read_after_clients(sock)
         except BaseException:
             sock.close()

@@ -42,6 +42,9 @@ CHUNK = 1 << 14
 """Bytes of one frame, so that a download does not keep telemetry waiting."""
 MAX_AHEAD = 1 << 20
 """Bytes sent on a channel before an acknowledgement is awaited (libmux MUX_CHANNEL_IP_ACK_BYTES_INTL)."""
+MAX_UNREAD = 1 << 24
+"""Bytes that wait for a local client that does not read; then its connection ends. The mux of all channels is one TCP
+connection, so that to read it later would keep the drone's telemetry waiting."""
 TIMEOUT = 5.0
 """s to wait for a resolution or an acknowledgement."""
 
@@ -76,8 +79,13 @@ class _Channel:
 
     def put(self, data: bytes) -> None:
         """Bytes from the other side."""
-        if not self.writer.is_closing():
-            self.writer.write(data)
+        if self.writer.is_closing():
+            return
+        if self.writer.transport.get_write_buffer_size() > MAX_UNREAD:
+            log.warning("mux: a connection ends: %d MB wait for its client", MAX_UNREAD >> 20)
+            self.writer.transport.abort()
+            return
+        self.writer.write(data)
 
     def close(self) -> None:
         """End the connection. Idempotent."""

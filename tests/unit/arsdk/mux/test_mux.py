@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import random
 import tracemalloc
 
@@ -15,7 +16,7 @@ from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.link.handshake import DeviceInfo
 from anafi_mav.arsdk.link.session import OnMessage
 from anafi_mav.arsdk.messages import ardrone3, common
-from anafi_mav.arsdk.mux import mux, mux_link
+from anafi_mav.arsdk.mux import mux, mux_link, mux_proxy
 from anafi_mav.arsdk.mux.mux import (
     Decoder,
     MuxControl,
@@ -280,6 +281,40 @@ async def test_datagrams_over_the_mux() -> None:
     assert again.closed
     with pytest.raises(LinkLost):
         await session.open_udp("skycontroller", ear.hear)
+
+
+async def test_client_of_the_mux_that_does_not_read_is_disconnected(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mux_proxy, "MAX_UNREAD", 1 << 20)
+
+    async def flood(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        with contextlib.suppress(OSError):
+            while not writer.is_closing():
+                writer.write(bytes(1 << 16))
+                await writer.drain()
+        writer.close()
+
+    device = Device()
+    server = await mux_link.MuxServer.start("127.0.0.1", port=0, info=INFO, on_session=device.on_session)
+    web = await asyncio.start_server(flood, "127.0.0.1", 0)
+    session = await mux_link.connect("127.0.0.1", port=server.discovery_port, on_message=lambda message, now: None)
+    try:
+        door = await session.open_tcp("drone", web.sockets[0].getsockname()[1])
+        reader, writer = await asyncio.open_connection(*door)
+        writer.transport.pause_reading()  # type: ignore[attr-defined]
+        await asyncio.sleep(5.0)
+        writer.transport.resume_reading()  # type: ignore[attr-defined]
+        read = 0
+        with contextlib.suppress(ConnectionResetError):
+            while data := await asyncio.wait_for(reader.read(1 << 20), 10.0):
+                read += len(data)
+        assert read < 1 << 24  # what the sockets hold, too
+        writer.close()
+        assert not session.lost.done()
+        assert await session.open_tcp("drone", web.sockets[0].getsockname()[1]) == door
+    finally:
+        await session.close()
+        await server.close()
+        web.close()
 
 
 async def test_connections_over_the_mux_end_with_the_mux() -> None:

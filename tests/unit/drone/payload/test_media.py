@@ -22,7 +22,7 @@ from anafi_mav.drone.payload.camera_enums import CameraMode, PhotoFile, PhotoMod
 from anafi_mav.drone.payload.camera_state import PhotoSettings
 from anafi_mav.drone.payload.media import MediaItem, Notification, Resource
 from anafi_mav.drone.payload.media_index import SORTED_IN_LOOP, MediaIndex
-from anafi_mav.drone.rest import Rest
+from anafi_mav.drone.rest import MUX_RANGE, Rest
 from anafi_mav.errors import CommandRejected, LinkLost, NotSupported, RemoteProtocolError
 
 
@@ -332,3 +332,44 @@ async def test_without_a_web_server_or_a_media_store() -> None:
     with pytest.raises(LinkLost):
         await rest.json("GET", "/")
     await rest.close()
+
+
+@pytest.mark.parametrize("has_ranges", [True, False])
+async def test_file_behind_the_mux_is_requested_in_ranges(has_ranges: bool) -> None:
+    """The mux passes on what the drone sends, whether it is read or not."""
+    content = b"".join(hashlib.sha256(number.to_bytes(4, "big")).digest() for number in range(5 * MUX_RANGE // 64))
+    requests: list[str | None] = []
+
+    async def answer(request: web.Request) -> web.Response:
+        requests.append(request.headers.get("Range"))
+        if not has_ranges or request.http_range.start is None:
+            return web.Response(body=content)
+        first, end, _ = request.http_range.indices(len(content))
+        found = f"bytes {first}-{end - 1}/{len(content)}"
+        return web.Response(status=206, body=content[first:end], headers={"Content-Range": found})
+
+    app = web.Application()
+    app.router.add_get("/file", answer)
+    runner = web.AppRunner(app)
+    await runner.setup()
+    await web.TCPSite(runner, "127.0.0.1", 0).start()
+    rest = Rest("127.0.0.1", 1)
+    await rest.aim("127.0.0.1", runner.addresses[0][1], is_behind_mux=True)
+    try:
+        async with rest.open_file("/file", 0, len(content)) as (start, pieces):
+            assert start == 0
+            read = await anext(pieces)
+            assert requests == [f"bytes=0-{MUX_RANGE - 1}"]
+            read += b"".join([piece async for piece in pieces])
+        assert read == content
+        async with rest.open_file("/file", 100, len(content)) as (start, pieces):
+            assert content[start:] == b"".join([piece async for piece in pieces])
+    finally:
+        await rest.close()
+        await runner.cleanup()
+    whole = [f"bytes=0-{MUX_RANGE - 1}", f"bytes=100-{MUX_RANGE + 99}"]
+    if has_ranges:
+        end = len(content)
+        whole[1:1] = [f"bytes={MUX_RANGE}-{2 * MUX_RANGE - 1}", f"bytes={2 * MUX_RANGE}-{end - 1}"]
+        whole += [f"bytes={MUX_RANGE + 100}-{2 * MUX_RANGE + 99}", f"bytes={2 * MUX_RANGE + 100}-{end - 1}"]
+    assert requests == whole
