@@ -28,6 +28,7 @@ from anafi_mav.drone.drone import CONTROLLER_PORTS
 from anafi_mav.drone.rest import HTTP_PORT
 from anafi_mav.drone.status.product import MODELS
 from anafi_mav.errors import AnafiMavError, ConfigError, LinkLost
+from anafi_mav.services.version_numbers import version_numbers
 from anafi_mav.vehicle.failsafe_settings import FailsafeLimits, warnings_of
 
 ANSWER_LIMIT = 2.0
@@ -298,8 +299,7 @@ def firmware(drone: Drone) -> Finding:
     version, wanted = drone.identity.firmware, drone.identity.model.firmware
     if not version:
         return wrong("firmware", "not reported", _RESTART)
-    numbers = tuple(int(part) if part.isdigit() else 0 for part in version.split("-")[0].split("."))
-    if numbers >= wanted:
+    if version_numbers(version) >= wanted:
         return ok("firmware", version)
     need = ".".join(map(str, wanted))
     return wrong("firmware", f"{version}, older than {need}", "update it by Parrot's FreeFlight")

@@ -6,7 +6,6 @@ The flags of CAMERA_INFORMATION are what the drone reported of its main camera: 
 from __future__ import annotations
 
 import math
-import re
 
 from anafi_mav import geo, units
 from anafi_mav.drone import Drone
@@ -18,6 +17,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.models import Model, PayloadSensor
 from anafi_mav.services.camera.pose_track import CameraPose
 from anafi_mav.services.stream import Times
+from anafi_mav.services.version_numbers import version_numbers
 from anafi_mav.vehicle.vehicle import Vehicle
 
 NAN = math.nan
@@ -75,10 +75,9 @@ def flags(drone: Drone) -> int:
     return int(found)
 
 
-def firmware_version(text: str) -> int:
+def firmware_version(text: str | None) -> int:
     """Return "1.8.2" as CAMERA_INFORMATION has it: the first number in the lowest byte."""
-    numbers = [min(int(number), 255) for number in re.findall(r"\d+", text)[:3]]
-    return sum(number << 8 * place for place, number in enumerate(numbers))
+    return sum(number << 8 * place for place, number in enumerate(version_numbers(text)))
 
 
 def information(drone: Drone, times: Times, extra_flags: int, uri: str, version: int) -> dialect.MAVLink_message:
@@ -89,7 +88,7 @@ def information(drone: Drone, times: Times, extra_flags: int, uri: str, version:
         times.boot_ms,
         _characters("Parrot"),
         _characters(identity.model.title),
-        firmware_version(identity.firmware or ""),
+        firmware_version(identity.firmware),
         NAN,
         NAN,
         NAN,

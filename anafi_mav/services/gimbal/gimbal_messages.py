@@ -7,7 +7,6 @@ to north where the axis is locked to it.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 
 from anafi_mav import units
@@ -16,6 +15,7 @@ from anafi_mav.drone.events import Axis, FrameOfReference, GimbalCalibrationStat
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.gimbal.control import GimbalControl
 from anafi_mav.services.stream import Times
+from anafi_mav.services.version_numbers import version_numbers
 from anafi_mav.vehicle.vehicle import Vehicle
 
 DEVICE = 1
@@ -106,8 +106,7 @@ def device_information(vehicle: Vehicle, gimbal: GimbalState, times: Times) -> d
     if gimbal.axes is None:
         return None
     identity, flags = vehicle.drone.identity, device_capabilities(gimbal)
-    numbers = [int(number) for number in re.findall(r"\d+", identity.firmware or "")[:3]]
-    major, minor, patch = (min(number, 255) for number in (*numbers, *[0] * (3 - len(numbers))))
+    major, minor, patch = version_numbers(identity.firmware)
     return dialect.MAVLink_gimbal_device_information_message(
         times.boot_ms,
         b"Parrot",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Mapping
 
 from anafi_mav import __version__
@@ -14,13 +13,13 @@ from anafi_mav.services.capabilities import capability_bits
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import MessageHandler, Request, Service
+from anafi_mav.services.version_numbers import version_numbers
 
 
 def _version(text: str) -> int:
     """ "1.8.2" as MAVLink's four version bytes, the last one 0."""
-    numbers = [int(number) for number in re.findall(r"\d+", text)[:3]]
-    numbers += [0] * (3 - len(numbers))
-    return min(numbers[0], 255) << 24 | min(numbers[1], 255) << 16 | min(numbers[2], 255) << 8
+    major, minor, patch = version_numbers(text)
+    return major << 24 | minor << 16 | patch << 8
 
 
 def _custom_version(firmware: str, flavour: Flavour) -> bytes:

@@ -221,7 +221,16 @@ async def test_doctor_reports_dangerous_settings_with_their_mend() -> None:
 
 
 @pytest.mark.parametrize(
-    ("version", "is_wrong"), [("1.8.2", False), ("1.6.0", True), ("1.10.0-rc1", False), ("", True), ("7", False)]
+    ("version", "is_wrong"),
+    [
+        ("1.8.2", False),
+        ("1.6.0", True),
+        ("1.10.0-rc1", False),
+        ("", True),
+        ("7", False),
+        ("7.²", False),
+        (f"1.{'9' * 5000}", False),
+    ],
 )
 async def test_doctor_firmware_is_compared_by_numbers(version: str, is_wrong: bool) -> None:
     async with simulated() as simulated_drone:
