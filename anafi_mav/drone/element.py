@@ -29,6 +29,9 @@ EnumT = TypeVar("EnumT", bound=enum.IntEnum)
 MAX_ITEMS = 64
 """Items kept of a map that the drone reports. The longest we declare has 25 keys; more is a confused peer."""
 
+LARGEST = 1e30
+"""Size of a number that is a measure: sums of several fit a float of 32 bits, which MAVLink's fields are."""
+
 Reducer: TypeAlias = Callable[[Any, Any], Any]
 """(state, message) -> state. Pure; must accept whatever a peer can put on the wire."""
 
@@ -130,8 +133,8 @@ class StateWatch:
 
 
 def finite(value: float) -> float | None:
-    """The number, or None for NaN and infinities, which no MAVLink integer can carry."""
-    return value if math.isfinite(value) else None
+    """The number, or None for NaN, infinities and what is beyond `LARGEST`."""
+    return value if abs(value) <= LARGEST else None
 
 
 def field_of_view(deg: float | None) -> float | None:
@@ -148,7 +151,7 @@ def setting(message: Any) -> Range | None:
 
 def position(latitude: float, longitude: float, altitude: float) -> Position | None:
     """A reported place; None when the drone does not know it (Parrot says so with 500 degrees)."""
-    if not (-90.0 <= latitude <= 90.0 and -180.0 <= longitude <= 180.0 and math.isfinite(altitude)):
+    if not (-90.0 <= latitude <= 90.0 and -180.0 <= longitude <= 180.0 and abs(altitude) <= LARGEST):
         return None
     return Position(latitude, longitude, altitude)
 

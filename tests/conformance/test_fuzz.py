@@ -1,8 +1,8 @@
 """Whatever arrives: no exception, no pause of the heartbeat, and no motion but what is on a list.
 
 Frames of every message of the dialect with random content and a right checksum, frames that are damaged, messages that
-fly a drone with some of their bytes changed, and every command with numbers that make no sense. What moves the drone is
-read from the simulator's own log.
+fly a drone with some of their bytes changed, every command with numbers that make no sense, and events of the drone
+with any values. What moves the drone is read from the simulator's own log.
 """
 
 from __future__ import annotations
@@ -15,15 +15,18 @@ import random
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+import aiohttp
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support import clock
+from support.drone_events import EVENTS, random_event
 from support.fuzz import LONGEST, framed, offset, random_frames
 from support.mav import NAN
 from support.missions import ROUND, put
 from support.setpoints import COPTER_BRAKE, COPTER_GUIDED, POSITION_ONLY, VELOCITY_ONLY, ZERO, attitude, earth, local
 from support.world import HOME, World, world
 
+from anafi_mav.arsdk.messages import battery
 from anafi_mav.mavlink import dialect as newer
 from anafi_mav.sim.world.motion import Pose
 
@@ -39,6 +42,9 @@ BATCH = 500
 
 BATCH_EVERY, FRAME_EVERY, COMMAND_EVERY = 0.25, 0.05, 0.001
 """s: a storm, and all the same time goes on: several heartbeats are due in it."""
+
+EVENT_BATCHES, EVENTS_AT_ONCE = 25, 60
+"""Events of a drone with random values: 1500 of 337 kinds."""
 
 LOST = 3.0
 """s without a heartbeat after which the most impatient client, MAVSDK, takes a vehicle for lost. The clock of tests
@@ -232,6 +238,39 @@ async def test_random_frames_to_the_camera_are_survived(fuzz_seed: int, mistakes
                 await throw(w, batch)
         assert motions(w, began) == []
         assert mistakes == []
+
+
+@pytest.mark.parametrize(("model", "skycontroller"), [("4k", None), ("thermal", 3), ("ai", 4)])
+async def test_random_events_of_the_drone_are_survived(
+    model: str, skycontroller: int | None, fuzz_seed: int, mistakes: list[str]
+) -> None:
+    source = random.Random(f"{fuzz_seed} {model}")
+    async with world(model=model, skycontroller=skycontroller, web=True) as w, aiohttp.ClientSession() as browser:
+        assert w.gateway.web is not None
+        await w.take_off(5.0)
+        with steady(w):
+            for _ in range(EVENT_BATCHES):
+                for kind in source.choices(EVENTS, k=EVENTS_AT_ONCE):
+                    w.drone.inject(random_event(kind, source))
+                await asyncio.sleep(BATCH_EVERY)
+                for id in source.choices(tuple(dialect.mavlink_map), k=10):
+                    component = source.choice((1, 100, 154))
+                    w.client.send(
+                        dialect.MAVLink_command_long_message(
+                            1, component, dialect.MAV_CMD_REQUEST_MESSAGE, 0, float(id), 0, 0, 0, 0, 0, 0
+                        )
+                    )
+                for path in ("drones", "status.json", "metrics"):
+                    async with browser.get(f"{w.gateway.web.describe()}{path}") as answer:
+                        assert answer.status == 200
+                assert w.gateway.lines()
+
+
+async def test_charge_that_no_field_holds_leaves_battery_status(mistakes: list[str]) -> None:
+    async with world(model="ai") as w:
+        w.drone.inject(battery.Capacity(0xFFFFFFFF, 0))
+        mark = w.client.mark()
+        await w.client.wait("BATTERY_STATUS", lambda status: status.current_consumed == 0x7FFFFFFF, since=mark)
 
 
 async def test_fields_named_id_are_not_taken_for_message_ids(mistakes: list[str]) -> None:

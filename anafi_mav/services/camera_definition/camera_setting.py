@@ -86,17 +86,21 @@ class CameraSetting:
             raise ValueError(f"{self.name}: expected either options or limits")
 
     def options_of(self, view: View) -> tuple[Option, ...]:
-        """Return the options that this camera accepts, as both ends hold their values."""
-        if self.options is None:
-            return ()
-        return tuple(Option(self.kind.normalise(value), text) for value, text in self.options(view))
+        """Return the options that this camera accepts, as both ends hold their values.
+
+        One whose value the type cannot hold is left out.
+        """
+        options = () if self.options is None else self.options(view)
+        held = ((self._held(value), text) for value, text in options)
+        return tuple(Option(value, text) for value, text in held if value is not None)
 
     def limits_of(self, view: View) -> ValueLimits | None:
-        """Return the range that this camera accepts."""
+        """Return the range that this camera accepts; None for one whose ends the type cannot hold."""
         found = None if self.limits is None else self.limits(view)
-        if found is None or not math.isfinite(found.low + found.high) or found.low > found.high:
+        if found is None or found.low > found.high:
             return None
-        return ValueLimits(self.kind.normalise(found.low), self.kind.normalise(found.high), found.step)
+        low, high = self._held(found.low), self._held(found.high)
+        return None if low is None or high is None else ValueLimits(low, high, found.step)
 
     def is_of(self, view: View) -> bool:
         """Return True when this camera has the setting."""
@@ -105,7 +109,11 @@ class CameraSetting:
     def value_of(self, view: View) -> float | None:
         """Return the value as both ends hold it; None when this camera does not report it."""
         value = self.read(view)
-        if value is None or not math.isfinite(value):
+        return None if value is None else self._held(value)
+
+    def _held(self, value: float) -> float | None:
+        """Return a value of the drone as both ends hold it; None when the type cannot."""
+        if not math.isfinite(value):
             return None
         try:
             return self.kind.normalise(value)

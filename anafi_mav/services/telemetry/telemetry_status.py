@@ -73,7 +73,7 @@ def battery_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | 
     voltages, more = _voltages(state)
     used = -1
     if state.full_charge_mah is not None and state.remaining_mah is not None:
-        used = max(state.full_charge_mah - state.remaining_mah, 0)
+        used = units.saturate(max(state.full_charge_mah - state.remaining_mah, 0), 32)
     return dialect.MAVLink_battery_status_message(
         0,
         dialect.MAV_BATTERY_FUNCTION_ALL,

@@ -21,7 +21,7 @@ from anafi_mav.drone.automatic.flight_plan import FlightPlan
 from anafi_mav.drone.automatic.follow_me import FollowMe
 from anafi_mav.drone.automatic.poi import Poi
 from anafi_mav.drone.controller.controller import Controller
-from anafi_mav.drone.element import MAX_ITEMS, Element
+from anafi_mav.drone.element import MAX_ITEMS, Element, finite, position
 from anafi_mav.drone.payload.camera import Camera
 from anafi_mav.drone.payload.camera_state import MAX_OPTIONS, CamerasState
 from anafi_mav.drone.payload.gimbal import Gimbal
@@ -121,3 +121,10 @@ def test_maps_and_lists_do_not_grow_without_end() -> None:
     assert len(cameras.cameras[0].photos) == MAX_OPTIONS
     many = new.CameraList(cameras=dict.fromkeys(range(1000), new.CameraModel.MAIN))
     assert len(Camera.REDUCERS[new.CameraList](CamerasState(), many).cameras) == MAX_ITEMS
+
+
+def test_number_that_no_float_of_32_bits_holds_is_unknown() -> None:
+    assert finite(1e30) == 1e30
+    for number in (1e300, -1e300, math.inf, math.nan):
+        assert finite(number) is None
+        assert position(48.0, 2.0, number) is None
