@@ -78,8 +78,6 @@ def _state(state: CamerasState, m: wire.State) -> CamerasState:
     id = m.camera_id or 0
     changes: dict[str, Any] = {"feature": FEATURE}
     now = state.cameras.get(id, UNREPORTED)
-    if m.active is not None:
-        state = replace(state, active=state.active | {id} if m.active else state.active - {id})
     if m.photo is not None:
         changes |= {
             "photo_available": m.photo.state != wire.PhotoState.UNAVAILABLE,
@@ -115,7 +113,10 @@ def _state(state: CamerasState, m: wire.State) -> CamerasState:
     rules = m.default_capabilities or m.current_capabilities
     if rules is not None:
         changes |= _rules(rules.rules, changes.get("style", now.style))
-    return changed(state, id, **changes)
+    state = changed(state, id, **changes)
+    if m.active is None or id not in state.cameras:
+        return state
+    return replace(state, active=state.active | {id} if m.active else state.active - {id})
 
 
 def _given(**values: Any) -> dict[str, Any]:

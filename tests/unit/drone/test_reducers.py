@@ -118,6 +118,10 @@ def test_maps_and_lists_do_not_grow_without_end() -> None:
             cameras, old.PhotoCapabilities(0, 1, 1, 1, old.Supported.SUPPORTED, 0)
         )
     assert len(gimbals) == len(cameras.cameras) == MAX_ITEMS
+    modern = CamerasState()
+    for id in range(10 * MAX_ITEMS):
+        modern = Camera.REDUCERS[new.State](modern, new.State(camera_id=id, active=True))
+    assert len(modern.cameras) == len(modern.active) == MAX_ITEMS
     assert len(cameras.cameras[0].photos) == MAX_OPTIONS
     many = new.CameraList(cameras=dict.fromkeys(range(1000), new.CameraModel.MAIN))
     assert len(Camera.REDUCERS[new.CameraList](CamerasState(), many).cameras) == MAX_ITEMS
