@@ -11,6 +11,9 @@ import math
 RAD_PER_DEG = math.pi / 180.0
 DEG_PER_RAD = 180.0 / math.pi
 
+LARGEST = 1e30
+"""Size of a number that is a measure: sums of several fit a float of 32 bits, which MAVLink's fields are."""
+
 
 def wrap_pi(angle: float) -> float:
     """The same angle (rad) in [-pi, pi)."""

@@ -20,6 +20,7 @@ import msgspec
 from anafi_mav.arsdk.codec.value_events import ValueLayout, Values
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages.generic import ListFlags
+from anafi_mav.units import LARGEST
 
 StateT = TypeVar("StateT")
 KeyT = TypeVar("KeyT")
@@ -28,9 +29,6 @@ EnumT = TypeVar("EnumT", bound=enum.IntEnum)
 
 MAX_ITEMS = 64
 """Items kept of a map that the drone reports. The longest we declare has 25 keys; more is a confused peer."""
-
-LARGEST = 1e30
-"""Size of a number that is a measure: sums of several fit a float of 32 bits, which MAVLink's fields are."""
 
 Reducer: TypeAlias = Callable[[Any, Any], Any]
 """(state, message) -> state. Pure; must accept whatever a peer can put on the wire."""

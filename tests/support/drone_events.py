@@ -29,7 +29,7 @@ TEXTS = (
     *("", "PI04", "x" * 300, "9" * 5000, "²", "ü" * 60, "\N{REPLACEMENT CHARACTER}" * 30),
     *("\x1b[2J", "[red]", "a;b;c", "%s{}", "../../x", "20261301T999999+9999"),
 )
-REALS = (math.nan, math.inf, -math.inf, 0.0, -0.0, 1e-40, 1e30, -1e30, 48.8, 2.3, 500.0)
+REALS = (math.nan, math.inf, -math.inf, 0.0, -0.0, 1e-40, 1e30, -1e30, 3.4e38, -3.4e38, 48.8, 2.3, 500.0)
 HUGE = 1e300
 """Of a double only."""
 

@@ -41,6 +41,7 @@ from anafi_mav.arsdk.video.video_metadata import (
     said_fov,
     said_mode,
 )
+from anafi_mav.units import LARGEST
 
 
 class _Quaternion(Submessage, frozen=True):
@@ -186,8 +187,8 @@ def _location(place: Location | None) -> _Location | None:
 def decode_proto(data: bytes) -> FrameMetadata | None:
     """The record in a serialized `TimedMetadata`; None if it is no protocol buffer.
 
-    A measure that is missing, or NaN, is None; battery, state and the numbers of a vector that is there are then zero,
-    which is what proto3 says by their absence. Of several links of one kind the first counts.
+    A measure that is missing, NaN or beyond `LARGEST` is None. Battery, state and the numbers of a vector that is there
+    are zero then, which is what proto3 says by their absence. Of several links of one kind the first counts.
     """
     timed = parse(_TimedMetadata, data)
     if timed is None:
@@ -233,7 +234,7 @@ def _said_starfish(link: _Starfish | None) -> StarfishLink | None:
 
 
 def _said(value: float) -> float | None:
-    return value if value and math.isfinite(value) else None
+    return value if value and abs(value) <= LARGEST else None
 
 
 def _said_quat(quat: _Quaternion | None) -> Quaternion | None:
@@ -250,7 +251,7 @@ def _said_triple(vector: type[_Vector], triple: _Triple | None) -> _Vector | Non
     if triple is None:
         return None
     parts = (triple.first, triple.second, triple.third)
-    return vector(*parts) if all(map(math.isfinite, parts)) else None
+    return vector(*parts) if all(abs(part) <= LARGEST for part in parts) else None
 
 
 def _said_location(place: _Location | None) -> Location | None:

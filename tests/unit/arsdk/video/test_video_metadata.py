@@ -185,6 +185,15 @@ def test_places_off_the_earth_and_broken_vectors_are_unknown() -> None:
     assert metadata.speed is None
 
 
+def test_measure_that_no_float_of_32_bits_holds_is_unknown() -> None:
+    # ground distance and height above take-off: fields 3 and 13 of the drone, doubles; its speed is field 4.
+    drone = b"\x19" + struct.pack("<d", 1e300) + b"\x69" + struct.pack("<d", -1e300)
+    drone += b"\x22\x05\x0d" + struct.pack("<f", 3.4e38)
+    metadata = decode_proto(b"\x0a" + bytes((len(drone),)) + drone)
+    assert metadata is not None
+    assert (metadata.ground_distance, metadata.altitude_ato, metadata.speed) == (None, None, None)
+
+
 @pytest.mark.parametrize("fov", [7.0, -1.0, 1e30, math.nan, math.inf])
 def test_impossible_field_of_view_is_unknown(fov: float) -> None:
     # hfov and vfov: fields 8 and 9 of the camera, floats.
