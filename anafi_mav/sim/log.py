@@ -10,15 +10,20 @@ ends), pose (the true pose, 10 Hz, and the simulated time in s).
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import logging
 from collections import deque
 from collections.abc import Callable, Iterator
+from io import FileIO
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import msgspec
 
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.errors import CommandTimeout
+
+logger = logging.getLogger("anafi_mav.sim")
 
 
 class LogEntry(msgspec.Struct, frozen=True):
@@ -31,29 +36,42 @@ class LogEntry(msgspec.Struct, frozen=True):
 
 
 class LogFile:
-    """A file of entries, one JSON object a line, written whole lines at a time."""
+    """A file of entries, one JSON object a line, written whole lines at a time.
+
+    It ends with one warning when the disk takes no more: the drones fly on.
+    """
 
     def __init__(self, path: Path) -> None:
+        """Raises `OSError` when the file cannot be opened."""
         self._encoder = msgspec.json.Encoder()
-        self._file: BinaryIO | None = path.open("wb")
+        self._path = path
+        self._file: FileIO | None = FileIO(path, "wb")
         self._lines = bytearray()
 
     def add(self, entry: LogEntry) -> None:
-        self._lines += self._encoder.encode(entry)
-        self._lines += b"\n"
+        if self._file is not None:
+            self._lines += self._encoder.encode(entry)
+            self._lines += b"\n"
 
     def flush(self) -> None:
         """Hand everything to the system. The simulation calls it after each turn."""
-        if self._lines and self._file is not None:
-            self._file.write(self._lines)
-            self._file.flush()
+        if not self._lines or self._file is None:
+            return
+        try:
+            while self._lines:
+                del self._lines[: self._file.write(self._lines) or 0]
+        except OSError as error:
+            logger.warning("%s: %s: the log ends here", self._path, error.strerror)
             self._lines.clear()
+            self.close()
 
     def close(self) -> None:
+        """Write what waits, and close the file. Idempotent."""
         self.flush()
-        if self._file is not None:
-            self._file.close()
-            self._file = None
+        file, self._file = self._file, None
+        if file is not None:
+            with contextlib.suppress(OSError):
+                file.close()
 
 
 class Log:

@@ -7,11 +7,13 @@ import json
 from pathlib import Path
 
 import pytest
+from support.world import loopback
 
 from anafi_mav.arsdk.codec.wire import MessageId, UnknownMessage
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.errors import CommandTimeout
+from anafi_mav.sim import DroneSpec, Simulator
 from anafi_mav.sim.log import Log, LogFile
 
 
@@ -29,6 +31,19 @@ def test_memory_is_bounded_and_the_file_is_not(tmp_path: Path) -> None:
     assert lines[0] == {"t": 0.0, "drone": "127.0.42.1", "kind": "state", "name": "step", "args": {"number": 0}}
     file.close()
     file.close()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+async def test_full_disk_ends_the_log_and_not_the_drones(caplog: pytest.LogCaptureFixture) -> None:
+    async with Simulator(
+        [DroneSpec(address=loopback(), http_port=None, rtsp_port=None)], log=Path("/dev/full")
+    ) as simulator:
+        (drone,) = simulator.drones
+        await asyncio.sleep(1.0)
+        assert drone.time > 0.5
+    assert [record.getMessage() for record in caplog.records] == [
+        "/dev/full: No space left on device: the log ends here"
+    ]
 
 
 def test_messages_have_parrots_names(tmp_path: Path) -> None:
