@@ -16,7 +16,7 @@ A step happens once for each of its drones. docs/simulator.md lists all keys. An
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Protocol
@@ -133,6 +133,47 @@ class Actor(Protocol):
     def note(self, name: str, args: dict[str, Any]) -> None: ...
 
 
+@dataclass(eq=False)
+class _Change:
+    """An attribute that a step has set."""
+
+    owner: Any
+    name: str
+    before: Any
+
+    def concerns(self, other: _Change) -> bool:
+        """Return True when both set the same attribute."""
+        return self.owner is other.owner and self.name == other.name
+
+
+class _AppliedChanges:
+    """The changes of one drone that are in effect, oldest first.
+
+    The newest one of an attribute counts. One that is undone below a newer one leaves its value to that, so that the
+    attribute is as before both when both are undone, in whatever sequence.
+    """
+
+    def __init__(self) -> None:
+        self._changes: list[_Change] = []
+
+    def put(self, owner: Any, name: str, value: Any) -> _Change:
+        """Set an attribute."""
+        change = _Change(owner, name, getattr(owner, name))
+        self._changes.append(change)
+        setattr(owner, name, value)
+        return change
+
+    def undo(self, change: _Change) -> None:
+        """Set the attribute as it was before a change, unless a newer one has set it."""
+        place = self._changes.index(change)
+        del self._changes[place]
+        newer = next((other for other in self._changes[place:] if other.concerns(change)), None)
+        if newer is None:
+            setattr(change.owner, change.name, change.before)
+        else:
+            newer.before = change.before
+
+
 @dataclass
 class _Cue:
     """One step for one drone."""
@@ -141,7 +182,7 @@ class _Cue:
     step: ScenarioStep
     due: float | None = None
     """When it happens, once its trigger is met."""
-    undo: list[Callable[[], None]] | None = None
+    undo: list[_Change] | None = None
     undo_at: float = 0.0
     done: bool = False
 
@@ -155,6 +196,7 @@ class Scenario:
         for index, step in enumerate(self.steps):
             _check(f"steps[{index}]", step)
         self._cues: dict[str, list[_Cue]] = {}
+        self._changes: dict[str, _AppliedChanges] = {}
 
     def check_drones(self, addresses: Collection[str]) -> None:
         """Raises `ConfigError` when a step names a drone that is not there."""
@@ -183,8 +225,8 @@ class Scenario:
         if cue.undo is not None:
             if drone.time >= cue.undo_at:
                 drone.note("step", {"step": cue.index, "ends": True})
-                for back in cue.undo:
-                    back()
+                for change in cue.undo:
+                    self._changes[drone.address].undo(change)
                 cue.done = True
             return
         if cue.due is None and _triggered(step, drone):
@@ -192,7 +234,7 @@ class Scenario:
         if cue.due is None or drone.time < cue.due:
             return
         drone.note("step", {"step": cue.index, "ends": False})
-        undo = _apply(step, drone)
+        undo = _apply(step, drone, self._changes.setdefault(drone.address, _AppliedChanges()))
         if step.for_ is None:
             cue.done = True
         else:
@@ -213,22 +255,14 @@ def _triggered(step: ScenarioStep, drone: Actor) -> bool:
     )
 
 
-def _apply(step: ScenarioStep, drone: Actor) -> list[Callable[[], None]]:
-    """Do it; how to undo it."""
-    undo: list[Callable[[], None]] = []
-
-    def put(owner: Any, name: str, value: Any) -> None:
-        before = getattr(owner, name)
-        undo.append(lambda: setattr(owner, name, before))
-        setattr(owner, name, value)
-
-    for name, value in _changes(step):
-        put(drone.faults, name, value)
+def _apply(step: ScenarioStep, drone: Actor, changes: _AppliedChanges) -> list[_Change]:
+    """Make the changes of a step; return them, so that they can be undone."""
+    made = [changes.put(drone.faults, name, value) for name, value in _changes(step)]
     if step.wind is not UNSET:
-        put(drone.wind, "spec", WindSpec(step.wind.speed, step.wind.direction, step.wind.gusts))
+        made.append(changes.put(drone.wind, "spec", WindSpec(step.wind.speed, step.wind.direction, step.wind.gusts)))
     if step.throw is True:
         drone.throw()
-    return undo
+    return made
 
 
 def _changes(step: ScenarioStep) -> Iterable[tuple[str, Any]]:

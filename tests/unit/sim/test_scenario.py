@@ -48,6 +48,22 @@ async def test_at_a_time_and_for_a_while() -> None:
     assert observed == [{"step": 0, "ends": False}, {"step": 0, "ends": True}]
 
 
+async def test_overlapping_steps_of_one_key_end_as_before_both() -> None:
+    world = World("steps: [{at: 1, battery: 50, for: 4}, {at: 2, battery: 40, for: 6}, {at: 3, battery: 30, for: 1}]")
+    world.run(0.5)
+    levels = []
+    for _ in range(9):
+        world.run(1.0)
+        levels.append(world.drone.faults.battery)
+    assert levels == [50, 40, 30, 40, 40, 40, 40, None, None]
+
+
+async def test_lasting_step_stays_when_an_earlier_one_ends() -> None:
+    world = World("steps: [{at: 1, gps: false, for: 2}, {at: 2, gps: false}]")
+    world.run(5.0)
+    assert not world.drone.faults.gps
+
+
 async def test_when_a_state_is_reached() -> None:
     world = World("steps: [{when: hovering, after: 1, battery: 42}]")
     world.run(5.0)
