@@ -113,8 +113,7 @@ class PhotoReporter:
         shots = self._shots.receive(update, now)
         if update.progress is CaptureProgress.FAILED and shots:
             self.host.text(Severity.WARNING, texts.PHOTO_NOT_STORED.fill(reason=update.reason))
-        media = update.media if update.media == self._shots.media else ""  # else of an earlier photo, again
-        self._report(shots, media, is_last=update.is_last)
+        self._report(shots, update.media, is_last=update.is_last)
 
     def reset(self) -> None:
         """Begin the index again: the storage was formatted."""
@@ -148,9 +147,10 @@ class PhotoReporter:
         images = [self._log.add(partial(self._image, shot)) for shot in shots]
         if images:
             self._remember()
-        listed = media if self.host.drone.media.state.index is not None else ""
+        capture = self._shots.capture_of(media)
+        listed = media if capture and self.host.drone.media.state.index is not None else ""
         if images or listed:
-            self.host.spawn(self._finish(images, listed, self._shots.capture, is_last=is_last))
+            self.host.spawn(self._finish(images, listed, capture, is_last=is_last))
 
     def _send(self, images: list[CapturedImage]) -> None:
         for image in images:

@@ -29,6 +29,8 @@ A drone of the newer feature reports the media of a series only at its end.
 LOST = 10.0
 """s after the end of a photo at which a picture that is not reported as stored counts as lost."""
 
+REPEATED = 4
+"""Media ids that are remembered, because the drone may report them again."""
 
 T = TypeVar("T")
 
@@ -45,35 +47,93 @@ class CapturedShot(msgspec.Struct, frozen=True):
     is_saved: bool
 
 
+class _Capture:
+    """A photo, burst or series, and its pictures."""
+
+    def __init__(self, number: int, now: float = 0.0, *, is_open: bool = False) -> None:
+        self.number = number
+        self.is_open = is_open
+        self.since = now
+        """When the last report of a shot was received, or the capture began."""
+        self.shots: list[float] = []
+        """Shutter times of the pictures that are not reported yet."""
+        self.taken = 0
+        self.reported = 0
+        self.ended: float | None = None
+        """When the drone reported the end of a capture whose media is not reported yet."""
+        self.media = ""
+        """Media id; empty until it is reported."""
+
+    def more(self, count: int) -> int:
+        """Return how many pictures a count adds; none for one that is older than the last."""
+        more = (count - self.taken) % COUNT
+        return more if more < COUNT // 2 else 0
+
+    def take(self, pictures: int, now: float) -> None:
+        """Add pictures, spread over the time since the last report."""
+        step = (now - self.since) / max(pictures, 1)
+        room = max(MOST - len(self.shots), 0)
+        self.shots += [self.since + step * number for number in range(1, min(pictures, room) + 1)]
+        self.taken += pictures
+        if pictures:
+            self.since = now
+
+    def end(self, now: float) -> None:
+        """Note that nothing more is taken."""
+        if self.is_open:
+            self.is_open, self.ended = False, now
+
+    def expire(self, now: float) -> list[CapturedShot]:
+        """Return the pictures that are not waited for any longer after the end."""
+        if self.ended is None or now - self.ended < LOST:
+            return []
+        self.ended = None
+        return self.report_all(is_saved=False)
+
+    def report_all(self, *, is_saved: bool) -> list[CapturedShot]:
+        """Return all pictures that are not reported yet."""
+        return self.report(len(self.shots), is_saved=is_saved)
+
+    def report(self, count: int, *, is_saved: bool) -> list[CapturedShot]:
+        """Return the first of the pictures that are not reported yet."""
+        shots, self.shots = self.shots[:count], self.shots[count:]
+        first = self.reported + 1
+        self.reported += len(shots)
+        return [CapturedShot(self.number, first + n, at, is_saved) for n, at in enumerate(shots)]
+
+
 class ShotTracker:
-    """Pictures of one camera. Times are those of the events, s."""
+    """Pictures of one camera. Times are those of the events, s.
+
+    The drone may report a photo as stored when the next one has begun, so the capture before is kept.
+    """
 
     def __init__(self, capture: int = 0) -> None:
-        self.capture = capture
+        self._now = _Capture(capture)
+        """The capture under way, or the last one."""
+        self._before = _Capture(capture)
+        """The one before that."""
+        self._captures: dict[str, int] = {}
+        """Numbers of the captures of the last media ids, each of which may be reported again."""
+
+    @property
+    def capture(self) -> int:
         """Number of the photo, burst or series under way, or of the last one."""
-        self._is_open = False
-        self._since = 0.0
-        """When the last report of a shot was received, or the capture began."""
-        self._shots: list[float] = []
-        """Shutter times of all pictures of the capture that are not reported yet."""
-        self._taken = 0
-        """Pictures of the capture."""
-        self._reported = 0
-        self._ended: float | None = None
-        self.media = ""
-        """Media id of the capture; empty until it is reported."""
-        self._media_before = ""
-        """Media id of the capture before, which may be reported again."""
+        return self._now.number
 
     @property
     def pending(self) -> tuple[float, ...]:
         """The shutter times of pictures that are not reported yet."""
-        return tuple(self._shots)
+        return (*self._before.shots, *self._now.shots)
 
     @property
     def taken(self) -> int:
         """Pictures of the capture under way, or of the last one."""
-        return self._taken
+        return self._now.taken
+
+    def capture_of(self, media: str) -> int:
+        """Return the number of the capture that is stored as this media; 0: not known."""
+        return self._captures.get(media, 0)
 
     def receive(self, update: CaptureUpdate, now: float) -> list[CapturedShot]:
         """Take an event about a photo; return the pictures that it completes."""
@@ -82,15 +142,14 @@ class ShotTracker:
                 return self._open(now)
             case CaptureProgress.TAKEN:
                 lost = self._open(now)
-                self._take(1 if update.count is None else self._more(update.count), now)
+                self._now.take(1 if update.count is None else self._now.more(update.count), now)
                 return lost
             case CaptureProgress.SAVED:
                 return self._save(update, now)
             case CaptureProgress.FAILED:
                 return [] if update.is_refused else self._fail(now)
             case CaptureProgress.ENDED:
-                if self._is_open:
-                    self._is_open, self._ended = False, now
+                self._now.end(now)
         return []
 
     def expire(self, now: float, *, is_series: bool) -> list[CapturedShot]:
@@ -98,81 +157,89 @@ class ShotTracker:
 
         `is_series`: a series of single pictures is under way.
         """
-        if self._ended is not None and now - self._ended >= LOST:
-            self._ended = None
-            return self._report(len(self._shots), is_saved=False)
-        if is_series and self._is_open:
-            late = sum(1 for at in self._shots if now - at >= UNSAVED)
-            return self._report(late, is_saved=True)
-        return []
-
-    def _open(self, now: float) -> list[CapturedShot]:
-        """Begin a capture, unless one is under way; return the lost pictures of the one before."""
-        if self._is_open:
-            return []
-        lost = self._report(len(self._shots), is_saved=False)
-        self.capture += 1
-        self._is_open, self._since, self._ended = True, now, None
-        self._shots, self._taken, self._reported = [], 0, 0
-        self.media, self._media_before = "", self.media or self._media_before
+        lost = self._before.expire(now) + self._now.expire(now)
+        if is_series and self._now.is_open:
+            late = sum(1 for at in self._now.shots if now - at >= UNSAVED)
+            return lost + self._now.report(late, is_saved=True)
         return lost
 
-    def _open_unreported(self, update: CaptureUpdate, now: float) -> None:
-        """Begin the capture of a media whose other reports were lost, but for those of its pictures."""
-        was_open, shots = self._is_open, self._shots
-        self._is_open, self._shots = False, []
-        self._open(now)
-        self._shots = shots or ([now] if was_open else [])
-        self._taken = len(self._shots)
+    def _open(self, now: float) -> list[CapturedShot]:
+        """Begin a capture, unless one is under way; return the lost pictures of the one before the last."""
+        if self._now.is_open:
+            return []
+        lost = self._before.report_all(is_saved=False)
+        self._before, self._now = self._now, _Capture(self._now.number + 1, now, is_open=True)
+        return lost
+
+    def _open_unreported(self, update: CaptureUpdate, now: float) -> list[CapturedShot]:
+        """Begin the capture of a media whose other reports were lost, but for those of its pictures.
+
+        Return the lost pictures of the capture before the last.
+        """
+        last = self._now
+        was_open, shots = last.is_open, last.shots
+        last.is_open, last.shots = False, []
+        lost = self._open(now)
+        self._now.shots = shots or ([now] if was_open else [])
+        self._now.taken = len(self._now.shots)
         if was_open and update.count is not None:
-            self._taken = update.count  # it may continue the count of the media before
+            self._now.taken = update.count  # it may continue the count of the media before
+        return lost
 
-    def _more(self, count: int) -> int:
-        """Return how many pictures a count adds; none for one that is older than the last."""
-        more = (count - self._taken) % COUNT
-        return more if more < COUNT // 2 else 0
+    def _is_of_capture_before(self, media: str) -> bool:
+        """True for the report that the capture before is stored, whose pictures still wait for it.
 
-    def _take(self, pictures: int, now: float) -> None:
-        step = (now - self._since) / max(pictures, 1)
-        room = max(MOST - len(self._shots), 0)
-        self._shots += [self._since + step * number for number in range(1, min(pictures, room) + 1)]
-        self._taken += pictures
-        if pictures:
-            self._since = now
+        The next one is not stored before it has pictures, nor as two media.
+        """
+        before, known = self._before, self.capture_of(media)
+        if not before.shots or before.media not in ("", media):
+            return False
+        if known:
+            return known == before.number
+        return not self._now.taken or self._now.media != ""
 
     def _save(self, update: CaptureUpdate, now: float) -> list[CapturedShot]:
-        if update.media and update.media == self._media_before:
+        if self._is_of_capture_before(update.media):
+            self._name(self._before, update.media)
+            self._before.ended = None
+            return self._before.report_all(is_saved=True)
+        if self.capture_of(update.media) not in (0, self.capture):
             return []  # the same report again
-        is_known = self._is_open or bool(self._shots) or self._ended is not None
-        if update.media and self.media not in ("", update.media):
-            self._open_unreported(update, now)
+        last, lost = self._now, list[CapturedShot]()
+        is_known = last.is_open or bool(last.shots) or last.ended is not None
+        if update.media and last.media not in ("", update.media):
+            lost = self._open_unreported(update, now)
         elif not is_known:
-            if self._taken and (not update.media or update.media == self.media):
+            if last.taken and (not update.media or update.media == last.media):
                 return []  # the same report again
-            self._open(now)
-        self.media = update.media or self.media
+            lost = self._open(now)
+        capture = self._now
+        self._name(capture, update.media)
         if update.count is not None:
-            self._take(self._more(update.count), now)
-        elif not self._taken:
-            self._take(1, now)
-        found = self._report(len(self._shots), is_saved=True)
-        self._ended = None
-        self._is_open = self._is_open and not update.is_last
-        return found
+            capture.take(capture.more(update.count), now)
+        elif not capture.taken:
+            capture.take(1, now)
+        capture.ended = None
+        capture.is_open = capture.is_open and not update.is_last
+        return lost + capture.report_all(is_saved=True)
+
+    def _name(self, capture: _Capture, media: str) -> None:
+        """Note the media id of a capture."""
+        if not media:
+            return
+        capture.media = media
+        self._captures[media] = capture.number
+        if len(self._captures) > REPEATED:
+            del self._captures[next(iter(self._captures))]
 
     def _fail(self, now: float) -> list[CapturedShot]:
-        if not self._is_open and not self._shots:
+        capture = self._now
+        if not capture.is_open and not capture.shots:
             return []  # a photo that never began
-        if not self._taken:
-            self._take(1, now)
-        self._is_open, self._ended = False, None
-        return self._report(len(self._shots), is_saved=False)
-
-    def _report(self, count: int, *, is_saved: bool) -> list[CapturedShot]:
-        shots, self._shots = self._shots[:count], self._shots[count:]
-        first = self._reported + 1
-        self._reported += len(shots)
-        return [CapturedShot(self.capture, first + n, at, is_saved) for n, at in enumerate(shots)]
+        if not capture.taken:
+            capture.take(1, now)
+        capture.is_open, capture.ended = False, None
+        return capture.report_all(is_saved=False)
 
 
 def named(files: Iterable[tuple[str, T]]) -> list[T]:

@@ -23,6 +23,10 @@ def feed(tracker: ShotTracker, *events: tuple[float, CaptureProgress, int | None
     ]
 
 
+def saved(media: str, count: int | None = None, *, is_last: bool = False) -> CaptureUpdate:
+    return CaptureUpdate(0, SAVED, media, count=count, is_last=is_last)
+
+
 def test_single_photo_has_the_time_of_its_shutter() -> None:
     tracker = ShotTracker()
     assert feed(tracker, (1.0, STARTED, None), (1.1, STARTED, None), (1.2, TAKEN, 1)) == []
@@ -58,10 +62,6 @@ def test_end_before_saved_loses_nothing() -> None:
     assert tracker.expire(1.3 + LOST / 2, is_series=False) == []
     assert feed(tracker, (2.0, SAVED, None)) == [CapturedShot(1, 1, 1.2, True)]
     assert tracker.expire(1.3 + LOST, is_series=False) == []
-
-
-def saved(media: str, count: int | None = None, *, is_last: bool = False) -> CaptureUpdate:
-    return CaptureUpdate(0, SAVED, media, count=count, is_last=is_last)
 
 
 def test_refused_second_photo_loses_nothing() -> None:
@@ -114,11 +114,52 @@ def test_picture_that_is_never_saved_is_lost() -> None:
     assert tracker.expire(2.0 + LOST, is_series=False) == []
 
 
-def test_next_photo_reports_the_lost_one_of_before() -> None:
+def test_lost_picture_is_reported_beside_the_photos_after_it() -> None:
     tracker = ShotTracker()
     feed(tracker, (1.0, STARTED, None), (1.2, TAKEN, None), (1.3, ENDED, None))
+    feed(tracker, (3.0, STARTED, None), (3.2, TAKEN, None))
+    assert tracker.receive(saved("b"), 3.4) == [CapturedShot(2, 1, 3.2, True)]
+    feed(tracker, (3.5, ENDED, None))
+    assert tracker.expire(1.3 + LOST, is_series=False) == [CapturedShot(1, 1, 1.2, False)]
+    assert tracker.pending == ()
+
+
+def test_picture_is_lost_when_a_second_photo_begins_after_it() -> None:
+    tracker = ShotTracker()
+    feed(tracker, (1.0, STARTED, None), (1.2, TAKEN, None), (1.3, ENDED, None))
+    assert feed(tracker, (2.0, STARTED, None), (2.2, TAKEN, None), (2.3, ENDED, None)) == []
     assert feed(tracker, (3.0, STARTED, None)) == [CapturedShot(1, 1, 1.2, False)]
-    assert feed(tracker, (3.2, TAKEN, None), (3.4, SAVED, None)) == [CapturedShot(2, 1, 3.2, True)]
+    assert tracker.pending == (2.2,)
+
+
+@pytest.mark.parametrize("count", [1, None])
+def test_photo_stored_after_the_next_one_has_begun_is_one_picture(count: int | None) -> None:
+    tracker = ShotTracker()
+    feed(tracker, (1.0, STARTED, None), (1.2, TAKEN, count), (1.3, ENDED, None), (1.4, STARTED, None))
+    assert tracker.receive(saved("a", count), 1.5) == [CapturedShot(1, 1, 1.2, True)]
+    assert tracker.receive(saved("a", count), 1.55) == []  # the same report again
+    feed(tracker, (1.6, TAKEN, count))
+    assert tracker.receive(saved("b", count), 1.8) == [CapturedShot(2, 1, 1.6, True)]
+    assert (tracker.capture_of("a"), tracker.capture_of("b")) == (1, 2)
+    feed(tracker, (1.9, ENDED, None))
+    assert tracker.expire(2.0 + LOST, is_series=False) == []
+
+
+def test_photos_stored_after_both_were_taken_are_two_pictures() -> None:
+    tracker = ShotTracker()
+    feed(tracker, (1.0, STARTED, None), (1.2, TAKEN, 1), (1.3, ENDED, None), (1.4, STARTED, None), (1.6, TAKEN, 1))
+    shots = [*tracker.receive(saved("a", 1), 1.7), *tracker.receive(saved("b", 1), 1.9)]
+    assert sorted(shot.at for shot in shots) == [1.2, 1.6]
+    assert all(shot.is_saved for shot in shots)
+
+
+def test_last_picture_of_a_series_is_stored_after_the_next_photo_has_begun() -> None:
+    tracker = ShotTracker()
+    feed(tracker, (0.0, STARTED, None), (1.0, TAKEN, 1))
+    tracker.receive(saved("a", 1), 1.3)
+    feed(tracker, (2.0, TAKEN, 2), (2.1, ENDED, None), (3.0, STARTED, None), (3.2, TAKEN, 1))
+    assert tracker.receive(saved("a", 2), 3.3) == [CapturedShot(1, 2, 2.0, True)]
+    assert tracker.receive(saved("b", 1), 3.5) == [CapturedShot(2, 1, 3.2, True)]
 
 
 def test_failure_before_the_shutter_is_one_lost_picture() -> None:
