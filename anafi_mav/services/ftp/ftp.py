@@ -234,6 +234,13 @@ class _Client:
     kept: tuple[FtpRequest, bytes] | None = None
     """The last request of `_KEPT` and its answer, which a repetition gets again."""
     seen: float = 0.0
+    """Time of the last request."""
+    heard: float | None = None
+    """Time of the last heartbeat; None: it has sent none since its first request."""
+
+    def is_silent(self, now: float) -> bool:
+        """Return True for a client whose heartbeats have stopped; one that sends none only waits."""
+        return self.heard is not None and now - max(self.heard, self.seen) >= SESSION_TIMEOUT
 
     @property
     def is_writing(self) -> bool:
@@ -372,12 +379,20 @@ class FtpServer:
                 return self._part(number, session)
         return None
 
+    def heartbeat(self, who: Hashable, now: float) -> None:
+        """Note a heartbeat: its sender still waits for its answers."""
+        if (client := self._clients.get(who)) is not None:
+            client.heard = now
+
     def expire(self, now: float) -> None:
         """Close the sessions without a request, a part sent or an answer due for `SESSION_TIMEOUT`.
 
-        A slow drone may take longer than that for one answer, which is then still owed to the client.
+        A slow drone may take longer than that for one answer, which is then still owed to the client. A checksum, which
+        reads a whole file, ends when the heartbeats of its client have stopped for as long.
         """
         for who, client in list(self._clients.items()):
+            if client.is_silent(now):
+                self._abandon(client, None, Opcode.CALC_FILE_CRC32)
             waiting = {wait.session for wait in client.waits}
             for number, session in list(client.sessions.items()):
                 if number in waiting:
@@ -449,8 +464,8 @@ class FtpServer:
         self._abandon(client, number)
         return session
 
-    def _abandon(self, client: _Client, number: int, opcode: int | None = None) -> None:
-        """Abandon what waits in a session; with `opcode` only requests of this kind."""
+    def _abandon(self, client: _Client, number: int | None, opcode: int | None = None) -> None:
+        """Abandon what waits in a session, None: in none; with `opcode` only requests of this kind."""
         for wait in [
             wait for wait in client.waits if wait.session == number and opcode in (None, wait.requests[0].opcode)
         ]:

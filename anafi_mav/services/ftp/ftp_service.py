@@ -100,6 +100,9 @@ class FtpService(Service):
         self._sender.clear()
         self._server.forget(lambda who: True)  # after a reboot the drone's files may be others
 
+    def heartbeat(self, inbound: Inbound) -> None:
+        self._server.heartbeat(inbound.client, inbound.now)
+
     def tick(self, now: float) -> float:
         self._server.expire(now)
         return NEVER

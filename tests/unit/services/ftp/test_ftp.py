@@ -506,6 +506,21 @@ def test_session_does_not_expire_while_its_client_is_owed_an_answer() -> None:
     assert b.server.sessions == 0
 
 
+@pytest.mark.parametrize(("beats", "is_abandoned"), [((), False), ((1.0,), True), ((1.0, SESSION_TIMEOUT), False)])
+def test_checksum_ends_when_heartbeats_of_its_client_stop(beats: tuple[float, ...], is_abandoned: bool) -> None:
+    """One that has sent none waits as long as the file takes."""
+    b = SlowBench()
+    wait, abandoned = b.ask(request(Opcode.CALC_FILE_CRC32, b"/slow")), []
+    wait.abandon = lambda: abandoned.append(1)
+    b.server.heartbeat("b", 0.0)  # of a client without a request
+    for at in beats:
+        b.server.expire(at)
+        b.server.heartbeat("a", at)
+    b.server.expire(1.0 + SESSION_TIMEOUT)
+    assert bool(abandoned) == is_abandoned
+    assert bool(b.finish(wait, 7)) != is_abandoned
+
+
 def test_file_being_opened_is_not_replaced_by_an_impatient_request() -> None:
     b = SlowBench()
     b.ask(request(Opcode.OPEN_FILE_RO, b"/slow"))
