@@ -117,10 +117,15 @@ class Rest:
             await client.close()
 
     async def json(
-        self, method: str, path: str, data: bytes | None = None, query: Mapping[str, str] | None = None
+        self,
+        method: str,
+        path: str,
+        data: bytes | None = None,
+        query: Mapping[str, str] | None = None,
+        work: float = 0.0,
     ) -> Any:
-        """The answer to a question, decoded; None for an empty one."""
-        body = await self.read(method, path, data, query)
+        """The answer to a question, decoded; None for an empty one. `work`: s that it may take longer."""
+        body = await self.read(method, path, data, query, work=work)
         if not body:
             return None
         try:
@@ -135,11 +140,12 @@ class Rest:
         data: bytes | None = None,
         query: Mapping[str, str] | None = None,
         limit: int | None = None,
+        work: float = 0.0,
     ) -> bytes:
-        """The body of an answer of at most `limit` bytes; None: `ANSWER_LIMIT`."""
+        """The body of an answer of at most `limit` bytes; None: `ANSWER_LIMIT`. `work`: s that it may take longer."""
         limit = ANSWER_LIMIT if limit is None else limit
         pieces, size = [], 0
-        async with self.open(method, path, data, query) as answer:
+        async with self.open(method, path, data, query, work) as answer:
             async for piece in answer:
                 size += len(piece)
                 if size > limit:
@@ -149,10 +155,15 @@ class Rest:
 
     @asynccontextmanager
     async def open(
-        self, method: str, path: str, data: bytes | None = None, query: Mapping[str, str] | None = None
+        self,
+        method: str,
+        path: str,
+        data: bytes | None = None,
+        query: Mapping[str, str] | None = None,
+        work: float = 0.0,
     ) -> AsyncIterator[AsyncIterator[bytes]]:
-        """An answer piece by piece."""
-        async with self._request(method, path, data, query) as response:
+        """An answer piece by piece. `work`: s that it may take longer than `ANSWER_TIMEOUT`."""
+        async with self._request(method, path, data, query, work=work) as response:
             yield response.content.iter_any()
 
     @asynccontextmanager
@@ -210,13 +221,20 @@ class Rest:
         data: bytes | None = None,
         query: Mapping[str, str] | None = None,
         headers: Mapping[str, str] | None = None,
+        work: float = 0.0,
     ) -> AsyncIterator[aiohttp.ClientResponse]:
         if not path.startswith("/") or path.startswith("//"):
             raise RemoteProtocolError(f"{path!r} is no place on the drone")
-        what = f"{method} {path}"
-        with _Translated(what, self.base):
+        what, timeout = f"{method} {path}", ANSWER_TIMEOUT + work
+        with _Translated(what, self.base, timeout):
             async with self._session().request(
-                method, self.base + path, data=data, params=query, headers=headers, allow_redirects=False
+                method,
+                self.base + path,
+                data=data,
+                params=query,
+                headers=headers,
+                allow_redirects=False,
+                timeout=_limits(timeout),
             ) as response:
                 if response.status == UNAVAILABLE:
                     raise LinkLost(await _refusal(what, response))
@@ -239,8 +257,7 @@ class Rest:
             options: dict[str, Any] = {"limit_per_host": CONNECTIONS, "socket_factory": self._make_socket}
             if self._local_address is not None and not self._is_behind_mux:
                 options["local_addr"] = (self._local_address, 0)
-            timeout = aiohttp.ClientTimeout(total=None, sock_connect=ANSWER_TIMEOUT, sock_read=ANSWER_TIMEOUT)
-            connector = aiohttp.TCPConnector(**options)
+            connector, timeout = aiohttp.TCPConnector(**options), _limits(ANSWER_TIMEOUT)
             self._client = aiohttp.ClientSession(connector=connector, timeout=timeout, headers=self._headers)
         return self._client
 
@@ -255,6 +272,11 @@ class Rest:
             sock.close()
             raise
         return sock
+
+
+def _limits(silence: float) -> aiohttp.ClientTimeout:
+    """Return the limits of a request whose answer may take so long, s."""
+    return aiohttp.ClientTimeout(total=None, sock_connect=ANSWER_TIMEOUT, sock_read=silence)
 
 
 async def _refusal(what: str, response: aiohttp.ClientResponse) -> str:
@@ -272,9 +294,10 @@ async def _refusal(what: str, response: aiohttp.ClientResponse) -> str:
 class _Translated:
     """Errors of the web server, translated to ours."""
 
-    def __init__(self, what: str, base: str) -> None:
+    def __init__(self, what: str, base: str, timeout: float = ANSWER_TIMEOUT) -> None:
         self._what = what
         self._base = base
+        self._timeout = timeout
 
     def __enter__(self) -> None:
         return None
@@ -283,7 +306,7 @@ class _Translated:
         if isinstance(error, CommandRejected | CommandTimeout | LinkLost | RemoteProtocolError):
             return
         if isinstance(error, asyncio.TimeoutError):
-            raise CommandTimeout(self._what, ANSWER_TIMEOUT) from error
+            raise CommandTimeout(self._what, self._timeout) from error
         if isinstance(error, aiohttp.ClientConnectionError | aiohttp.ClientPayloadError):  # also in mid-answer
             raise LinkLost(f"the drone's web server {self._base}: {error}") from error
         if isinstance(error, aiohttp.ClientError):

@@ -40,6 +40,10 @@ NOTIFICATION_LIMIT = 1 << 20
 """Bytes of one notification; a media with a thousand resources is half of it."""
 THREAD_LIMIT = 100_000
 """Bytes of a list from which it is decoded in a thread: the event loop controls all drones."""
+MD5_RATE = 10e6
+"""Bytes of a file in a second of which the drone makes an MD5, at least: it reads the whole file from its card."""
+MD5_LIMIT = 1800.0
+"""s that an MD5 may take, whatever size the drone reports."""
 _MD5 = re.compile("[0-9a-f]{32}")
 THUMBNAIL_LIMIT = 1 << 18
 """Bytes of a thumbnail; an ANAFI's are about a tenth of it."""
@@ -164,7 +168,8 @@ class MediaClient:
         """Return the MD5 of a file on the drone, hexadecimal."""
         md5 = resource.md5
         if not md5:
-            answer = await self._rest.json("GET", f"{API}/md5/{file_name(resource.resource_id)}")
+            place = f"{API}/md5/{file_name(resource.resource_id)}"
+            answer = await self._rest.json("GET", place, work=min(resource.size / MD5_RATE, MD5_LIMIT))
             md5 = answer.get("md5") if isinstance(answer, dict) else None
         if not isinstance(md5, str) or not _MD5.fullmatch(md5.lower()):  # it becomes part of a file name of ours
             raise RemoteProtocolError(f"the MD5 of {resource.resource_id} is not readable")

@@ -23,7 +23,7 @@ from anafi_mav.drone.payload.camera_state import PhotoSettings
 from anafi_mav.drone.payload.media import MediaItem, Notification, Resource
 from anafi_mav.drone.payload.media_index import SORTED_IN_LOOP, MediaIndex
 from anafi_mav.drone.rest import MUX_RANGE, Rest
-from anafi_mav.errors import CommandRejected, LinkLost, NotSupported, RemoteProtocolError
+from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
 
 
 async def photograph(drone: Drone) -> str:
@@ -108,10 +108,14 @@ async def test_not_yet_indexed(pair: Pair) -> None:
 
 
 @asynccontextmanager
-async def serving(**answers: web.Response) -> AsyncIterator[tuple[Drone, ScriptedDevice]]:
-    """A scripted drone whose web server gives these answers by the last part of the path."""
+async def serving(work: float = 0.0, **answers: web.Response) -> AsyncIterator[tuple[Drone, ScriptedDevice]]:
+    """A scripted drone whose web server gives these answers by the last part of the path.
+
+    It needs `work` s for each.
+    """
 
     async def answer(request: web.Request) -> web.StreamResponse:
+        await asyncio.sleep(work)
         name = request.path.rpartition("/")[2]
         found = answers.get(name) or answers.get(f"f{name}")
         return web.Response(status=404) if found is None else web.Response(body=found.body, status=found.status)
@@ -271,6 +275,20 @@ async def test_status_line_that_is_no_utf_8_is_replaced() -> None:
             await rest.json("GET", "/")
         await rest.close()
     assert str(refusal.value) == "GET /: HTTP 403 Refus?"
+
+
+@pytest.mark.parametrize(("size", "is_waited_for"), [(0, False), (1 << 32, True)])
+async def test_md5_of_a_large_file_is_waited_for(
+    size: int, is_waited_for: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The drone reads the whole file for it."""
+    monkeypatch.setattr("anafi_mav.drone.rest.ANSWER_TIMEOUT", 0.05)
+    async with serving(work=0.3, video=json_answer({"md5": "a" * 32})) as (drone, _):
+        if is_waited_for:
+            assert await drone.media.known_md5(Resource("video", size=size)) == "a" * 32
+        else:
+            with pytest.raises(CommandTimeout):
+                await drone.media.known_md5(Resource("video", size=size))
 
 
 @pytest.mark.parametrize("body", [b"{", b"\xff\xfe", b"[" * 100_000, b'"text"', b"null"])
