@@ -14,6 +14,7 @@ from anafi_mav.drone import GimbalState
 from anafi_mav.drone.events import Axis, FrameOfReference, GimbalCalibrationState, GimbalError
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.gimbal.control import GimbalControl
+from anafi_mav.services.gimbal.targets import wrap_180
 from anafi_mav.services.stream import Times
 from anafi_mav.services.version_numbers import version_numbers
 from anafi_mav.vehicle.vehicle import Vehicle
@@ -223,13 +224,18 @@ def failure_flags(gimbal: GimbalState) -> int:
     return flags
 
 
-def mount_orientation(gimbal: GimbalState, times: Times) -> dialect.MAVLink_message | None:
-    """MOUNT_ORIENTATION, for clients older than the gimbal protocol."""
+def mount_orientation(gimbal: GimbalState, heading: float | None, times: Times) -> dialect.MAVLink_message | None:
+    """MOUNT_ORIENTATION, for clients older than the gimbal protocol.
+
+    Its `yaw_absolute` is the yaw to the nose on the vehicle's heading (rad; None: unknown), from the north of ATTITUDE:
+    the gimbal's own absolute yaw is to magnetic north.
+    """
     attitude = gimbal.attitude
     if attitude is None:
         return None
     absolute, yaw = attitude.absolute, attitude.relative.yaw
-    return dialect.MAVLink_mount_orientation_message(times.boot_ms, absolute.roll, absolute.pitch, yaw, absolute.yaw)
+    to_north = NAN if heading is None else wrap_180(heading * units.DEG_PER_RAD + yaw)
+    return dialect.MAVLink_mount_orientation_message(times.boot_ms, absolute.roll, absolute.pitch, yaw, to_north)
 
 
 def mount_status(gimbal: GimbalState, mode: int) -> dialect.MAVLink_message | None:

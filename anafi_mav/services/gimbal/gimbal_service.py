@@ -123,6 +123,10 @@ class GimbalService(Service):
         def gimbal(vehicle: Vehicle) -> GimbalState:
             return vehicle.drone.gimbal.main
 
+        def heading(vehicle: Vehicle) -> float | None:
+            body = vehicle.drone.piloting.state.attitude
+            return None if body is None else body.yaw
+
         attitude = (GimbalAttitudeChanged,)
         return {
             dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION: MessageStream(
@@ -143,7 +147,7 @@ class GimbalService(Service):
                 from_pictures=True,
             ),
             dialect.MAVLINK_MSG_ID_MOUNT_ORIENTATION: MessageStream(
-                lambda vehicle, times: gimbal_messages.mount_orientation(gimbal(vehicle), times),
+                lambda vehicle, times: gimbal_messages.mount_orientation(gimbal(vehicle), heading(vehicle), times),
                 attitude,
                 every=0.2,
                 spared=True,

@@ -9,12 +9,14 @@ from collections.abc import Mapping, Sequence
 import pytest
 
 from anafi_mav import geo, texts, units
-from anafi_mav.drone import Aim
+from anafi_mav.drone import Aim, GimbalAttitude, GimbalState
 from anafi_mav.drone.events import Axis, FrameOfReference
+from anafi_mav.drone.payload.gimbal import Angles
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.gimbal import mount, targets
-from anafi_mav.services.gimbal.gimbal_messages import pictured_rotation
+from anafi_mav.services.gimbal.gimbal_messages import mount_orientation, pictured_rotation
 from anafi_mav.services.gimbal.targets import Frames, GimbalTarget
+from anafi_mav.services.stream import Times
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 
 ABSOLUTE, RELATIVE = FrameOfReference.ABSOLUTE, FrameOfReference.RELATIVE
@@ -157,3 +159,16 @@ def test_picture_is_turned_back_by_the_heading(pitch: float, to_nose: float) -> 
     assert pictured_rotation(from_north, heading, earth=True) == from_north
     assert pictured_rotation(from_north, None, earth=False) is None
     assert pictured_rotation(None, heading, earth=True) is None
+
+
+@pytest.mark.parametrize(("heading", "yaw_absolute"), [(math.radians(170.0), -160.0), (None, NAN)])
+def test_absolute_yaw_of_a_mount_counts_from_the_north_of_the_heading(
+    heading: float | None, yaw_absolute: float
+) -> None:
+    """By hand: 170 deg and 30 deg to the right are 200 deg. The gimbal's own yaw is to magnetic north, 15 deg less."""
+    held = dict.fromkeys(Axis, RELATIVE)
+    attitude = GimbalAttitude(held, relative=Angles(30.0, -10.0, 0.0), absolute=Angles(-175.0, -12.0, 1.0))
+    message = mount_orientation(GimbalState(attitude=attitude), heading, Times(0, 0, 5))
+    assert message is not None
+    found = message.time_boot_ms, message.roll, message.pitch, message.yaw, message.yaw_absolute
+    assert found == pytest.approx((5, 1.0, -12.0, 30.0, yaw_absolute), nan_ok=True)
