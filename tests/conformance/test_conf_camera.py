@@ -20,6 +20,7 @@ from anafi_mav import geo
 from anafi_mav.arsdk.messages import camera as camera_messages
 from anafi_mav.arsdk.messages import user_storage
 from anafi_mav.arsdk.messages import user_storage_v2 as v2
+from anafi_mav.arsdk.messages.camera import Availability, State
 from anafi_mav.arsdk.messages.proto import camera2
 from anafi_mav.arsdk.messages.user_storage import FsState, PhyState
 from anafi_mav.mavlink import dialect
@@ -280,8 +281,31 @@ async def test_conf_089_recording_that_ends_by_itself_is_a_text() -> None:
         await w.client.wait("HEARTBEAT")
         assert not texts(w.client, mark)
         w.drone.inject(camera_messages.RecordingProgress(0, results.STOPPED_NO_STORAGE_SPACE, ""))
+        w.drone.inject(camera_messages.RecordingState(0, Availability.AVAILABLE, State.INACTIVE, 0))
         text = await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Recording ended"), since=mark)
         assert text.severity == dialect.MAV_SEVERITY_WARNING
+
+
+async def test_late_end_of_a_recording_is_not_that_of_the_next_one() -> None:
+    async with world(model="ai") as w:
+        await enter(w.client, VIDEO)
+        assert await command(w.client, START_VIDEO, 0, 0) == ACCEPTED
+        assert await command(w.client, STOP_VIDEO, 0) == ACCEPTED
+        assert await command(w.client, START_VIDEO, 0, 5) == ACCEPTED
+        mark = w.client.mark()
+        await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.recording_time_ms > 1000, since=mark)
+        late = camera2.Recording(
+            type=camera2.RecordingEvent.STOP,
+            media_id="1",
+            stop_reason=camera2.RecordingStopReason.INSUFFICIENT_STORAGE_SPACE,
+        )
+        w.drone.inject(late)
+        await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.recording_time_ms > 2000, since=mark)
+        statuses = [s for _, s in w.client.since(mark, "CAMERA_CAPTURE_STATUS")]
+        assert all(status.video_status for status in statuses)
+        times = [status.recording_time_ms for status in statuses]
+        assert times == sorted(times)
+        assert not texts(w.client, mark)
 
 
 @both

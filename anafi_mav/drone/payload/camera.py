@@ -213,7 +213,8 @@ class Camera(Commanding[CamerasState]):
 
         def judge(update: CaptureUpdate) -> str | AnafiMavError | None:
             if update.progress is CaptureProgress.ENDED:
-                return update.media
+                is_repeated = update.media != "" and update.media == now.last_recording
+                return None if is_repeated else update.media
             return CommandRejected(f"recording: {update.reason}") if update.progress is CaptureProgress.FAILED else None
 
         command = speech.stop_recording(id)

@@ -60,7 +60,7 @@ class CaptureService(Service):
         self._recording_since: float | None = None
         """When the recording under way began (s, monotonic)."""
         self._recording_failure = ""
-        """Reason of a reported error; the recording may continue nevertheless."""
+        """Reason that the drone reported last; the recording may continue nevertheless."""
         self._sent: _Status | None = None
         """Content of the last CAMERA_CAPTURE_STATUS to all."""
         self._rates: dict[Channel, tuple[float, float]] = {}
@@ -124,15 +124,14 @@ class CaptureService(Service):
             self._recording_failure = ""
             if self._recording_since is None:
                 self._recording_since = now
-        elif update.progress is CaptureProgress.FAILED:
+        else:  # the state decides whether it runs: this may be a late report about the recording before
             self._recording_failure = update.reason
-        elif update.progress is CaptureProgress.ENDED:
-            self._end_recording(update.reason)
         self._send_changed()
 
-    def _end_recording(self, reason: str) -> None:
-        """Note the end of the recording; `reason` of one that no command has ended, else empty."""
-        if reason and self._recording_since is not None:
+    def _end_recording(self) -> None:
+        """Note the end of the recording; one that no command has ended is a text."""
+        reason = self._recording_failure
+        if reason:
             self.host.text(Severity.WARNING, texts.RECORDING_ENDED.fill(reason=reason))
         self._recording_since, self._recording_failure = None, ""
 
@@ -148,7 +147,7 @@ class CaptureService(Service):
         if self._recording_since is None:
             self._recording_since = self._found_recording(now)
         elif not self._records:
-            self._end_recording(self._recording_failure)
+            self._end_recording()
         self._send_changed()
         for channel, (interval, due) in tuple(self._rates.items()):
             if not self._records:

@@ -478,6 +478,10 @@ async def test_photo_and_film_of_an_ai(ai: ScriptedDevice, ai_drone: Drone) -> N
         new.Recording(camera_id=3, type=new.RecordingEvent.STOP, media_id="43"),
     ]
     assert await ai_drone.camera.stop_recording(id=3) == "43"
+    ai.script[new.StopRecording] = lambda _: [
+        new.Recording(camera_id=3, type=new.RecordingEvent.STOP, media_id=media) for media in ("43", "44")
+    ]
+    assert await ai_drone.camera.stop_recording(id=3) == "44"  # the end of the recording before is reported again
 
 
 async def test_zoom_of_an_ai(ai: ScriptedDevice, ai_drone: Drone) -> None:
