@@ -286,6 +286,17 @@ async def test_conf_089_recording_that_ends_by_itself_is_a_text() -> None:
         assert text.severity == dialect.MAV_SEVERITY_WARNING
 
 
+@pytest.mark.parametrize("model", ["4k", "ai"])
+async def test_recording_on_a_full_storage_is_refused_at_once(model: str) -> None:
+    async with world(model=model) as w:
+        await enter(w.client, VIDEO)
+        w.drone.faults.storage_full = True
+        await w.client.wait("HEARTBEAT")  # it takes effect within 50 ms
+        mark = w.client.mark()
+        assert await command(w.client, START_VIDEO, 0, 0) == REJECTED
+        assert any("storage space" in text for text in texts(w.client, mark))
+
+
 async def test_late_end_of_a_recording_is_not_that_of_the_next_one() -> None:
     async with world(model="ai") as w:
         await enter(w.client, VIDEO)
