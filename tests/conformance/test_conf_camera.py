@@ -10,10 +10,11 @@ from typing import Any
 
 import pytest
 from support.cameras import ACCEPTED, PHOTO, VIDEO, command, enter, photos, press, request, shoot, texts, videos
-from support.ext_params import CHOICE, write
+from support.ext_params import CHOICE, value_of, write
 from support.flavours import both
 from support.ftp import Ftp
 from support.mav import CAMERA, Client
+from support.sim_settings import sim_value
 from support.world import HOME, world
 
 from anafi_mav import geo
@@ -33,6 +34,9 @@ DENIED, REJECTED, UNSUPPORTED = (
 START_PHOTO, STOP_PHOTO = dialect.MAV_CMD_IMAGE_START_CAPTURE, dialect.MAV_CMD_IMAGE_STOP_CAPTURE
 START_VIDEO, STOP_VIDEO = dialect.MAV_CMD_VIDEO_START_CAPTURE, dialect.MAV_CMD_VIDEO_STOP_CAPTURE
 ZOOM, FORMAT = dialect.MAV_CMD_SET_CAMERA_ZOOM, dialect.MAV_CMD_STORAGE_FORMAT
+
+TIME_LAPSE = 3.0
+"""Of CAM_PHOTOMODE."""
 
 models = pytest.mark.parametrize("model", ["4k", "thermal", "usa", "ai"])
 
@@ -198,6 +202,24 @@ async def test_conf_087_one_picture_of_a_series_is_one(model: str) -> None:
         assert await command(w.client, START_PHOTO, 0, 0, 0) == ACCEPTED
         await w.client.wait("CAMERA_IMAGE_CAPTURED", lambda image: image.image_index == 2, timeout=20.0)
         assert w.drone.firmware.payload.cameras.busy
+
+
+@pytest.mark.parametrize("model", ["4k", "ai"])
+@pytest.mark.parametrize("count", [0, 2])
+async def test_conf_087_photo_mode_is_restored_after_a_series(model: str, count: int) -> None:
+    """`count`: pictures after which it ends by itself; 0: it is stopped."""
+    async with world(model=model, web=True) as w:
+        await enter(w.client, PHOTO)
+        before = sim_value(w.drone, "CAM_PHOTOMODE")
+        assert await command(w.client, START_PHOTO, 0, 2, count) == ACCEPTED
+        assert sim_value(w.drone, "CAM_PHOTOMODE") == TIME_LAPSE
+        mark = w.client.mark()
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", lambda image: image.image_index == 1, since=0, timeout=10.0)
+        if not count:
+            assert await command(w.client, STOP_PHOTO, 0) == ACCEPTED
+        shown = "PARAM_EXT_VALUE"
+        await w.client.wait(shown, lambda m: m.param_id == "CAM_PHOTOMODE" and value_of(m) == before, since=mark)
+        assert sim_value(w.drone, "CAM_PHOTOMODE") == before
 
 
 @pytest.mark.parametrize("model", ["4k", "ai"])

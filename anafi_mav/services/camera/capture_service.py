@@ -113,7 +113,7 @@ class CaptureService(Service):
         if update is None or update.camera != self.host.drone.camera.active_id:
             return
         self._reporter.receive(update, now)
-        self._photos.receive(update, self._reporter.taken)
+        self._photos.receive(update, self._reporter.taken, is_present=self._reporter.is_present(update.media))
         self._send_changed()
 
     def _on_recording(self, message: events.Message, now: float) -> None:

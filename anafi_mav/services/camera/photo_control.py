@@ -59,8 +59,11 @@ class PhotoControl:
         photo = self.camera.photo
         return photo is not None and photo.mode in SERIES
 
-    def receive(self, update: CaptureUpdate, taken: int) -> None:
-        """Handle an event about a photo; `taken`: pictures of the series so far."""
+    def receive(self, update: CaptureUpdate, taken: int, *, is_present: bool) -> None:
+        """Handle an event about a photo; `taken`: pictures of the series so far.
+
+        `is_present`: the media of the event is that of the photo or series under way, or of the last one.
+        """
         series = self._series
         if series is None or update.is_refused:
             return
@@ -69,8 +72,9 @@ class PhotoControl:
         if update.progress is CaptureProgress.TAKEN and series.limit is not None and taken >= series.limit:
             series.limit = None
             self.host.spawn(self._end_series())
-        saved = update.progress is CaptureProgress.SAVED and not self.host.drone.camera[update.camera].taking
-        ended = saved or update.progress is CaptureProgress.ENDED
+        is_saved = update.progress is CaptureProgress.SAVED and is_present
+        is_last = is_saved and (update.is_last or not self.host.drone.camera[update.camera].taking)
+        ended = is_last or update.progress is CaptureProgress.ENDED
         if (ended and series.has_begun) or update.progress is CaptureProgress.FAILED:
             self._series = None
             if series.restore is not None:

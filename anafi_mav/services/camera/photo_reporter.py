@@ -77,6 +77,10 @@ class PhotoReporter:
         """Pictures of the photo, burst or series under way, or of the last one."""
         return self._shots.taken
 
+    def is_present(self, media: str) -> bool:
+        """Return True for the media of the photo, burst or series under way, or of the last one; "": not reported."""
+        return not media or self._shots.capture_of(media) == self._shots.capture
+
     @property
     def is_saving(self) -> bool:
         """True while a picture is taken that is not reported yet."""
