@@ -25,6 +25,7 @@ from anafi_mav.arsdk.messages.camera import Availability, State
 from anafi_mav.arsdk.messages.proto import camera2
 from anafi_mav.arsdk.messages.user_storage import FsState, PhyState
 from anafi_mav.mavlink import dialect
+from anafi_mav.sim.world.faults import Impairment
 
 DENIED, REJECTED, UNSUPPORTED = (
     dialect.MAV_RESULT_DENIED,
@@ -220,6 +221,25 @@ async def test_conf_087_photo_mode_is_restored_after_a_series(model: str, count:
         shown = "PARAM_EXT_VALUE"
         await w.client.wait(shown, lambda m: m.param_id == "CAM_PHOTOMODE" and value_of(m) == before, since=mark)
         assert sim_value(w.drone, "CAM_PHOTOMODE") == before
+
+
+@pytest.mark.parametrize("model", ["4k", "ai"])
+@pytest.mark.parametrize(("interval", "count", "mode"), [(0, 1, "SINGLE"), (2, 2, "TIMELAPSE")])
+async def test_conf_087_photo_after_a_series_is_taken_as_commanded(
+    model: str, interval: int, count: int, mode: str
+) -> None:
+    """The settings of before the series are restored a round trip later."""
+    async with world(model=model, speed=1.0) as w:
+        await enter(w.client, PHOTO)
+        w.drone.faults.up = w.drone.faults.down = Impairment(delay=0.3)
+        assert await command(w.client, START_PHOTO, 0, 2, 0) == ACCEPTED
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", since=0, timeout=10.0)
+        assert await command(w.client, STOP_PHOTO, 0) == ACCEPTED
+        assert await command(w.client, START_PHOTO, 0, interval, count) == ACCEPTED
+        mark = w.client.mark()
+        await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 0, since=mark, timeout=20.0)
+        second = photos(w)[-1]
+        assert (len(photos(w)), second.mode, len(second.resources)) == (2, mode, count)
 
 
 @pytest.mark.parametrize("model", ["4k", "ai"])

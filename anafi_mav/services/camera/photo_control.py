@@ -42,11 +42,13 @@ class PhotoControl:
         self.host = host
         self._commands = asyncio.Lock()
         self._series: PhotoSeries | None = None
+        self._restoring: asyncio.Task[None] | None = None
+        """Restores the settings of before a series that has ended; the next photo waits for it."""
 
     def link_up(self) -> None:
         """Forget the series of an earlier connection."""
         self._commands = asyncio.Lock()
-        self._series = None
+        self._series = self._restoring = None
 
     @property
     def camera(self) -> CameraState:
@@ -78,7 +80,7 @@ class PhotoControl:
         if (ended and series.has_begun) or update.progress is CaptureProgress.FAILED:
             self._series = None
             if series.restore is not None:
-                self.host.spawn(self._restore_photo(series.restore, update.camera))
+                self._restoring = self.host.spawn(self._restore_photo(series.restore, update.camera))
 
     # Commands.
 
@@ -88,6 +90,7 @@ class PhotoControl:
         Of a series it is the first picture.
         """
         async with self._commands:
+            await self._restored()
             self._require_photo()
             if self.is_series:
                 require_free(self.host.vehicle, texts.PHOTO)
@@ -102,6 +105,7 @@ class PhotoControl:
         None: when it is stopped.
         """
         async with self._commands:
+            await self._restored()
             require_free(self.host.vehicle, texts.PHOTO)
             self._require_photo()
             before = self.camera.photo
@@ -143,6 +147,11 @@ class PhotoControl:
         require_idle(drone, what)
         if await drone.camera.set_mode(mode, id) is not mode:
             raise Refused(what, texts.CAMERA_MODE_KEPT)
+
+    async def _restored(self) -> None:
+        """Wait until the settings of before the last series are restored."""
+        if self._restoring is not None:
+            await asyncio.wait({self._restoring})
 
     def _require_photo(self) -> None:
         """Refuse a photo that cannot be taken in this mode, or not be stored."""
