@@ -19,7 +19,10 @@ from anafi_mav.arsdk.messages.thermal import RenderingMode, ThermalMode
 from anafi_mav.arsdk.video.rtcp import Goodbye
 from anafi_mav.arsdk.video.rtsp import split_url
 from anafi_mav.config import VideoConfig
-from anafi_mav.drone.payload.camera_enums import CameraMode
+from anafi_mav.drone.payload.camera_enums import CameraMode, PhotoMode
+from anafi_mav.drone.payload.camera_state import PhotoSettings
+from anafi_mav.drone.video.stream_choice import StreamKind
+from anafi_mav.errors import CommandRejected
 
 RUNNING, THERMAL = stock.VIDEO_STREAM_STATUS_FLAGS_RUNNING, stock.VIDEO_STREAM_STATUS_FLAGS_THERMAL
 ACCEPTED, DENIED = stock.MAV_RESULT_ACCEPTED, stock.MAV_RESULT_DENIED
@@ -171,6 +174,22 @@ async def test_conf_137_stream_stays_while_a_camera_records() -> None:
         assert await show(w.client, 4) == DENIED
         assert w.commands("thermal.set_mode") == []
         await drone.camera.stop_recording()
+        assert await show(w.client, 2) == ACCEPTED
+
+
+async def test_conf_137_thermal_stream_ends_no_photos() -> None:
+    async with world(model="thermal") as w:
+        drone = w.gateway.systems[0].drone
+        await drone.camera.set_mode(CameraMode.PHOTO)
+        await drone.camera.set_photo(PhotoSettings(mode=PhotoMode.TIME_LAPSE, interval=2.0))
+        await drone.camera.take_photo()
+        mark = w.client.mark()
+        assert await show(w.client, 2) == stock.MAV_RESULT_TEMPORARILY_REJECTED
+        await said(w, "Video stream refused: camera takes photos", since=mark)
+        with pytest.raises(CommandRejected, match="photos"):
+            await drone.streams.show(StreamKind.THERMAL)
+        assert w.commands("thermal.set_mode") == []
+        await drone.camera.stop_photo()
         assert await show(w.client, 2) == ACCEPTED
 
 

@@ -103,6 +103,14 @@ class StreamChoice:
         """True while a camera records: the drone records what it shows, so that it must not change."""
         return any(camera.recording_now for camera in self._camera.state.cameras.values())
 
+    def ends_photos(self, kind: StreamKind) -> bool:
+        """Return True when a change to this stream would end the photos that are being taken.
+
+        The thermal mode changes the camera that takes them.
+        """
+        changes_camera = kind.is_thermal or self._shown_by_drone().is_thermal
+        return changes_camera and self._camera.state.is_taking
+
     def subscribe(self, callback: ChangeCallback) -> Callable[[], None]:
         """Call `callback` whenever another stream is shown; return the function that ends it."""
         self._callbacks = (*self._callbacks, callback)
@@ -116,7 +124,8 @@ class StreamChoice:
         """Show this stream from now on; return when the drone has confirmed it.
 
         Of several calls the latest wins. Raises `NotSupported` for a stream that this model does not have,
-        `CommandRejected` while a camera records or when the drone keeps another mode, `CommandTimeout`, `LinkLost`.
+        `CommandRejected` while a camera records, for a thermal stream also while it takes photos, or when the drone
+        keeps another mode, `CommandTimeout`, `LinkLost`.
         """
         if kind not in (stream.kind for stream in self.offered):
             raise NotSupported(f"{kind.value} stream")
@@ -131,6 +140,8 @@ class StreamChoice:
     async def _change(self, kind: StreamKind) -> None:
         if self.is_recording:
             raise CommandRejected("a camera records")
+        if self.ends_photos(kind):
+            raise CommandRejected("a camera takes photos")
         if PayloadSensor.THERMAL not in self._model().payloads:
             self._chosen = kind
             return

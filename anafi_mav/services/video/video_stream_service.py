@@ -101,8 +101,8 @@ class VideoStreamService(Service):
             raise Refused(texts.VIDEO_STREAM, texts.MISSION_USES_CAMERA)
         if streams.is_recording:
             raise Refused(texts.VIDEO_STREAM, texts.CAMERA_RECORDS)
-        if self.host.vehicle.mission_needs_camera:
-            raise Refused(texts.VIDEO_STREAM, texts.MISSION_USES_CAMERA)
+        if streams.ends_photos(stream.kind):
+            raise Refused(texts.VIDEO_STREAM, texts.CAMERA_TAKES_PHOTOS)
         self.host.end_others(ActionGroup.STREAM)
         await streams.show(stream.kind)
 
