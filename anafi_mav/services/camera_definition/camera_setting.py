@@ -7,7 +7,6 @@ its cameras, so that a row has functions of a camera's state in their place. A v
 from __future__ import annotations
 
 import enum
-import math
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -88,18 +87,19 @@ class CameraSetting:
     def options_of(self, view: View) -> tuple[Option, ...]:
         """Return the options that this camera accepts, as both ends hold their values.
 
-        One whose value the type cannot hold is left out.
+        Those that the type cannot hold are left out.
         """
-        options = () if self.options is None else self.options(view)
-        held = ((self._held(value), text) for value, text in options)
+        if self.options is None:
+            return ()
+        held = ((self.kind.held(value), text) for value, text in self.options(view))
         return tuple(Option(value, text) for value, text in held if value is not None)
 
     def limits_of(self, view: View) -> ValueLimits | None:
-        """Return the range that this camera accepts; None for one whose ends the type cannot hold."""
+        """Return the range that this camera accepts; None without one that the type can hold."""
         found = None if self.limits is None else self.limits(view)
-        if found is None or found.low > found.high:
+        if found is None or not found.low <= found.high:
             return None
-        low, high = self._held(found.low), self._held(found.high)
+        low, high = self.kind.held(found.low), self.kind.held(found.high)
         return None if low is None or high is None else ValueLimits(low, high, found.step)
 
     def is_of(self, view: View) -> bool:
@@ -109,13 +109,4 @@ class CameraSetting:
     def value_of(self, view: View) -> float | None:
         """Return the value as both ends hold it; None when this camera does not report it."""
         value = self.read(view)
-        return None if value is None else self._held(value)
-
-    def _held(self, value: float) -> float | None:
-        """Return a value of the drone as both ends hold it; None when the type cannot."""
-        if not math.isfinite(value):
-            return None
-        try:
-            return self.kind.normalise(value)
-        except ValueError:
-            return None
+        return None if value is None else self.kind.held(value)

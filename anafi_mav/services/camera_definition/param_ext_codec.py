@@ -55,6 +55,13 @@ class ExtType(enum.Enum):
             raise ValueError(f"{value} is no {self.xml}") from error
         return float(held)
 
+    def held(self, value: float) -> float | None:
+        """Return a reported value as both ends hold it; None for one that the type cannot hold."""
+        try:
+            return self.normalise(value) if math.isfinite(value) else None
+        except ValueError:
+            return None
+
     def encode(self, value: float) -> bytes:
         """Return the field of a message."""
         return self._struct.pack(self._number(value)).ljust(VALUE_LENGTH, b"\0")

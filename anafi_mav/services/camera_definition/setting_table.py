@@ -8,7 +8,6 @@ between the Ai and the other models.
 from __future__ import annotations
 
 import enum
-import math
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from fractions import Fraction
 from typing import TypeVar
@@ -47,8 +46,8 @@ Choice = Mapping[WordT, tuple[int, str]]
 """Number and text of each value."""
 
 LONGEST_INTERVAL = 3600.0
-"""s or m, the longest interval of a series where the drone reports the shortest one only: as on the Ai, which reports
-both."""
+"""s or m, the longest interval of a series. The Ai reports it; other drones may report the shortest one only, or the
+largest number that there is."""
 
 MODES: Choice[CameraMode] = {CameraMode.PHOTO: (0, "Photo"), CameraMode.RECORDING: (1, "Video")}
 """Numbers of MAVLink's CAMERA_MODE."""
@@ -311,7 +310,7 @@ def bounded(bounds: tuple[float, float] | None) -> ValueLimits | None:
     """Return the range of an interval."""
     if bounds is None or bounds[0] <= 0.0:
         return None  # a camera without such a series reports 0
-    return ValueLimits(bounds[0], bounds[1] if math.isfinite(bounds[1]) else LONGEST_INTERVAL)
+    return ValueLimits(bounds[0], min(bounds[1], LONGEST_INTERVAL))
 
 
 def interval(mode: PhotoMode, view: View) -> float | None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import lzma
+import math
+import sys
 from typing import Any
 
 import pytest
@@ -72,6 +74,25 @@ def test_definition_changes_with_capabilities_alone() -> None:
     assert definition_file(second, "ANAFI 4K").version != before.version
     second.learn(replace(cameras, cameras={0: main}), thermal)
     assert 4.0 in [option.value for option in second["CAM_EV"].options]
+
+
+@pytest.mark.parametrize("most", [3600.5, sys.float_info.max, math.inf])
+def test_numbers_beyond_their_type_make_no_limit_and_no_option(most: float) -> None:
+    """A drone may report the largest double for an interval without an end."""
+    cameras, thermal = states("ai")
+    main = replace(
+        cameras.cameras[0],
+        time_lapse_bounds=(1.0, most),
+        zoom_speed_bounds=(0.1, sys.float_info.max),
+        bitrates=(100_000_000, 3_000_000_000),
+        zoom_speed=sys.float_info.max,
+    )
+    learned = Catalogue()
+    assert learned.learn(replace(cameras, cameras={0: main}), thermal)
+    assert learned["CAM_PHOTOLAPSE"].limits == (1.0, 3600.0, None)
+    assert [option.value for option in learned["CAM_VIDRATE"].options] == [100_000_000]
+    assert "CAM_ZOOMSPEED" not in learned.index
+    assert read_definition(definition_file(learned, "ANAFI Ai").content).parameters
 
 
 def test_equal_cameras_of_two_drones_share_their_options() -> None:
