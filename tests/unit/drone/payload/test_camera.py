@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 from collections.abc import AsyncIterator
 
 import pytest
@@ -395,6 +396,23 @@ async def test_the_cameras_of_an_ai_are_asked_for(ai: ScriptedDevice, ai_drone: 
     assert (now.photo_available, now.recording_now) == (False, False)
     assert ai_drone.camera.state.antiflicker == Antiflicker.AUTO
     assert ai_drone.camera.state.active == frozenset({3})
+
+
+async def test_number_that_no_message_can_carry_is_unknown(ai: ScriptedDevice, ai_drone: Drone) -> None:
+    heard = asyncio.ensure_future(ai_drone.expect(new.State))
+    await asyncio.sleep(0)
+    ai.say(
+        new.State(
+            camera_id=3,
+            config=new.Config(photo_mode=new.PhotoMode.TIME_LAPSE, photo_time_lapse_interval=1e39),
+            zoom=new.StateZoom(zoom_level_max=sys.float_info.max),
+        )
+    )
+    await heard
+    now = ai_drone.camera[3]
+    assert now.photo is not None
+    assert (now.photo.mode, now.photo.interval) == (PhotoMode.TIME_LAPSE, 2.0)  # as before
+    assert now.zoom_max is None
 
 
 async def test_an_ai_that_does_not_answer_connects_all_the_same(ai: ScriptedDevice) -> None:
