@@ -193,6 +193,14 @@ async def test_conf_095_value_that_is_not_accepted_is_refused(name: str, value: 
             assert value_of(await read(w.client, name)) == value_of(before[name])
 
 
+async def test_conf_095_temperature_of_many_decimals_is_accepted_as_the_drone_takes_it() -> None:
+    async with world(model="thermal") as w:
+        ack = await write(w.client, "CAM_THM_HIGH", 33.33333, dialect.MAV_PARAM_EXT_TYPE_REAL32)
+        assert ack.param_result == dialect.PARAM_ACK_ACCEPTED
+        assert value_of(ack) == pytest.approx(33.333)
+        assert sim_value(w.drone, "CAM_THM_HIGH") == pytest.approx(33.333)
+
+
 async def test_conf_095_repeated_write_is_not_carried_out_again() -> None:
     async with world() as w:
         for _ in range(3):

@@ -75,6 +75,8 @@ class CameraSetting:
     guard: Guard = Guard.PICTURE
     is_listed: bool = True
     """False: stations have a control of their own for it, and leave it out of their list."""
+    resolution: float = 0.0
+    """Difference from a written value at which a reported one is still that value: the drone's unit is another one."""
     only_in: Mapping[str, frozenset[int]] = field(default_factory=dict)
     """Values of other settings in which it counts; stations hide it in all others."""
 
@@ -101,6 +103,10 @@ class CameraSetting:
             return None
         low, high = self.kind.held(found.low), self.kind.held(found.high)
         return None if low is None or high is None else ValueLimits(low, high, found.step)
+
+    def is_set(self, reported: float | None, written: float) -> bool:
+        """Return True when a reported value shows that the written one is in effect."""
+        return reported is not None and abs(reported - written) <= self.resolution
 
     def is_of(self, view: View) -> bool:
         """Return True when this camera has the setting."""

@@ -312,7 +312,7 @@ class ParamExtService(Service):
             except AnafiMavError as error:
                 reason = reason_of(error)
             else:
-                if self._reported(entry) == write.value:
+                if entry.setting.is_set(self._reported(entry), write.value):
                     result = dialect.PARAM_ACK_ACCEPTED
                 elif (reason := self._capturing()) is None:
                     result, reason = dialect.PARAM_ACK_VALUE_UNSUPPORTED, texts.VALUE_KEPT

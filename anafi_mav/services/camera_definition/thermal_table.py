@@ -34,6 +34,9 @@ may reach beyond it."""
 OFF = frozenset({int(ThermalMode.DISABLED)})
 ON = frozenset({int(ThermalMode.STANDARD), int(ThermalMode.BLENDED)})
 
+RESOLUTION = 1e-3
+"""degC, of a temperature that travels as K in single precision."""
+
 _PALETTE_MODES = {PaletteMode.ABSOLUTE: "Absolute", PaletteMode.RELATIVE: "Relative", PaletteMode.SPOT: "Spot"}
 
 
@@ -145,6 +148,7 @@ THERMAL_SETTINGS: tuple[CameraSetting, ...] = (
         limits=_temperatures,
         unit="degC",
         decimals=1,
+        resolution=RESOLUTION,
         only_in={"CAM_THERMAL": ON},
     ),
     CameraSetting(
@@ -156,6 +160,7 @@ THERMAL_SETTINGS: tuple[CameraSetting, ...] = (
         limits=_temperatures,
         unit="degC",
         decimals=1,
+        resolution=RESOLUTION,
         default=100.0,
         only_in={"CAM_THERMAL": ON},
     ),
@@ -224,6 +229,7 @@ THERMAL_SETTINGS: tuple[CameraSetting, ...] = (
         limits=_temperatures,
         unit="degC",
         decimals=1,
+        resolution=RESOLUTION,
         default=20.0,
         only_in={"CAM_THERMAL": ON},
     ),
