@@ -223,6 +223,22 @@ async def test_conf_087_photo_mode_is_restored_after_a_series(model: str, count:
         assert sim_value(w.drone, "CAM_PHOTOMODE") == before
 
 
+async def test_conf_087_series_whose_begin_is_reported_late_keeps_its_settings() -> None:
+    """The drone reports the first picture as stored before it reports that photos are taken."""
+    async with world(speed=1.0, web=True) as w:
+        await enter(w.client, PHOTO)
+        w.drone.faults.late = {camera_messages.PhotoState.NAME: 1.5}
+        assert await command(w.client, START_PHOTO, 0, 2, 3) == ACCEPTED
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", lambda image: image.image_index == 2, since=0, timeout=10.0)
+        await w.drone.wait_log(lambda e: e.kind == "command" and e.name == "camera.stop_photo", 5.0)
+        names = [
+            e.name
+            for e in w.drone.log
+            if e.kind == "command" and e.name in ("camera.set_photo_mode", "camera.stop_photo")
+        ]
+        assert names == ["camera.set_photo_mode", "camera.stop_photo"]
+
+
 @pytest.mark.parametrize("model", ["4k", "ai"])
 @pytest.mark.parametrize(("interval", "count", "mode"), [(0, 1, "SINGLE"), (2, 2, "TIMELAPSE")])
 async def test_conf_087_photo_after_a_series_is_taken_as_commanded(

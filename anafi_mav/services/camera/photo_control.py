@@ -74,9 +74,8 @@ class PhotoControl:
         if update.progress is CaptureProgress.TAKEN and series.limit is not None and taken >= series.limit:
             series.limit = None
             self.host.spawn(self._end_series())
-        is_saved = update.progress is CaptureProgress.SAVED and is_present
-        is_last = is_saved and (update.is_last or not self.host.drone.camera[update.camera].taking)
-        ended = is_last or update.progress is CaptureProgress.ENDED
+        is_saved = update.progress is CaptureProgress.SAVED and update.is_last and is_present
+        ended = is_saved or update.progress is CaptureProgress.ENDED
         if (ended and series.has_begun) or update.progress is CaptureProgress.FAILED:
             self._series = None
             if series.restore is not None:
