@@ -576,7 +576,8 @@ is sent within a second of the drone's report that the picture is stored; `captu
 lost. Place, height and orientation are those of the camera when the shutter opened: of the live video's picture at
 that time while it runs, else interpolated between events. An unknown place is 0. `file_url` is the file in the
 camera's MAVLink FTP; it is empty when the drone has not listed the file in time, and is then filled in for a later
-request.
+request. A series is listed after each of the first ten pictures, then each time it has grown by a tenth, and at its
+end: a list names all its pictures, and the radio carries the controls, too.
 
 Photos of the history are requested by index (param2), by range (param2 to param3) or all (-1), at most 100 at a
 time; 2000 are kept until the gateway ends. Their places and orientations are not kept over a restart of the

@@ -24,6 +24,7 @@ from anafi_mav.arsdk.messages import user_storage_v2 as v2
 from anafi_mav.arsdk.messages.camera import Availability, State
 from anafi_mav.arsdk.messages.proto import camera2
 from anafi_mav.arsdk.messages.user_storage import FsState, PhyState
+from anafi_mav.drone.payload.media import MediaItem
 from anafi_mav.mavlink import dialect
 from anafi_mav.sim.world.faults import Impairment
 
@@ -36,6 +37,7 @@ START_PHOTO, STOP_PHOTO = dialect.MAV_CMD_IMAGE_START_CAPTURE, dialect.MAV_CMD_I
 START_VIDEO, STOP_VIDEO = dialect.MAV_CMD_VIDEO_START_CAPTURE, dialect.MAV_CMD_VIDEO_STOP_CAPTURE
 ZOOM, FORMAT = dialect.MAV_CMD_SET_CAMERA_ZOOM, dialect.MAV_CMD_STORAGE_FORMAT
 
+IMAGE = dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED
 TIME_LAPSE = 3.0
 """Of CAM_PHOTOMODE."""
 
@@ -221,6 +223,34 @@ async def test_conf_087_photo_mode_is_restored_after_a_series(model: str, count:
         shown = "PARAM_EXT_VALUE"
         await w.client.wait(shown, lambda m: m.param_id == "CAM_PHOTOMODE" and value_of(m) == before, since=mark)
         assert sim_value(w.drone, "CAM_PHOTOMODE") == before
+
+
+async def test_conf_087_long_series_is_listed_when_it_has_grown(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A list names all pictures of the series: with each of them it would take the radio of the flight."""
+    count = 30
+    async with world(speed=8.0, web=True) as w:
+        media = w.gateway.systems[0].drone.media
+        get, listed = media.get, []
+
+        async def counted(id: str) -> MediaItem:
+            listed.append(id)
+            return await get(id)
+
+        monkeypatch.setattr(media, "get", counted)
+        await enter(w.client, PHOTO)
+        assert await command(w.client, START_PHOTO, 0, 2, count) == ACCEPTED
+        shown = "CAMERA_IMAGE_CAPTURED"
+        first = await w.client.wait(shown, lambda image: image.image_index == 4, since=0, timeout=20.0)
+        assert first.file_url
+        await w.client.wait(shown, lambda image: image.image_index == count - 1, since=0, timeout=60.0)
+        await w.client.wait("HEARTBEAT")
+        mark = w.client.mark()
+        assert await command(w.client, dialect.MAV_CMD_REQUEST_MESSAGE, IMAGE, -1) == ACCEPTED
+        await w.client.wait(shown, lambda image: image.image_index == count - 1, since=mark)
+        images = [image for _, image in w.client.since(mark, shown)]
+        names = [image.file_url.rpartition("/")[2] for image in images]
+        assert names == [resource.id for resource in photos(w)[0].resources]
+        assert 10 < len(listed) < count
 
 
 async def test_conf_087_series_whose_begin_is_reported_late_keeps_its_settings() -> None:

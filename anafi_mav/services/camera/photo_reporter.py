@@ -46,6 +46,10 @@ LISTED = 10.0
 RETRY = 0.2
 """s after which a photo that is not listed yet is requested again."""
 
+GROWTH = 1.1
+"""Ratio by which a series grows until the drone lists it again. A list names all its pictures, some 400 bytes each: one
+of a thousand pictures with each of them would be more than all other files may take in flight."""
+
 MAX_SHOWN = 100
 """Photos that one request may send; a client requests the others by range."""
 
@@ -118,6 +122,8 @@ class PhotoReporter:
         if update.progress is CaptureProgress.FAILED and shots:
             self.host.text(Severity.WARNING, texts.PHOTO_NOT_STORED.fill(reason=update.reason))
         self._report(shots, update.media, is_last=update.is_last)
+        if update.progress is CaptureProgress.ENDED:
+            self._name_rest()
 
     def reset(self) -> None:
         """Begin the index again: the storage was formatted."""
@@ -151,6 +157,17 @@ class PhotoReporter:
         images = [self._log.add(partial(self._image, shot)) for shot in shots]
         if images:
             self._remember()
+        is_due = self._shots.is_over(media) or any(is_listed(shot.number) for shot in shots)
+        self._name_later(images, media if is_due else "", is_last=is_last)
+
+    def _name_rest(self) -> None:
+        """Name the last pictures of a series, which has ended."""
+        images = self._log.of_capture(self._shots.capture)
+        if images and not is_listed(images[-1].number):
+            self._name_later([], self._shots.media, is_last=False)
+
+    def _name_later(self, images: list[CapturedImage], media: str, *, is_last: bool) -> None:
+        """Send the messages of these pictures; fill in the names of all pictures of a media, if one is given."""
         capture = self._shots.capture_of(media)
         listed = media if capture and self.host.drone.media.state.index is not None else ""
         if images or listed:
@@ -261,6 +278,11 @@ class PhotoReporter:
             count = self._log.count
             if (problem := await self.host.memory.save()) is not None:
                 self.host.warn_throttled(problem)
+
+
+def is_listed(number: int) -> bool:
+    """Return True when a media is listed after its picture of this number: each of the first ten, then fewer."""
+    return number <= 1 or math.floor(math.log(number, GROWTH)) > math.floor(math.log(number - 1, GROWTH))
 
 
 def file_url(file: Resource) -> str:

@@ -122,6 +122,11 @@ class ShotTracker:
         return self._now.number
 
     @property
+    def media(self) -> str:
+        """Media id of that capture; empty until it is reported."""
+        return self._now.media
+
+    @property
     def pending(self) -> tuple[float, ...]:
         """The shutter times of pictures that are not reported yet."""
         return (*self._before.shots, *self._now.shots)
@@ -134,6 +139,10 @@ class ShotTracker:
     def capture_of(self, media: str) -> int:
         """Return the number of the capture that is stored as this media; 0: not known."""
         return self._captures.get(media, 0)
+
+    def is_over(self, media: str) -> bool:
+        """Return True when no more pictures of this media are taken."""
+        return not self._now.is_open or self.capture_of(media) != self.capture
 
     def receive(self, update: CaptureUpdate, now: float) -> list[CapturedShot]:
         """Take an event about a photo; return the pictures that it completes."""
