@@ -19,6 +19,7 @@ from support.sim_settings import sim_value
 from support.world import HOME, WEB_PORT, World, loopback, world
 
 from anafi_mav.arsdk.messages import camera as camera_messages
+from anafi_mav.arsdk.messages import thermal as thermal_messages
 from anafi_mav.arsdk.messages.thermal import RenderingMode, ThermalMode
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
@@ -140,6 +141,19 @@ async def test_camera_source_chooses_the_shown_picture(model: str) -> None:
         assert await command(w.client, dialect.MAV_CMD_VIDEO_STOP_CAPTURE, 0) == ACCEPTED
         assert await command(w.client, SOURCE, 0, dialect.CAMERA_SOURCE_IR, 1) == ACCEPTED
         assert await command(w.client, dialect.MAV_CMD_SET_CAMERA_MODE, 0, PHOTO) == REJECTED
+
+
+async def test_series_that_a_thermal_mode_ends_restores_its_settings() -> None:
+    """Its end may be reported when the thermal camera is the active one already."""
+    async with world(model="thermal", speed=1.0) as w:
+        await enter(w.client, PHOTO)
+        assert await command(w.client, dialect.MAV_CMD_IMAGE_START_CAPTURE, 0, 2, 0) == ACCEPTED
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", since=0)
+        w.drone.faults.late = dict.fromkeys((camera_messages.PhotoProgress.NAME, camera_messages.PhotoState.NAME), 0.5)
+        press(w, thermal_messages.SetMode(ThermalMode.BLENDED))
+        await w.drone.wait_log(lambda e: e.name == camera_messages.SetPhotoMode.NAME and e.args["mode"] == 0, 5.0)
+        restored = [entry.args for entry in w.commands(camera_messages.SetPhotoMode.NAME)][-1]
+        assert (restored["cam_id"], restored["mode"]) == (0, camera_messages.CameraPhotoMode.SINGLE)
 
 
 async def test_camera_source_of_a_model_without_thermal_camera_is_unsupported() -> None:

@@ -14,9 +14,9 @@ from collections.abc import Awaitable, Callable, Mapping
 from anafi_mav import texts
 from anafi_mav.clock import NEVER
 from anafi_mav.drone import events
-from anafi_mav.drone.payload.camera import Camera
+from anafi_mav.drone.payload.camera import BEGUN, Camera
 from anafi_mav.drone.payload.camera_enums import CameraMode, PhotoMode
-from anafi_mav.drone.payload.camera_state import CaptureProgress
+from anafi_mav.drone.payload.camera_state import CaptureProgress, CaptureUpdate
 from anafi_mav.drone.payload.storage import Storage
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
@@ -110,11 +110,19 @@ class CaptureService(Service):
 
     def _on_photo(self, message: events.Message, now: float) -> None:
         update = Camera.photo_update(message)
-        if update is None or update.camera != self.host.drone.camera.active_id:
+        if update is None or not self._is_of_photo(update):
             return
         self._reporter.receive(update, now)
         self._photos.receive(update, self._reporter.taken, is_present=self._reporter.is_present(update.media))
         self._send_changed()
+
+    def _is_of_photo(self, update: CaptureUpdate) -> bool:
+        """Return True for an event of the camera whose photo is under way, else for one of the active camera.
+
+        A thermal mode changes the active camera, and ends a photo; the drone may report that afterwards.
+        """
+        camera = None if update.progress in BEGUN else self._reporter.camera
+        return update.camera == (self.host.drone.camera.active_id if camera is None else camera)
 
     def _on_recording(self, message: events.Message, now: float) -> None:
         update = Camera.recording_update(message)

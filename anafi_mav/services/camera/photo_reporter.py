@@ -81,6 +81,11 @@ class PhotoReporter:
         """Pictures of the photo, burst or series under way, or of the last one."""
         return self._shots.taken
 
+    @property
+    def camera(self) -> int | None:
+        """Camera of the photo under way, or of one whose pictures are not all reported; None without one."""
+        return self._shots.camera
+
     def is_present(self, media: str) -> bool:
         """Return True for the media of the photo, burst or series under way, or of the last one; "": not reported."""
         return not media or self._shots.capture_of(media) == self._shots.capture

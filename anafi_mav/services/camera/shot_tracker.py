@@ -50,8 +50,9 @@ class CapturedShot(msgspec.Struct, frozen=True):
 class _Capture:
     """A photo, burst or series, and its pictures."""
 
-    def __init__(self, number: int, now: float = 0.0, *, is_open: bool = False) -> None:
+    def __init__(self, number: int, now: float = 0.0, camera: int = 0, *, is_open: bool = False) -> None:
         self.number = number
+        self.camera = camera
         self.is_open = is_open
         self.since = now
         """When the last report of a shot was received, or the capture began."""
@@ -103,7 +104,7 @@ class _Capture:
 
 
 class ShotTracker:
-    """Pictures of one camera. Times are those of the events, s.
+    """Pictures of one camera at a time. Times are those of the events, s.
 
     The drone may report a photo as stored when the next one has begun, so the capture before is kept.
     """
@@ -120,6 +121,11 @@ class ShotTracker:
     def capture(self) -> int:
         """Number of the photo, burst or series under way, or of the last one."""
         return self._now.number
+
+    @property
+    def camera(self) -> int | None:
+        """Camera of the photo under way, or of one whose pictures are not all reported; None without one."""
+        return self._now.camera if self._now.is_open or self._now.shots else None
 
     @property
     def media(self) -> str:
@@ -148,9 +154,9 @@ class ShotTracker:
         """Take an event about a photo; return the pictures that it completes."""
         match update.progress:
             case CaptureProgress.STARTED:
-                return self._open(now)
+                return self._open(update, now)
             case CaptureProgress.TAKEN:
-                lost = self._open(now)
+                lost = self._open(update, now)
                 self._now.take(1 if update.count is None else self._now.more(update.count), now)
                 return lost
             case CaptureProgress.SAVED:
@@ -172,12 +178,12 @@ class ShotTracker:
             return lost + self._now.report(late, is_saved=True)
         return lost
 
-    def _open(self, now: float) -> list[CapturedShot]:
+    def _open(self, update: CaptureUpdate, now: float) -> list[CapturedShot]:
         """Begin a capture, unless one is under way; return the lost pictures of the one before the last."""
         if self._now.is_open:
             return []
         lost = self._before.report_all(is_saved=False)
-        self._before, self._now = self._now, _Capture(self._now.number + 1, now, is_open=True)
+        self._before, self._now = self._now, _Capture(self._now.number + 1, now, update.camera, is_open=True)
         return lost
 
     def _open_unreported(self, update: CaptureUpdate, now: float) -> list[CapturedShot]:
@@ -188,7 +194,7 @@ class ShotTracker:
         last = self._now
         was_open, shots = last.is_open, last.shots
         last.is_open, last.shots = False, []
-        lost = self._open(now)
+        lost = self._open(update, now)
         self._now.shots = shots or ([now] if was_open else [])
         self._now.taken = len(self._now.shots)
         if was_open and update.count is not None:
@@ -221,7 +227,7 @@ class ShotTracker:
         elif not is_known:
             if last.taken and (not update.media or update.media == last.media):
                 return []  # the same report again
-            lost = self._open(now)
+            lost = self._open(update, now)
         capture = self._now
         self._name(capture, update.media)
         if update.count is not None:
