@@ -16,6 +16,7 @@ from support.fault_scenarios import (
     PX4_OFFBOARD,
     SET_MODE,
     another_controller,
+    being_tried,
     on_command,
     results,
     until,
@@ -229,11 +230,11 @@ async def test_choice_of_the_item_of_a_start_that_fails_is_newer_than_a_start_th
         begun = on_command(w, common.Start.NAME, lambda: None)
         w.client.send_command(CHOOSE, 3)
         await begun
-        mark = third.mark()
+        seconds, mark = second.mark(), third.mark()
         second.send_command(START)
-        await asyncio.sleep(0.1)  # between two clients
+        await being_tried(second, seconds, START)
         third.send_command(CHOOSE, 3)
-        await asyncio.sleep(0.1)
+        await being_tried(third, mark, CHOOSE)
         w.drone.faults.unreported = frozenset()
         assert await until(third, mark, 1, 60.0) == [(CHOOSE, ACCEPTED)]
         assert (await third.wait("MISSION_CURRENT")).seq == 3

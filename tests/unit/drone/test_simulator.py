@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 import pytest
+from support.fault_scenarios import watched
 from support.world import loopback
 
 from anafi_mav import geo
@@ -323,6 +324,6 @@ async def test_hover_after_a_silence_is_for_the_aircraft_that_was_silent(is_same
         await real.wait_log(lambda entry: entry.name == "flying" and entry.args["to"] == "hovering")
         await drone.connect()
         await real.wait_log(lambda entry: entry.name.endswith("AllSettings"))
-        await asyncio.sleep(0.2)  # of the first PCMDs
+        await watched(0.2)  # the first PCMDs
         assert ("PCMD" in commands(real)) == is_same
         await drone.close()

@@ -39,8 +39,7 @@ async def test_full_disk_ends_the_log_and_not_the_drones(caplog: pytest.LogCaptu
         [DroneSpec(address=loopback(), http_port=None, rtsp_port=None)], log=Path("/dev/full")
     ) as simulator:
         (drone,) = simulator.drones
-        await asyncio.sleep(1.0)
-        assert drone.time > 0.5
+        await drone.wait_log(lambda entry: entry.kind == "pose" and entry.args["time"] > 0.5)
     assert [record.getMessage() for record in caplog.records] == [
         "/dev/full: No space left on device: the log ends here"
     ]

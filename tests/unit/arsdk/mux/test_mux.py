@@ -285,6 +285,7 @@ async def test_datagrams_over_the_mux() -> None:
 
 async def test_client_of_the_mux_that_does_not_read_is_disconnected(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mux_proxy, "MAX_UNREAD", 1 << 20)
+    disconnected = asyncio.Event()
 
     async def flood(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         with contextlib.suppress(OSError):
@@ -292,6 +293,7 @@ async def test_client_of_the_mux_that_does_not_read_is_disconnected(monkeypatch:
                 writer.write(bytes(1 << 16))
                 await writer.drain()
         writer.close()
+        disconnected.set()
 
     device = Device()
     server = await mux_link.MuxServer.start("127.0.0.1", port=0, info=INFO, on_session=device.on_session)
@@ -301,7 +303,7 @@ async def test_client_of_the_mux_that_does_not_read_is_disconnected(monkeypatch:
         door = await session.open_tcp("drone", web.sockets[0].getsockname()[1])
         reader, writer = await asyncio.open_connection(*door)
         writer.transport.pause_reading()  # type: ignore[attr-defined]
-        await asyncio.sleep(5.0)
+        await asyncio.wait_for(disconnected.wait(), 5.0)
         writer.transport.resume_reading()  # type: ignore[attr-defined]
         read = 0
         with contextlib.suppress(ConnectionResetError):

@@ -8,6 +8,7 @@ import math
 from datetime import datetime
 
 import pytest
+from support.fault_scenarios import watched
 from support.scripted_device import SETTINGS, STATES, ScriptedDevice
 
 from anafi_mav.arsdk.codec.wire import Message, MessageId, UnknownMessage
@@ -248,7 +249,7 @@ async def test_timeout_of_nan_raises_and_sends_nothing(drone: Drone, device: Scr
     ):
         with pytest.raises(LocalProtocolError, match="timeout"):
             await call
-    await asyncio.sleep(SHORT)
+    await watched(SHORT)
     assert device.received[before:] == []
 
 
