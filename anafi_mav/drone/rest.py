@@ -226,6 +226,7 @@ class Rest:
         if not path.startswith("/") or path.startswith("//"):
             raise RemoteProtocolError(f"{path!r} is no place on the drone")
         what, timeout = f"{method} {path}", ANSWER_TIMEOUT + work
+        options: dict[str, Any] = {"timeout": _limits(timeout)} if work else {}  # else the session's
         with _Translated(what, self.base, timeout):
             async with self._session().request(
                 method,
@@ -234,7 +235,7 @@ class Rest:
                 params=query,
                 headers=headers,
                 allow_redirects=False,
-                timeout=_limits(timeout),
+                **options,
             ) as response:
                 if response.status == UNAVAILABLE:
                     raise LinkLost(await _refusal(what, response))
