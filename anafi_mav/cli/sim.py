@@ -164,7 +164,10 @@ def _from_options(arguments: argparse.Namespace) -> Fleet:
 
 
 def _seed(text: str) -> int:
-    """As in a configuration: of a negative seed Python would use the amount, so that -1 is 1."""
+    """Return a seed within the bounds of a configuration. Raises `ConfigError`.
+
+    Of a negative one Python would use the amount, so that -1 is 1.
+    """
     wanted = f"a whole number from 0 to {MAX_SEED}"
     seed = integer("--seed", text, wanted)
     if not 0 <= seed <= MAX_SEED:

@@ -168,10 +168,10 @@ class Rest:
 
     @asynccontextmanager
     async def open_file(self, path: str, offset: int, size: int) -> AsyncIterator[tuple[int, AsyncIterator[bytes]]]:
-        """Open a file of `size` bytes (0: unknown) at `offset`; yield where the answer begins, and its pieces.
+        """Open a file of `size` bytes (0: unknown) at `offset`; yield its start and its pieces.
 
-        It begins at 0 when the web server has no ranges (RFC 9110 §14.2). Raises `RemoteProtocolError` when the file
-        has another size by now. The caller counts the bytes: an answer may end too early.
+        The answer begins at 0 when the web server has no ranges (RFC 9110 §14.2). Raises `RemoteProtocolError` when
+        the file has another size by now. The caller counts the bytes: an answer may end too early.
         """
         end = offset + MUX_RANGE if self._is_behind_mux and offset + MUX_RANGE < size else None
         async with self._open_range(path, offset, end, size) as (found, pieces):
@@ -184,7 +184,10 @@ class Rest:
     async def _following_ranges(
         self, path: str, pieces: AsyncIterator[bytes], offset: int, size: int
     ) -> AsyncGenerator[bytes, None]:
-        """Yield the pieces of an open range, then those of the ranges behind it, each requested when it is read."""
+        """Yield the pieces of an open range, then those of the ranges behind it.
+
+        Each of these is requested when it is read.
+        """
         async for piece in pieces:
             yield piece
         while offset < size:
@@ -197,7 +200,10 @@ class Rest:
     async def _open_range(
         self, path: str, offset: int, end: int | None, size: int
     ) -> AsyncIterator[tuple[_Range, AsyncIterator[bytes]]]:
-        """Open the bytes from `offset` to before `end` (None: the end of the file); yield what is answered."""
+        """Open the bytes from `offset` to before `end`; yield what is answered.
+
+        `end` None: the end of the file.
+        """
         headers = None
         if offset or end is not None:
             last = "" if end is None else str(end - 1)

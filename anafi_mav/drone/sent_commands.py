@@ -232,7 +232,7 @@ class SentCommands:
         return any(one.may_begin(now) and not one.is_ignored(now) for one in sent)
 
     def has_failed_launch(self, now: float) -> bool:
-        """Return True while a launch that the drone seems to have ignored or refused may still begin.
+        """Return True while a launch that the drone seems to have ignored or refused may begin.
 
         LANDED is taken for a refusal after motors that ramped up; both may be late events about an earlier launch.
         """

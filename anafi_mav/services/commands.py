@@ -427,7 +427,7 @@ class CommandHistory:
         return None if effect is Effect.RETURN or ended or not newest.still_holds else newest.result
 
     def was_cancelled(self, client: Hashable, id: int, now: float) -> bool:
-        """Return True when this client's newest action was this command, and has just ended with CANCELLED."""
+        """Return True when this command, the client's newest, has just ended with CANCELLED."""
         newest = self._newest.get(client)
         if newest is None or newest.command.id != id or newest.result != dialect.MAV_RESULT_CANCELLED:
             return False

@@ -338,7 +338,10 @@ class Moves:
         self.aborting = False
 
     def expect_stray(self, now: float) -> None:
-        """Note that any moveBy is about to be ended; the event of one that is not ours is not about ours."""
+        """Note that any moveBy is about to be ended.
+
+        The event of one that is not ours is not about ours.
+        """
         self.inherited = False
         self._stray_until = now + STRAY_FOR
 

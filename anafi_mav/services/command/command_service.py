@@ -354,12 +354,12 @@ class CommandService(Service):
             self._finish(*running.answer, dialect.MAV_RESULT_CANCELLED)
 
     def _cancel(self, inbound: Inbound) -> None:
-        """COMMAND_CANCEL: cancel the sender's running action of that number, or without one any client's.
+        """COMMAND_CANCEL: cancel the sender's running action of that number.
 
-        The action's sender gets CANCELLED. Without such an action nothing is sent (MAVLink command.md). An accepted
-        command is not withdrawn, and an action that cannot honestly be cancelled continues to its own
-        acknowledgement. Another client may wait with the same command for the end of the sender's: that one continues,
-        also when the sender repeats its COMMAND_CANCEL.
+        If the sender has none, any client's is cancelled. The action's sender gets CANCELLED. Without such an action
+        nothing is sent (MAVLink command.md). An accepted command is not withdrawn, and an action that cannot honestly
+        be cancelled continues to its own acknowledgement. Another client may wait with the same command for the end of
+        the sender's: that one continues, also when the sender repeats its COMMAND_CANCEL.
         """
         id, now = inbound.message.command, self.host.clock.monotonic()
         alike = [

@@ -183,7 +183,10 @@ class MissionFlight(PlainTask):
         self._require_mission(mission)
 
     async def _start_ended(self) -> None:
-        """Wait until the start under way has ended; a command that waits, too, may have begun another one then."""
+        """Wait until the start under way has ended.
+
+        A command that waits, too, may have begun another one then.
+        """
         self._begun = self._begun or asyncio.Event()
         await self._begun.wait()
 
