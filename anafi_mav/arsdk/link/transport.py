@@ -220,8 +220,8 @@ class Transport:
         self._tokens = itertools.count(1)
         self._seq_mask = 0xFF if version == 1 else 0xFFFF
         self._received_ids = _RECEIVED_IDS[role]
-        # The first frame has number 0 and must count as new, hence a wrap from the highest number.
-        self._last_seq = dict.fromkeys(self._received_ids, self._seq_mask)
+        self._last_seq: dict[int, int] = {}
+        """By queue. A first frame is new whatever its number is; to libarsdk but for the highest eleven numbers."""
         self._unpacker = Unpacker(version)
         self._known = _known_frames[role, version]
         self._type_place = frame_type(version)
@@ -297,12 +297,18 @@ class Transport:
 
     def _is_new(self, type: int, id: int, seq: int) -> bool:
         """Return False for the copy of a frame, which is counted."""
-        last = self._last_seq[id]
-        if (last - seq) & self._seq_mask <= self._seq_mask >> 1 if type == _WITHACK else -10 <= seq - last <= 0:
+        last = self._last_seq.get(id)
+        if last is not None and self._is_behind(type, seq, last):
             self.counters["duplicate"] += 1
             return False
         self._last_seq[id] = seq
         return True
+
+    def _is_behind(self, type: int, seq: int, last: int) -> bool:
+        """Return True for a number that the last one has passed."""
+        if type == _WITHACK:
+            return (last - seq) & self._seq_mask <= self._seq_mask >> 1
+        return -10 <= seq - last <= 0
 
     def _unpack(self, frame: Frame, events: list[Event], datagram: bytes | None) -> None:
         """Read the commands of a frame.

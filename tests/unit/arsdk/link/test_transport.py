@@ -150,6 +150,7 @@ def test_emergency_does_not_cut_a_split_command() -> None:
     ("type", "version", "earlier", "seq", "taken"),
     [
         (FrameType.NOACK, 3, [], 0, True),  # the first frame
+        (FrameType.NOACK, 3, [], 65530, True),
         (FrameType.NOACK, 3, [20], 21, True),
         (FrameType.NOACK, 3, [20], 25, True),  # frames were lost
         (FrameType.NOACK, 3, [20], 20, False),  # a repetition
@@ -161,6 +162,8 @@ def test_emergency_does_not_cut_a_split_command() -> None:
         (FrameType.NOACK, 1, [100, 250], 245, False),
         (FrameType.NOACK, 1, [100, 250], 239, True),
         (FrameType.WITHACK, 3, [], 0, True),
+        (FrameType.WITHACK, 3, [], 40000, True),  # a peer that counts on from an earlier connection
+        (FrameType.WITHACK, 1, [], 200, True),
         (FrameType.WITHACK, 3, [20], 21, True),
         (FrameType.WITHACK, 3, [20], 25, True),  # a peer that speaks version 1 gives some up
         (FrameType.WITHACK, 3, [20], 20, False),
