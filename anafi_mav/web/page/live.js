@@ -23,6 +23,11 @@ function row(drone) {
 }
 
 function show(drones) {
+  for (const [sysid, item] of rows) {
+    if (drones.some((drone) => drone.sysid === sysid)) continue; // a restarted gateway may have others
+    item.remove();
+    rows.delete(sysid);
+  }
   for (const drone of drones) {
     const item = row(drone);
     item.querySelector(".name").textContent = drone.name;

@@ -57,6 +57,16 @@ function card(drone) {
   return held;
 }
 
+// Remove the cards of drones that a restarted gateway no longer has.
+function keepOnly(drones) {
+  for (const [sysid, held] of cards) {
+    if (drones.some((drone) => drone.sysid === sysid)) continue;
+    if (held.picture.session !== null) held.picture.close();
+    held.item.remove();
+    cards.delete(sysid);
+  }
+}
+
 async function showDrone(drone) {
   const held = card(drone), { parts } = held;
   held.item.classList.toggle("lost", !drone.connected);
@@ -126,6 +136,7 @@ async function refresh() {
   try {
     const status = await answers.next();
     show(status);
+    keepOnly(status.drones);
     for (const drone of status.drones) await showDrone(drone);
     problem.textContent = "";
   } catch (error) {
