@@ -529,6 +529,11 @@ class Autopilot:
         elif self.state is LANDED:
             self._fire(Event.TAKE_OFF)
 
+    def fence_margin(self, north: float, east: float) -> float:
+        """m between a place and the fence of this flight, or of the one that begins here."""
+        here = None if self.state in AIRBORNE else (self.pose.north, self.pose.east)
+        return self.guidance.fence_margin(north, east, here)
+
     def plan_take_off(self) -> None:
         self._fire(Event.TAKE_OFF)
 

@@ -60,6 +60,8 @@ class Pilot(Protocol):
         """True in the air, when the drone accepts guided commands."""
         ...
 
+    def fence_margin(self, north: float, east: float) -> float: ...
+
     def plan_take_off(self) -> None: ...
 
     def plan_land(self) -> None: ...
@@ -380,7 +382,7 @@ class FlightPlan:
         north, east, up = self._point(item)
         if up > self._settings.number("max_altitude"):
             return False
-        return not self._settings["geofence"] or math.hypot(north, east) <= self._settings.number("max_distance")
+        return self._pilot.fence_margin(north, east) >= 0.0
 
     def _way_in(self, pose: Pose) -> list[tuple[float, float, float]]:
         """Up here, then over to above the first way point (Parrot's flight plan page, for the Ai)."""

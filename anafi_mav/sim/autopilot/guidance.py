@@ -89,11 +89,14 @@ class Guidance:
         pilot = self._homing.pilot
         return self.take_off_place if pilot is None else self._origin.offset(pilot.latitude, pilot.longitude)
 
-    def fence_margin(self, north: float, east: float) -> float:
-        """m between a place and the fence; infinite without one."""
+    def fence_margin(self, north: float, east: float, take_off: tuple[float, float] | None = None) -> float:
+        """m between a place and the fence; infinite without one.
+
+        `take_off`: the place of a take-off to come; None: of the last one.
+        """
         if not self._settings["geofence"]:
             return float("inf")
-        centre = self.fence_centre
+        centre = self.fence_centre if take_off is None or self._homing.pilot is not None else take_off
         off_north, off_east = north - centre[0], east - centre[1]
         return self._settings.number("max_distance") - float((off_north**2 + off_east**2) ** 0.5)
 

@@ -395,6 +395,20 @@ def test_no_way_point_beyond_the_fence_or_the_ceiling() -> None:
     assert flight.states == [PlayingState.PLAYING]
 
 
+def test_fence_of_a_plan_is_around_the_take_off() -> None:
+    near = Flight(line(16, at=(230.0, 0.0, 10.0)))
+    near.bench.body.place(200.0, 0.0, 0.0)
+    near.bench.run(0.1)
+    near.bench.send(ardrone3.NoFlyOverMaxDistance(1))
+    near.start()
+    assert near.states == [PlayingState.PLAYING]
+    far = Flight(line(16, at=(50.0, 0.0, 10.0)))
+    far.bench.body.place(200.0, 0.0, 0.0)
+    far.bench.run(0.1)
+    far.bench.send(ardrone3.NoFlyOverMaxDistance(1))
+    assert refused(far) == {Part.WAYPOINTS_BEYOND_GEOFENCE}
+
+
 def test_not_without_gps_or_calibration() -> None:
     flight = Flight(line(93, 1))
     flight.bench.faults.gps = False
