@@ -31,6 +31,14 @@ ANSWER_LIMIT = 1 << 24
 ANSWER_TIMEOUT = 10.0
 """s for an answer, and between two pieces of a file: the drone reads a slow card."""
 
+WHOLE_TIMEOUT = 60.0
+"""s for all of an answer that is read as a whole: the start of a mission waits for some. The longest list of media
+takes half of it at 5 Mbit/s."""
+
+WHOLE_TIMEOUT = 60.0
+"""s for all of an answer that is read as a whole: the start of a mission waits for some. The longest list of media
+takes half of it at 5 Mbit/s."""
+
 CONNECTIONS = 8
 """At a time: two files, notifications, a list, a checksum and a flight plan, which must not wait for them."""
 
@@ -124,7 +132,7 @@ class Rest:
         query: Mapping[str, str] | None = None,
         work: float = 0.0,
     ) -> Any:
-        """The answer to a question, decoded; None for an empty one. `work`: s that it may take longer."""
+        """The answer to a question, decoded; None for an empty one. `work` as in `read`."""
         body = await self.read(method, path, data, query, work=work)
         if not body:
             return None
@@ -142,29 +150,21 @@ class Rest:
         limit: int | None = None,
         work: float = 0.0,
     ) -> bytes:
-        """The body of an answer of at most `limit` bytes; None: `ANSWER_LIMIT`. `work`: s that it may take longer."""
+        """Return the body of an answer of at most `limit` bytes; None: `ANSWER_LIMIT`.
+
+        `work`: s that it may take longer. Raises `CommandTimeout` also for one that arrives bit by bit for longer than `WHOLE_TIMEOUT`.
+        """
         limit = ANSWER_LIMIT if limit is None else limit
+        silence = ANSWER_TIMEOUT + work
+        timeout = aiohttp.ClientTimeout(total=WHOLE_TIMEOUT + work, sock_connect=ANSWER_TIMEOUT, sock_read=silence)
         pieces, size = [], 0
-        async with self.open(method, path, data, query, work) as answer:
-            async for piece in answer:
+        async with self._request(method, path, data, query, timeout=timeout) as response:
+            async for piece in response.content.iter_any():
                 size += len(piece)
                 if size > limit:
                     raise RemoteProtocolError(f"{method} {path}: the answer has more than {limit} bytes")
                 pieces.append(piece)
         return b"".join(pieces)
-
-    @asynccontextmanager
-    async def open(
-        self,
-        method: str,
-        path: str,
-        data: bytes | None = None,
-        query: Mapping[str, str] | None = None,
-        work: float = 0.0,
-    ) -> AsyncIterator[AsyncIterator[bytes]]:
-        """An answer piece by piece. `work`: s that it may take longer than `ANSWER_TIMEOUT`."""
-        async with self._request(method, path, data, query, work=work) as response:
-            yield response.content.iter_any()
 
     @asynccontextmanager
     async def open_file(self, path: str, offset: int, size: int) -> AsyncIterator[tuple[int, AsyncIterator[bytes]]]:
@@ -227,12 +227,12 @@ class Rest:
         data: bytes | None = None,
         query: Mapping[str, str] | None = None,
         headers: Mapping[str, str] | None = None,
-        work: float = 0.0,
+        timeout: aiohttp.ClientTimeout | None = None,
     ) -> AsyncIterator[aiohttp.ClientResponse]:
         if not path.startswith("/") or path.startswith("//"):
             raise RemoteProtocolError(f"{path!r} is no place on the drone")
-        what, timeout = f"{method} {path}", ANSWER_TIMEOUT + work
-        options: dict[str, Any] = {"timeout": _limits(timeout)} if work else {}  # else the session's
+        what = f"{method} {path}"
+        options: dict[str, Any] = {} if timeout is None else {"timeout": timeout}  # else the session's
         with _Translated(what, self.base, timeout):
             async with self._session().request(
                 method,
@@ -264,7 +264,8 @@ class Rest:
             options: dict[str, Any] = {"limit_per_host": CONNECTIONS, "socket_factory": self._make_socket}
             if self._local_address is not None and not self._is_behind_mux:
                 options["local_addr"] = (self._local_address, 0)
-            connector, timeout = aiohttp.TCPConnector(**options), _limits(ANSWER_TIMEOUT)
+            timeout = aiohttp.ClientTimeout(total=None, sock_connect=ANSWER_TIMEOUT, sock_read=ANSWER_TIMEOUT)
+            connector = aiohttp.TCPConnector(**options)
             self._client = aiohttp.ClientSession(connector=connector, timeout=timeout, headers=self._headers)
         return self._client
 
@@ -279,11 +280,6 @@ class Rest:
             sock.close()
             raise
         return sock
-
-
-def _limits(silence: float) -> aiohttp.ClientTimeout:
-    """Return the limits of a request whose answer may take so long, s."""
-    return aiohttp.ClientTimeout(total=None, sock_connect=ANSWER_TIMEOUT, sock_read=silence)
 
 
 async def _refusal(what: str, response: aiohttp.ClientResponse) -> str:
@@ -301,7 +297,7 @@ async def _refusal(what: str, response: aiohttp.ClientResponse) -> str:
 class _Translated:
     """Errors of the web server, translated to ours."""
 
-    def __init__(self, what: str, base: str, timeout: float = ANSWER_TIMEOUT) -> None:
+    def __init__(self, what: str, base: str, timeout: aiohttp.ClientTimeout | None = None) -> None:
         self._what = what
         self._base = base
         self._timeout = timeout
@@ -313,8 +309,14 @@ class _Translated:
         if isinstance(error, CommandRejected | CommandTimeout | LinkLost | RemoteProtocolError):
             return
         if isinstance(error, asyncio.TimeoutError):
-            raise CommandTimeout(self._what, self._timeout) from error
+            raise CommandTimeout(self._what, self._limit_of(error)) from error
         if isinstance(error, aiohttp.ClientConnectionError | aiohttp.ClientPayloadError):  # also in mid-answer
             raise LinkLost(f"the drone's web server {self._base}: {error}") from error
         if isinstance(error, aiohttp.ClientError):
             raise RemoteProtocolError(f"{self._what}: {error}") from error
+
+    def _limit_of(self, error: asyncio.TimeoutError) -> float:
+        """Return the limit (s) that was exceeded: that of a silence, or that of the whole answer."""
+        timeout = self._timeout or aiohttp.ClientTimeout(sock_read=ANSWER_TIMEOUT)
+        exceeded = timeout.sock_read if isinstance(error, aiohttp.ServerTimeoutError) else timeout.total
+        return ANSWER_TIMEOUT if exceeded is None else exceeded

@@ -263,6 +263,22 @@ async def test_refusal_with_an_unreadable_body_is_a_refusal(body: bytes) -> None
             await drone.media.list()
 
 
+async def test_answer_that_never_ends_is_a_timeout() -> None:
+    async def drip(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.readuntil(b"\r\n\r\n")
+        writer.write(b"HTTP/1.1 200 OK\r\nContent-Length: 1000\r\n\r\n")
+        while not writer.is_closing():
+            writer.write(b" ")
+            await asyncio.sleep(3.0)
+        writer.close()
+
+    async with await asyncio.start_server(drip, "127.0.0.1", 0) as server:
+        rest = Rest("127.0.0.1", server.sockets[0].getsockname()[1])
+        with pytest.raises(CommandTimeout, match=r"PUT /plan within 60 s"):
+            await asyncio.wait_for(rest.json("PUT", "/plan", b"QGC WPL 120"), 100.0)
+        await rest.close()
+
+
 async def test_status_line_that_is_no_utf_8_is_replaced() -> None:
     async def refuse(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         await reader.readuntil(b"\r\n\r\n")
