@@ -196,8 +196,9 @@ def _media_line(media: MediaDescription, kind: str, value: str) -> MediaDescript
     if name == "rtpmap" and (match := re.fullmatch(rf"{media.payload_type} ([^/]+)/([0-9]{{1,9}})(?:/.*)?", text)):
         return replace(media, encoding=match[1], clock_rate=int(match[2]))
     if name == "fmtp" and text.startswith(f"{media.payload_type} "):
-        sets = re.search(r"sprop-parameter-sets=([^;,\s]+),([^;,\s]+)", text)
-        units = [_unit(one) for one in sets.groups()] if sets else []
+        # Not by a search: many beginnings in one line would take it seconds.
+        options = dict(option.strip().partition("=")[::2] for option in text.partition(" ")[2].split(";"))
+        units = [_unit(one.strip()) for one in options.get("sprop-parameter-sets", "").split(",")[:2]]
         if all(units) and len(units) == 2:
             return replace(media, sps=units[0], pps=units[1])
         return media

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import time
 
 import pytest
 
@@ -231,6 +232,15 @@ i=Disparity map
 a=control:disparity
 a=rtpmap:96 H264/90000
 """
+
+
+def test_longest_line_of_a_description_is_read_at_once() -> None:
+    line = (b"a=fmtp:96 " + b"sprop-parameter-sets=" * rtsp.MAX_BODY)[: rtsp.MAX_BODY - 40]
+    began = time.process_time()
+    described = parse_description(b"v=0\r\nm=video 0 RTP/AVP 96\r\n" + line)
+    assert time.process_time() - began < 1.0
+    assert described is not None
+    assert described.media[0].sps == b""
 
 
 def test_a_description_by_hand() -> None:
