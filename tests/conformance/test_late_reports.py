@@ -319,6 +319,24 @@ async def test_takeoff_that_a_landing_has_prevented_is_not_accepted(delay: float
         assert (ack.result == ACCEPTED) == (w.drone.pose.up > 0.5)
 
 
+@pytest.mark.parametrize("gap", [0.1, 0.5, 1.0])
+@pytest.mark.parametrize("stop", [(LAND_CMD,), (ARM, 0)])
+async def test_takeoff_is_not_accepted_that_a_landing_before_its_motors_has_prevented(
+    stop: tuple[int, ...], gap: float
+) -> None:
+    """The stop is sent before the motors of a first take-off are reported, and the second take-off after that."""
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        w.drone.faults.up = w.drone.faults.down = Impairment(delay=1.0)
+        w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
+        await asyncio.sleep(1.9)  # of the client, between its commands
+        w.client.send_command(*stop)
+        await asyncio.sleep(gap)
+        ack = await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=4.0, timeout=15.0)
+        await watched(6.0)
+        assert (ack.result == ACCEPTED) == (w.drone.pose.up > 0.5)
+
+
 @pytest.mark.parametrize(("is_after_hand_launch", "has_height"), [(False, True), (True, True), (False, False)])
 async def test_forced_disarm_cuts_no_motors_in_the_air(is_after_hand_launch: bool, has_height: bool) -> None:
     """By the fresh height, which some firmware reports above the take-off point alone.

@@ -28,8 +28,8 @@ LAND_INSISTS = 10.0
 to a drone that takes off, hovers or flies, and none to one whose motors ramp up."""
 
 LAND_MEMORY = 3.0
-"""s after a Landing was withdrawn in which the drone may land all the same, and after a landing was to be ended in
-which the reported landing may be over."""
+"""s after the verb of a Landing was ended in which the drone may land all the same, and after a landing was to be ended
+in which the reported landing may be over."""
 
 STANDS_FOR = 2.0
 """s after a drone that is said to stand was commanded to land in which motors that start are against that: the take-off
@@ -73,7 +73,7 @@ class Motors:
         self._takeoff_blockers = takeoff_blockers
         self._sent = commander.sent
         self._may_land_until = -math.inf
-        """Until when a Landing that was withdrawn may be reported to have begun."""
+        """Until when a Landing that was withdrawn, or whose verb has ended, may be reported to have begun."""
         self._doubtful_until = -math.inf
         """Until when the reported LANDING may be over: its end was asked for."""
         self._stands_until = -math.inf
@@ -304,6 +304,9 @@ class Motors:
                     cut = self._commander.deliver(ardrone3.Emergency())
             await answer.wait()
             self._sent.rule_out()
+        except BaseException:
+            self._may_land_until = loop_time() + LAND_MEMORY
+            raise
         finally:
             self._sticks.landings_asked -= 1
             answer.close()
@@ -341,6 +344,9 @@ class Motors:
             delivery = self._commander.deliver(ardrone3.Landing())
             if not await answer.wait_or_quiet(delivery, ardrone3.Landing.NAME, timeout):
                 self._sent.rule_out()
+        except BaseException:
+            self._may_land_until = loop_time() + LAND_MEMORY
+            raise
         finally:
             answer.close()
 
