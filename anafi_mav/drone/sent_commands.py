@@ -197,7 +197,8 @@ class SentCommand(msgspec.Struct, eq=False):
         phase = TRANSITIONS[self.phase].get(event, self.phase)
         if phase is not self.phase and phase in (Phase.WITHDRAWN, Phase.ABANDONED):
             expiry = EXPIRY.get(self.slot, Expiry())
-            self.may_begin_until, self.reported_until = now + expiry.may_begin, now + expiry.reported
+            undone = expiry.reported if self.undo is None else max(expiry)  # what is undone once may be so again
+            self.may_begin_until, self.reported_until = now + expiry.may_begin, now + undone
         self.phase = phase
 
 

@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.fault_scenarios import (
     ACCEPTED,
     ARM,
+    CANCELLED,
     FAILED,
     LAND_CMD,
     PX4_HOLD,
@@ -317,6 +318,25 @@ async def test_takeoff_that_a_landing_has_prevented_is_not_accepted(delay: float
         ack = await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=4.0, timeout=15.0)
         await watched(5.0)
         assert (ack.result == ACCEPTED) == (w.drone.pose.up > 0.5)
+
+
+@pytest.mark.parametrize("newer", [(TAKEOFF_CMD,), (SET_MODE, *PX4_HOLD)])
+async def test_hand_launch_that_another_command_replaces_stops_although_it_ignores_that_first(
+    newer: tuple[int, ...],
+) -> None:
+    """A drone that ignores UserTakeOff(0) while its motors ramp up is sent it again before it waits for the throw."""
+    async with world(speed=1.0, quirks=(Quirk.RAMPING_IGNORES_LANDING.value,)) as w:
+        await write(w.client, "ANF_HAND_LAUNCH", 1, 6)
+        w.drone.faults.up = w.drone.faults.down = Impairment(delay=0.2)
+        began, mark = now(), w.client.mark()
+        w.client.send_command(ARM, 1)
+        await asyncio.sleep(0.1)  # of the client, between its commands
+        w.client.send_command(*newer)
+        assert (ARM, CANCELLED) in await until(w.client, mark, 2)
+        await flies(w, "usertakeoff", began)
+        await flies(w, "landed", began)
+        await watched(2.0)
+        assert flown(w)[-1] == "landed"
 
 
 @pytest.mark.parametrize("gap", [0.1, 0.5, 1.0])

@@ -92,7 +92,9 @@ class Motors:
         is_against_landing = now < self._stands_until and not self.has_launched and message.state in TURNING | TAKEN_OFF
         if is_against_landing and message.state in TURNING:
             self._stands_until = now + STANDS_FOR
-        if is_against_landing or (sent is not None and self._sent.is_unwanted(sent, now)):
+        # A hand launch that was withdrawn is undone before the throw; one that is thrown all the same hovers.
+        can_be_undone = sent is not None and (sent.undo is None or message.state in TURNING)
+        if is_against_landing or (sent is not None and can_be_undone and self._sent.is_unwanted(sent, now)):
             if message.state in TURNING:
                 self._commander.send_stop_if_connected(ardrone3.UserTakeOff(0))
             self._commander.send_stop_if_connected(ardrone3.Landing())
