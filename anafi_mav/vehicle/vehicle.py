@@ -55,7 +55,6 @@ from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.base.velocity_loop import TILT_LAG
 from anafi_mav.vehicle.controller_inputs import ControllerInputs
-from anafi_mav.vehicle.fence.rally import RallyPoints
 from anafi_mav.vehicle.follow_flight import FollowFlight
 from anafi_mav.vehicle.guided_flight import GOTO, GuidedFlight
 from anafi_mav.vehicle.hold_rule import APART, HoldRule
@@ -200,7 +199,6 @@ class Vehicle(Aircraft):
         self.gcs_loss = LossPolicy()
         """Reaction to the loss of all ground stations (a parameter)."""
         self.stations = GcsWatch()
-        self.rally = RallyPoints()
         self.link_facts = LinkFacts()
         self.flight_facts = FlightFacts()
         self.allow_kill = allow_kill

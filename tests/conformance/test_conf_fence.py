@@ -37,6 +37,7 @@ ACCEPTED, REJECTED, DENIED = (
     dialect.MAV_RESULT_DENIED,
 )
 GEOFENCE = dialect.MAV_SYS_STATUS_GEOFENCE
+HOME_CIRCLE = mav_enums.MAV_CMD_NAV_FENCE_HOME_CIRCLE_INCLUSION
 REPOSITION, ENABLE = dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_FENCE_ENABLE
 BRAKE = 17
 
@@ -747,6 +748,22 @@ async def test_conf_077_a_rally_point_outside_the_fence_is_not_used() -> None:
         assert (await upload(w.client, [rally(outside, 20.0), rally(inside, 20.0)], RALLY)).type == TAKEN
         await w.take_off()
         await said(w.client, "Returns end at rally point 1", since=0, timeout=10.0)
+
+
+async def test_conf_077_rally_point_in_use_does_not_move_a_fence_circle_around_home() -> None:
+    """The drone's home is the rally point, 35 m north; the circle of 40 m stays around the take-off point."""
+    async with world() as w:
+        await put(w, "RTL_TYPE", 1)
+        assert (await upload(w.client, [Item(HOME_CIRCLE, 0.0, 0.0, p1=40.0, frame=3)], FENCE)).type == TAKEN
+        assert (await upload(w.client, [rally(around(PLACE, (35.0, 0.0))[0], 20.0)], RALLY)).type == TAKEN
+        await w.take_off(10.0)
+        await said(w.client, "Returns end at rally point 0", since=0, timeout=10.0)
+        for north, is_inside in ((60.0, False), (-30.0, True)):
+            place = around(PLACE, (north, 0.0))[0]
+            ack = await w.client.command(REPOSITION, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=10.0)
+            assert (ack.result == ACCEPTED) is is_inside
+        await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["north"] + 30.0) < 1.0, 40.0)
+        assert [text for text in texts(w.client) if text.startswith("Fence ") and " beyond " in text] == []
 
 
 async def test_conf_077_home_chosen_by_a_client_is_left_alone() -> None:

@@ -93,7 +93,7 @@ class FenceMirror:
         setting = state.max_distance
         if setting is None or state.geofence is None or not setting.min <= circle.radius <= setting.max:
             return True, None, None
-        middle = vehicle.home if circle.centre is None and vehicle.home is not None else circle.centre
+        middle = circle.centre or vehicle.fence_home
         centre = vehicle.geofence_centre
         if centre is None or middle is None:
             return False, None, None

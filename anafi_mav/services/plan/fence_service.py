@@ -144,7 +144,7 @@ class FenceService(Service):
 
     def _sight(self, now: float) -> Sight:
         vehicle, drone = self.host.vehicle, self.host.drone
-        state, place, home, mode = drone.piloting.state, vehicle.place, vehicle.home, vehicle.mode
+        state, place, home, mode = drone.piloting.state, vehicle.place, vehicle.fence_home, vehicle.mode
         flying_state = vehicle.flying_state
         velocity = (0.0, 0.0) if state.velocity is None else (state.velocity.north, state.velocity.east)
         # A plan and an orbit turn before a fence that was there when they began.
@@ -203,7 +203,7 @@ class FenceService(Service):
         if end is None:
             return False
         try:
-            self._watch.check_place(end, vehicle.home, vehicle.place)
+            self._watch.check_place(end, vehicle.fence_home, vehicle.place)
         except OutsideFence:
             return False
         return True

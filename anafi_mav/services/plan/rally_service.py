@@ -56,6 +56,7 @@ class RallyService(Service):
 
     def link_up(self) -> None:
         self._chosen, self._given = None, self.host.drone.home.state.custom_location
+        self._rally.is_home = self._before() is not None
 
     def link_down(self) -> None:
         self._task = self._chosen = self._given = None
@@ -179,6 +180,7 @@ class RallyService(Service):
             settings.pop(MIRROR, None)
         else:
             settings[MIRROR] = name
+        self._rally.is_home = name is not None
         await self._save()
 
     async def _save(self) -> None:

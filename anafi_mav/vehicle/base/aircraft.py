@@ -34,6 +34,7 @@ from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.roll_sign import RollCheck, RollSign
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.fence.fence_watch import FenceWatch, OutsideFence
+from anafi_mav.vehicle.fence.rally import RallyPoints
 
 ALTITUDE_WAIT = 3.0
 """s for the drone to report its height, which it does five times a second."""
@@ -106,6 +107,7 @@ class Aircraft(Conditions):
         self.commanded_speeds = CommandedSpeeds()
         """For the present flight, on the ground for the next one."""
         self.fence = FenceWatch()
+        self.rally = RallyPoints()
         self.home_choice = asyncio.Lock()
         """Lock held while the drone's home is chosen.
 
@@ -218,6 +220,15 @@ class Aircraft(Conditions):
         return self.place if self.on_ground else None
 
     @property
+    def fence_home(self) -> GeoPoint | None:
+        """Centre of fence circles around home: a rally point in use does not move them."""
+        state, is_rally = self.drone.home.state, self.rally.is_home
+        home = state.takeoff_location if is_rally else state.location
+        if home is None:
+            return self.origin if is_rally else self.home
+        return GeoPoint(home.latitude, home.longitude)
+
+    @property
     def geofence_centre(self) -> GeoPoint | None:
         """Centre of the drone's own geofence: a controller's GPS, else the take-off point.
 
@@ -278,7 +289,7 @@ class Aircraft(Conditions):
         """The reason why the fence keeps the drone on the ground, in a sentence; None without one."""
         if self.on_ground:
             try:
-                self.fence.check_place(self.place, self.home)
+                self.fence.check_place(self.place, self.fence_home)
             except OutsideFence as error:
                 return error.reason
         return None

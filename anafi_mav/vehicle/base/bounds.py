@@ -150,7 +150,7 @@ def check_place(vehicle: Aircraft, place: GeoPoint, *, start: GeoPoint | None = 
     With `start` the straight way from there is checked, too.
     """
     check_on_earth(place, texts.GOTO)
-    centre, home = vehicle.geofence_centre, vehicle.home
+    centre = vehicle.geofence_centre
     around = centre or vehicle.place
     if around is not None:
         distance = geo.distance(around.latitude, around.longitude, place.latitude, place.longitude)
@@ -159,7 +159,7 @@ def check_place(vehicle: Aircraft, place: GeoPoint, *, start: GeoPoint | None = 
         if centre is not None:
             _check_geofence(vehicle, distance)
     try:
-        vehicle.fence.check_place(place, home, start)
+        vehicle.fence.check_place(place, vehicle.fence_home, start)
     except OutsideFence as error:
         raise Refused(texts.GOTO, error.reason, lasting=error.lasting) from error
 

@@ -57,6 +57,8 @@ class RallyPoints:
         self.rtl_type = DEFAULT_TYPE
         """RTL_TYPE, a key of `RTL_TYPES`."""
         self.items = PlanItems()
+        self.is_home = False
+        """True while a rally point is the drone's home instead of the one that it preferred."""
 
     @property
     def purpose(self) -> Return:

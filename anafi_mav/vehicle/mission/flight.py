@@ -296,7 +296,7 @@ class MissionFlight(PlainTask):
         try:
             for part in progress.course.parts:
                 for point in way_points(part, line) if isinstance(part, FlightPlanFile) else ():
-                    vehicle.fence.check_place(point.place, vehicle.home, where)
+                    vehicle.fence.check_place(point.place, vehicle.fence_home, where)
                     where = point.place
                     yield None
                 line = -1
