@@ -136,7 +136,7 @@ def _without_zeros(items: list[Item]) -> list[Item]:
 
 def _with_north(items: tuple[Item, ...]) -> list[Item]:
     """Write headings of 0 as 360 where they would be read as not set."""
-    if {item.params[3] for item in items if item.command in HEADED} != {0.0}:
+    if not {item.params[3] for item in items if item.command in HEADED} <= {0.0, NORTH}:
         return [*items]
     return [with_heading(item, NORTH) if item.command in HEADED else item for item in items]
 

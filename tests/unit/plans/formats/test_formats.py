@@ -36,6 +36,7 @@ from anafi_mav.plans.plan import (
     DO_JUMP,
     MAX_ITEMS,
     MISSION,
+    NORTH,
     RELATIVE,
     FenceCircle,
     FencePolygon,
@@ -298,10 +299,12 @@ def test_unset_value_is_spelled_as_its_readers_take_it() -> None:
     assert [line.split(b"\t")[7] for line in drone.splitlines()[1:]] == [b"nan", b"90.0"]
 
 
-def test_plan_with_headings_north_keeps_them_through_the_waypoint_format() -> None:
-    plan = Plan((waypoint(0, 0, 20.0, 0.0, 0.0, 0.0, 0.0), waypoint(1, 0, 20.0, 0.0, 0.0, 0.0, 0.0)), Point(LAT, LON))
-    data, losses = waypoints.write(plan)
-    assert (waypoints.read(data.decode(), "x"), losses) == (plan, [])
+@pytest.mark.parametrize("other", [0.0, NORTH])
+def test_plan_with_headings_north_keeps_them_through_the_waypoint_format(other: float) -> None:
+    first, second = waypoint(0, 0, 20.0, 0.0, 0.0, 0.0, 0.0), waypoint(1, 0, 20.0, 0.0, 0.0, 0.0, other)
+    data, losses = waypoints.write(Plan((first, second), Point(LAT, LON)))
+    read = waypoints.read(data.decode(), "x")
+    assert ([item.params[3] for item in read.items], losses) == ([0.0, 0.0], [])  # 360 is the same
 
 
 # Parrot's.
