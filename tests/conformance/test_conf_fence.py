@@ -18,6 +18,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.fault_scenarios import another_controller, watched
 from support.flavours import both
 from support.mav import NAN, Client
+from support.params import send_set, value_of
 from support.plans import ACCEPTED as TAKEN
 from support.plans import FENCE, RALLY, Item, around, circle, clear, content, download, rally, square, upload
 from support.setpoints import NO_ACCELERATION, NO_YAW, NO_YAW_RATE, allow_speed, engage, local, streaming
@@ -25,6 +26,7 @@ from support.world import HOME, MODES, World, world
 
 from anafi_mav import geo, mav_enums
 from anafi_mav.arsdk.messages import ardrone3, rth
+from anafi_mav.arsdk.messages.rth import RthHomeType
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim.world.faults import CLEAR, Impairment
@@ -764,6 +766,24 @@ async def test_conf_077_rally_point_in_use_does_not_move_a_fence_circle_around_h
             assert (ack.result == ACCEPTED) is is_inside
         await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["north"] + 30.0) < 1.0, 40.0)
         assert [text for text in texts(w.client) if text.startswith("Fence ") and " beyond " in text] == []
+
+
+async def test_conf_077_home_type_written_while_a_rally_point_becomes_home_follows_it() -> None:
+    """What is reported last holds: returns end at the take-off point again."""
+    async with world(speed=1.0) as w:
+        await put(w, "RTL_TYPE", 1)
+        assert (await upload(w.client, [rally(around(PLACE, (-30.0, 0.0))[0], 20.0)], RALLY)).type == TAKEN
+        w.drone.faults.down = w.drone.faults.up = Impairment(delay=0.3)
+        mark = w.client.mark()
+        taking_off = asyncio.ensure_future(w.take_off())
+        await until(lambda: preferred(w) == [RthHomeType.CUSTOM], 20.0)
+        send_set(w.client, "ANF_HOME_TYPE", RthHomeType.TAKEOFF, dialect.MAV_PARAM_TYPE_INT32)
+        await taking_off
+        await said(w.client, "Returns end at rally point 0", since=mark, timeout=10.0)
+        chosen = w.client.mark()
+        value = await w.client.wait("PARAM_VALUE", lambda m: m.param_id == "ANF_HOME_TYPE", since=chosen, timeout=10.0)
+        assert value_of(value) == RthHomeType.TAKEOFF
+        assert preferred(w)[-1] == RthHomeType.TAKEOFF
 
 
 async def test_conf_077_home_chosen_by_a_client_is_left_alone() -> None:

@@ -313,12 +313,19 @@ PRECISE_HOME = _switch(
     events.PreciseHomeModeChanged,
     group=HOME,
 )
+
+
+async def _set_home_type(host: Host, value: float) -> None:
+    async with host.vehicle.home_choice:  # else a rally point may be reported as the home afterwards
+        await host.drone.home.set_preferred_type(RthHomeType(int(value)))
+
+
 HOME_TYPE = Parameter(
     "ANF_HOME_TYPE",
     ParamType.INT32,
     "Preferred home",
     read=lambda host: number(host.drone.home.state.preferred_type),
-    write=lambda host, value: host.drone.home.set_preferred_type(RthHomeType(int(value))),
+    write=_set_home_type,
     values={
         int(RthHomeType.TAKEOFF): "Take-off",
         int(RthHomeType.FOLLOWEE): "Followed target",
