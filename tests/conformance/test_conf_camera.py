@@ -15,7 +15,7 @@ from support.flavours import both
 from support.ftp import Ftp
 from support.mav import CAMERA, Client
 from support.sim_settings import sim_value
-from support.world import HOME, world
+from support.world import HOME, World, world
 
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import camera as camera_messages
@@ -207,6 +207,12 @@ async def test_conf_087_one_picture_of_a_series_is_one(model: str) -> None:
         assert w.drone.firmware.payload.cameras.busy
 
 
+async def photo_mode_shown(client: Client, mode: float, since: int) -> None:
+    """Wait until a change of CAM_PHOTOMODE to this mode is sent."""
+    shown = "PARAM_EXT_VALUE"
+    await client.wait(shown, lambda m: m.param_id == "CAM_PHOTOMODE" and value_of(m) == mode, since=since, timeout=30.0)
+
+
 @pytest.mark.parametrize("model", ["4k", "ai"])
 @pytest.mark.parametrize("count", [0, 2])
 async def test_conf_087_photo_mode_is_restored_after_a_series(model: str, count: int) -> None:
@@ -220,9 +226,40 @@ async def test_conf_087_photo_mode_is_restored_after_a_series(model: str, count:
         await w.client.wait("CAMERA_IMAGE_CAPTURED", lambda image: image.image_index == 1, since=0, timeout=10.0)
         if not count:
             assert await command(w.client, STOP_PHOTO, 0) == ACCEPTED
-        shown = "PARAM_EXT_VALUE"
-        await w.client.wait(shown, lambda m: m.param_id == "CAM_PHOTOMODE" and value_of(m) == before, since=mark)
+        await photo_mode_shown(w.client, before, mark)
         assert sim_value(w.drone, "CAM_PHOTOMODE") == before
+
+
+async def lose_link(w: World, seconds: float) -> None:
+    """No datagram passes for this time; return when the vehicle is heard again."""
+    w.drone.faults.mute = True
+    await asyncio.sleep(seconds)
+    w.drone.faults.mute = False
+    mark = w.client.mark()
+    await w.client.wait("GLOBAL_POSITION_INT", since=mark, timeout=30.0)
+
+
+@pytest.mark.parametrize("model", ["4k", "ai"])
+async def test_conf_087_pictures_are_reported_once_around_a_lost_link(model: str) -> None:
+    """Those that were taken without a link are not reported, and the others have the names of their own files."""
+    async with world(model=model, speed=1.0, web=True) as w:
+        await enter(w.client, PHOTO)
+        assert await command(w.client, START_PHOTO, 0, 2, 0) == ACCEPTED
+        shown = "CAMERA_IMAGE_CAPTURED"
+        await w.client.wait(shown, lambda image: image.image_index == 2, since=0, timeout=10.0)
+        await lose_link(w, 8.0)
+        begun = w.drone.firmware.payload.cameras.shots
+        last = await w.client.wait(shown, lambda image: image.image_index == 4, timeout=10.0)
+        assert await command(w.client, STOP_PHOTO, 0) == ACCEPTED
+        assert begun > 4
+        await w.client.wait("HEARTBEAT")
+        mark = w.client.mark()
+        assert await command(w.client, dialect.MAV_CMD_REQUEST_MESSAGE, IMAGE, last.image_index) == ACCEPTED
+        image = await w.client.wait(shown, since=mark)
+        names = [resource.id for resource in photos(w)[0].resources]
+        assert image.file_url.rpartition("/")[2] in names[begun:]
+        status = await request(w.client, "CAMERA_CAPTURE_STATUS")
+        assert status.image_count < len(names)
 
 
 async def test_conf_087_long_series_is_listed_when_it_has_grown(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -100,10 +100,15 @@ class PhotoReporter:
     def link_up(self) -> None:
         """Continue the index of this drone."""
         drone = self.host.drone
+        before = self._shots
         if self.host.memory.generation != self._generation:
             self._generation = self.host.memory.generation
-            self._log = PhotoLog(PhotoLog.stored_count(self.host.memory.settings))
-        self._shots, self._poses = ShotTracker(self._shots.capture), {}
+            self._log, before = PhotoLog(PhotoLog.stored_count(self.host.memory.settings)), ShotTracker(before.capture)
+        self._shots, self._poses = ShotTracker(before.capture), {}
+        id = drone.camera.active_id
+        if drone.camera[id].taking:
+            known = before.taken if before.is_open else 0
+            self._shots.join(id, max(known, drone.camera[id].photo_count or 0), self.host.clock.monotonic())
         self._turn = asyncio.Lock()
         self._undo = drone.video.subscribe(lambda frame: add_frame(self._track, frame))
 

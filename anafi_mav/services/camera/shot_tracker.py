@@ -59,7 +59,8 @@ class _Capture:
         self.shots: list[float] = []
         """Shutter times of the pictures that are not reported yet."""
         self.taken = 0
-        self.reported = 0
+        self.reported: int | None = 0
+        """Pictures that are reported; None: not known yet, of a capture that was under way at the connection."""
         self.ended: float | None = None
         """When the drone reported the end of a capture whose media is not reported yet."""
         self.media = ""
@@ -68,10 +69,15 @@ class _Capture:
     def more(self, count: int) -> int:
         """Return how many pictures a count adds; none for one that is older than the last."""
         more = (count - self.taken) % COUNT
+        if self.reported is None:
+            self.taken += max(more - 1, 0)  # without a connection
+            return min(more, 1)
         return more if more < COUNT // 2 else 0
 
     def take(self, pictures: int, now: float) -> None:
         """Add pictures, spread over the time since the last report."""
+        if self.reported is None:
+            self.reported = self.taken
         step = (now - self.since) / max(pictures, 1)
         room = max(MOST - len(self.shots), 0)
         self.shots += [self.since + step * number for number in range(1, min(pictures, room) + 1)]
@@ -98,8 +104,9 @@ class _Capture:
     def report(self, count: int, *, is_saved: bool) -> list[CapturedShot]:
         """Return the first of the pictures that are not reported yet."""
         shots, self.shots = self.shots[:count], self.shots[count:]
-        first = self.reported + 1
-        self.reported += len(shots)
+        first = (self.reported or 0) + 1
+        if shots:
+            self.reported = first - 1 + len(shots)
         return [CapturedShot(self.number, first + n, at, is_saved) for n, at in enumerate(shots)]
 
 
@@ -116,6 +123,20 @@ class ShotTracker:
         """The one before that."""
         self._captures: dict[str, int] = {}
         """Numbers of the captures of the last media ids, each of which may be reported again."""
+
+    def join(self, camera: int, taken: int, now: float) -> None:
+        """Follow a photo that is under way when a connection begins.
+
+        `taken`: its pictures so far, or fewer; a report may count on. They were taken on an earlier connection, or
+        without one.
+        """
+        self._now = _Capture(self.capture + 1, now, camera, is_open=True)
+        self._now.taken, self._now.reported = taken, None
+
+    @property
+    def is_open(self) -> bool:
+        """True while a photo, burst or series is under way."""
+        return self._now.is_open
 
     @property
     def capture(self) -> int:

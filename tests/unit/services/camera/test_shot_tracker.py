@@ -107,6 +107,28 @@ def test_pictures_of_a_series_are_one_media() -> None:
     assert tracker.receive(saved("a", 2), 2.5) == []
 
 
+@pytest.mark.parametrize(("taken", "count", "number"), [(0, 7, 7), (4, 7, 7), (300, 50, 306), (7, 7, 0)])
+def test_series_under_way_at_the_begin_of_a_connection_has_no_pictures_of_before(
+    taken: int, count: int, number: int
+) -> None:
+    """`number` of the picture, by hand: 50 is 306 modulo 256. 0: there is none."""
+    tracker = ShotTracker(3)
+    tracker.join(0, taken, 10.0)
+    feed(tracker, (12.0, TAKEN, count))
+    expected = [CapturedShot(4, number, 12.0, True)] if number else []
+    assert tracker.receive(saved("a", count), 12.3) == expected
+    feed(tracker, (14.0, TAKEN, count + 1))
+    assert tracker.receive(saved("a", count + 1), 14.3) == [CapturedShot(4, max(number, taken) + 1, 14.0, True)]
+
+
+def test_series_under_way_without_counts_goes_on_behind_the_pictures_of_before() -> None:
+    tracker = ShotTracker()
+    tracker.join(0, 5, 10.0)
+    feed(tracker, (12.0, TAKEN, None))
+    assert tracker.expire(12.0 + UNSAVED, is_series=True) == [CapturedShot(1, 6, 12.0, True)]
+    assert tracker.receive(saved("a", is_last=True), 13.0) == []
+
+
 def test_picture_that_is_never_saved_is_lost() -> None:
     tracker = ShotTracker()
     feed(tracker, (1.0, STARTED, None), (1.2, TAKEN, None), (1.3, ENDED, None))
