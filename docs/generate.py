@@ -584,7 +584,9 @@ time; 2000 are kept until the gateway ends. Their places and orientations are no
 gateway. The index goes on, and begins again only after a format. MAVSDK requests missing photos; an index that does
 not exist is DENIED.
 
-Photos that are taken while the drone's link is lost are not reported.
+Photos that are taken while the drone's link is lost are not reported. The gateway ends a series that has all its
+pictures. While the link is lost the drone takes more; the series is ended, and the settings are restored, when the
+link is back.
 
 PANORAMA_CREATE takes one of Parrot's panoramas: from 360 deg the spherical one, from 180 deg the horizontal or
 vertical one, below it the super wide one where the drone has it. It turns the drone, so the drone must hover; any

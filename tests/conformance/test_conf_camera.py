@@ -262,6 +262,24 @@ async def test_conf_087_pictures_are_reported_once_around_a_lost_link(model: str
         assert status.image_count < len(names)
 
 
+@pytest.mark.parametrize("ends", [False, True])
+async def test_conf_087_series_goes_on_after_a_lost_link_and_ends_as_commanded(ends: bool) -> None:
+    """`ends`: another controller has stopped it meanwhile."""
+    async with world(speed=1.0) as w:
+        await enter(w.client, PHOTO)
+        before = sim_value(w.drone, "CAM_PHOTOMODE")
+        assert await command(w.client, START_PHOTO, 0, 2, 8) == ACCEPTED
+        mark = w.client.mark()
+        w.drone.faults.mute = True
+        await asyncio.sleep(6.0)
+        if ends:
+            press(w, camera_messages.StopPhoto(0))
+        await lose_link(w, 1.0)
+        await photo_mode_shown(w.client, before, mark)
+        assert sim_value(w.drone, "CAM_PHOTOMODE") == before
+        assert len(photos(w)[0].resources) <= 8
+
+
 async def test_conf_087_long_series_is_listed_when_it_has_grown(monkeypatch: pytest.MonkeyPatch) -> None:
     """A list names all pictures of the series: with each of them it would take the radio of the flight."""
     count = 30

@@ -31,6 +31,8 @@ class PhotoSeries:
     """Pictures after which it is ended."""
     restore: PhotoSettings | None
     """Photo settings to restore at its end."""
+    generation: int
+    """Of the host's memory: which drone takes it."""
     has_begun: bool = False
     """The drone has reported its begin; an end before that is another photo's."""
 
@@ -46,9 +48,16 @@ class PhotoControl:
         """Restores the settings of before a series that has ended; the next photo waits for it."""
 
     def link_up(self) -> None:
-        """Forget the series of an earlier connection."""
+        """Go on with the series of an earlier connection, or restore its settings if it has ended meanwhile."""
         self._commands = asyncio.Lock()
-        self._series = self._restoring = None
+        series, self._series, self._restoring = self._series, None, None
+        if series is None or series.generation != self.host.memory.generation or not self.is_series:
+            return
+        if self.camera.taking:
+            series.has_begun, self._series = True, series
+        elif series.restore is not None:
+            id = self.host.drone.camera.active_id
+            self._restoring = self.host.spawn(self._restore_photo(series.restore, id))
 
     @property
     def camera(self) -> CameraState:
@@ -93,7 +102,7 @@ class PhotoControl:
             self._require_photo()
             if self.is_series:
                 require_free(self.host.vehicle, texts.PHOTO)
-                await self._shoot_series(PhotoSeries(1, None))
+                await self._shoot_series(PhotoSeries(1, None, self.host.memory.generation))
             else:
                 await self._shoot()
 
@@ -111,7 +120,8 @@ class PhotoControl:
             is_set = before is not None and before.mode is mode and interval in (None, before.interval)
             if not is_set:
                 await self._set_series(mode, interval)
-            await self._shoot_series(PhotoSeries(limit, None if is_set else before))
+            restore = None if is_set else before
+            await self._shoot_series(PhotoSeries(limit, restore, self.host.memory.generation))
 
     async def follow_distance(self, distance: float) -> None:
         """Take a photo each `distance` m, in place of a series under way."""
