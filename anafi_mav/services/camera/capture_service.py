@@ -117,9 +117,10 @@ class CaptureService(Service):
         self._send_changed()
 
     def _is_of_photo(self, update: CaptureUpdate) -> bool:
-        """Return True for an event of the camera whose photo is under way, else for one of the active camera.
+        """Return True for an event of the camera whose photo is under way.
 
-        A thermal mode changes the active camera, and ends a photo; the drone may report that afterwards.
+        Without one it is the active camera. A thermal mode changes the active camera, and ends a photo; the drone may
+        report that afterwards.
         """
         camera = None if update.progress in BEGUN else self._reporter.camera
         return update.camera == (self.host.drone.camera.active_id if camera is None else camera)

@@ -48,7 +48,10 @@ class PhotoControl:
         """Restores the settings of before a series that has ended; the next photo waits for it."""
 
     def link_up(self) -> None:
-        """Go on with the series of an earlier connection, or restore its settings if it has ended meanwhile."""
+        """Go on with the series of an earlier connection.
+
+        Restore its settings if it has ended meanwhile.
+        """
         self._commands = asyncio.Lock()
         series, self._series, self._restoring = self._series, None, None
         if series is None or series.generation != self.host.memory.generation or not self.is_series:

@@ -83,11 +83,11 @@ class PhotoReporter:
 
     @property
     def camera(self) -> int | None:
-        """Camera of the photo under way, or of one whose pictures are not all reported; None without one."""
+        """Camera of the photo under way, or whose pictures are not all reported; None: none."""
         return self._shots.camera
 
     def is_present(self, media: str) -> bool:
-        """Return True for the media of the photo, burst or series under way, or of the last one; "": not reported."""
+        """Return True for the media of the photo under way, or of the last one; "": not reported."""
         return not media or self._shots.capture_of(media) == self._shots.capture
 
     @property
@@ -177,7 +177,10 @@ class PhotoReporter:
             self._name_later([], self._shots.media, is_last=False)
 
     def _name_later(self, images: list[CapturedImage], media: str, *, is_last: bool) -> None:
-        """Send the messages of these pictures; fill in the names of all pictures of a media, if one is given."""
+        """Send the messages of these pictures.
+
+        The names of all pictures of a media are filled in, if one is given.
+        """
         capture = self._shots.capture_of(media)
         listed = media if capture and self.host.drone.media.state.index is not None else ""
         if images or listed:
@@ -291,7 +294,7 @@ class PhotoReporter:
 
 
 def is_listed(number: int) -> bool:
-    """Return True when a media is listed after its picture of this number: each of the first ten, then fewer."""
+    """Return True when a media is listed after its picture of this number."""
     return number <= 1 or math.floor(math.log(number, GROWTH)) > math.floor(math.log(number - 1, GROWTH))
 
 

@@ -145,7 +145,7 @@ class ShotTracker:
 
     @property
     def camera(self) -> int | None:
-        """Camera of the photo under way, or of one whose pictures are not all reported; None without one."""
+        """Camera of the photo under way, or whose pictures are not all reported; None: none."""
         return self._now.camera if self._now.is_open or self._now.shots else None
 
     @property
@@ -168,7 +168,7 @@ class ShotTracker:
         return self._captures.get(media, 0)
 
     def is_over(self, media: str) -> bool:
-        """Return True when no more pictures of this media are taken."""
+        """Return True when the pictures of this media are all taken."""
         return not self._now.is_open or self.capture_of(media) != self.capture
 
     def receive(self, update: CaptureUpdate, now: float) -> list[CapturedShot]:
@@ -200,7 +200,7 @@ class ShotTracker:
         return lost
 
     def _open(self, update: CaptureUpdate, now: float) -> list[CapturedShot]:
-        """Begin a capture, unless one is under way; return the lost pictures of the one before the last."""
+        """Begin a capture, unless one is under way; return lost pictures of an earlier one."""
         if self._now.is_open:
             return []
         lost = self._before.report_all(is_saved=False)
