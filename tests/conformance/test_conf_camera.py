@@ -517,6 +517,34 @@ async def test_conf_092_unusable_storage_is_pushed_and_refuses_photos() -> None:
         await shoot(w.client)
 
 
+async def test_conf_096_change_without_a_link_is_pushed_after_it() -> None:
+    """A station asks only once, and would show the recording for good."""
+    async with world(speed=1.0) as w:
+        await enter(w.client, VIDEO)
+        assert await command(w.client, START_VIDEO, 0, 0) == ACCEPTED
+        mark = w.client.mark()
+        w.drone.faults.mute = True
+        await asyncio.sleep(6.0)
+        press(w, camera_messages.StopRecording(0))
+        press(w, camera_messages.SetCameraMode(0, camera_messages.CameraCameraMode.PHOTO))
+        await lose_link(w, 1.0)
+        await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.video_status == 0, since=mark)
+        await w.client.wait("CAMERA_SETTINGS", lambda s: s.mode_id == PHOTO, since=mark)
+        assert not texts(w.client, mark)
+
+
+async def test_conf_092_storage_that_changes_without_a_link_is_pushed_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with world(speed=1.0) as w:
+        mark = w.client.mark()
+        w.drone.faults.mute = True
+        await asyncio.sleep(6.0)
+        report = user_storage.State(PhyState.AVAILABLE, FsState.FORMAT_NEEDED, 0, 1, 5)
+        monkeypatch.setattr(w.drone.firmware.payload.storage.place, "states_report", lambda: [report])
+        await lose_link(w, 1.0)
+        await w.client.wait("STORAGE_INFORMATION", is_in(dialect.STORAGE_STATUS_UNFORMATTED), since=mark)
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Storage 1: storage not formatted", since=mark)
+
+
 async def test_conf_092_photo_without_card_goes_to_the_internal_storage() -> None:
     """The Ai writes to its internal storage without a card, unless its setting forbids that."""
     async with world(model="ai") as w:

@@ -55,7 +55,9 @@ class CameraService(Service):
 
     def link_up(self) -> None:
         self._camera.reset()
-        self._sent_settings, self._sent_flags = self._settings(), camera_messages.flags(self.host.drone)
+        if self._sent_settings is None:
+            self._sent_settings, self._sent_flags = self._settings(), camera_messages.flags(self.host.drone)
+        self._send_changed()  # without a link the pilot, or the drone itself, may have changed them
 
     # Messages.
 

@@ -73,7 +73,9 @@ class CaptureService(Service):
         self._photos.link_up()
         self._recordings = asyncio.Lock()
         self._recording_since, self._recording_failure = self._found_recording(self.host.clock.monotonic()), ""
-        self._sent = self._status()
+        if self._sent is None:
+            self._sent = self._status()
+        self._send_changed()  # without a link the pilot, or the drone itself, may have changed it
 
     def link_down(self) -> None:
         self._reporter.link_down()

@@ -76,15 +76,20 @@ class StorageService(Service):
         """A storage has been formatted, and nothing has been taken or recorded since."""
         self._problems: dict[int, Reason | None] = {}
         """Reason why nothing can be stored, as last reported in a text."""
+        self._generation = -1
+        """Of the host's memory: which drone has these storages."""
         self._reported = StateWatch(host.drone.storage, host.drone.camera)
         """The camera says which storage it writes to."""
 
     def link_up(self) -> None:
         self._reported.reset()
-        self._ids, self._sent, self._problems = (), {}, {}
-        self._note_storages()
-        for id in self.host.drone.storage.state:
-            self._sent[id], self._problems[id] = self._content(id), storage_problem(self.host.drone, id)
+        if self.host.memory.generation != self._generation:  # the first connection of this drone
+            self._generation = self.host.memory.generation
+            self._ids, self._sent, self._problems = (), {}, {}
+            self._note_storages()
+            for id in self.host.drone.storage.state:
+                self._sent[id], self._problems[id] = self._content(id), storage_problem(self.host.drone, id)
+        self._send_changed()  # without a link a card may have been changed
         self.host.spawn(self._monitor())
 
     async def _monitor(self) -> None:
