@@ -36,6 +36,7 @@ from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.mavlink import dialect as newer
 from anafi_mav.sim import DroneSpec, Simulator
+from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.vehicle.base.modes import FlightMode
 
 ACCEPTED, DENIED, REJECTED, UNSUPPORTED = (
@@ -444,6 +445,24 @@ async def test_conf_100_mission_has_the_gimbal_while_its_items_come(flavour: str
         await looks(w, pitch_absolute=-30.0)  # the mission's own item
         await belongs((0, 0), mark)
         assert (await w.client.command(PITCHYAW, 5.0, x=LEVEL)).result == ACCEPTED
+
+
+@pytest.mark.parametrize("is_command", [True, False])
+async def test_angles_while_a_region_begins_free_the_gimbal(is_command: bool) -> None:
+    """Within the round trip of its start: the drone would lock the gimbal after them."""
+    async with world(speed=1.0) as w:
+        await w.take_off(6.0)
+        w.drone.faults.up = w.drone.faults.down = Impairment(delay=0.3)
+        w.client.send_command(ROI, x=EAST[0], y=EAST[1], z=0.0, frame=6)
+        await w.drone.wait_log(lambda e: e.name == "ardrone3.Piloting.StartPilotedPOIV2", 5.0)
+        if is_command:
+            assert (await w.client.command(PITCHYAW, 20.0, NAN, NAN, NAN, x=LEVEL)).result == ACCEPTED
+        else:
+            pitch = math.radians(20.0)
+            w.client.send(dialect.MAVLink_gimbal_manager_set_pitchyaw_message(1, 1, LEVEL, 1, pitch, NAN, NAN, NAN))
+        await looks(w, pitch_absolute=20.0)
+        starts = [entry.args["mode"] for entry in w.commands("ardrone3.Piloting.StartPilotedPOIV2")]
+        assert starts == [PoiMode.LOCKED_GIMBAL, PoiMode.FREE_GIMBAL]
 
 
 async def test_conf_139_mount_commands_and_messages_have_the_same_signs() -> None:

@@ -62,6 +62,8 @@ class Region:
     """Requester; None: it was found."""
     is_confirmed: bool = False
     """The drone has reported it."""
+    starting: asyncio.Future[None] | None = None
+    """Done when the drone has answered the start under way."""
     freeing: asyncio.Task[None] | None = None
     """Frees the gimbal; one task for all targets that wait for it."""
 
@@ -91,16 +93,23 @@ class RegionOfInterest(PlainTask):
 
     @property
     def holds_gimbal(self) -> bool:
-        """True while the drone aims the gimbal at the region by itself."""
+        """True while the drone aims the gimbal at the region by itself, or is commanded to."""
+        region = self._region
+        is_commanded = region is not None and region.starting is not None and region.mode != PoiMode.FREE_GIMBAL
+        return is_commanded or self._is_aimed
+
+    @property
+    def _is_aimed(self) -> bool:
+        """True while the drone reports that it aims the gimbal at the region."""
         state = self._host.drone.poi.state
         return _holds(state.status, state.mode)
 
     def is_locked_on(self, where: GeoPoint, ato: float) -> bool:
         """Return True while the drone aims the gimbal at this place (height: m above take-off)."""
         region, target = self._region, self._host.drone.poi.state.target
-        if region is None or region.freeing is not None or self._update is not None:
+        if region is None or region.starting is not None or region.freeing is not None or self._update is not None:
             return False  # a newer start is under way
-        if not self.holds_gimbal or target is None:
+        if not self._is_aimed or target is None:
             return False
         apart = geo.distance(target.latitude, target.longitude, *where)
         return math.hypot(apart, target.altitude - ato) < SAME_PLACE
@@ -214,8 +223,9 @@ class RegionOfInterest(PlainTask):
         """
         if self._update is not None:
             await asyncio.wait({self._update})
-        region = self._region
-        if not self.holds_gimbal:
+        while (region := self._region) is not None and region.starting is not None and region.freeing is None:
+            await asyncio.wait({region.starting})
+        if not self._is_aimed:
             return
         vehicle = self._host.vehicle
         if region is None or vehicle.descent is not None or not vehicle.in_air:
@@ -233,7 +243,7 @@ class RegionOfInterest(PlainTask):
 
     async def _released(self) -> None:
         """Return when the drone reports that it does not aim the gimbal. Raises `CommandTimeout`."""
-        if self.holds_gimbal:
+        if self._is_aimed:
             await self._host.drone.expect(PilotedPOIV2, lambda message: not _holds(message.status, message.mode))
 
     async def _free(self, region: Region) -> None:
@@ -247,12 +257,17 @@ class RegionOfInterest(PlainTask):
 
     async def _start(self, region: Region, where: GeoPoint, ato: float) -> None:
         """Command the region in force. A start that fails is undone by a stop, so it ends then."""
+        starting = region.starting = asyncio.get_running_loop().create_future()
         try:
             await self._host.drone.poi.start(where.latitude, where.longitude, ato, region.mode)
         except BaseException:
             if self._region is region:
                 self._drop_region()
             raise
+        finally:
+            starting.set_result(None)
+            if region.starting is starting:
+                region.starting = None
 
     def _drop_region(self) -> None:
         """The region is over, and nothing is to be sent for it."""
