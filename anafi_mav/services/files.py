@@ -93,8 +93,8 @@ class Folder(Protocol):
     def checksum(self, path: str) -> int | Awaitable[int]:
         """Return MAVLink's CRC-32 of a file."""
 
-    def remove(self, path: str) -> Awaitable[None] | None:
-        """Remove a file."""
+    def remove(self, path: str, may_change: Callable[[], bool]) -> Awaitable[None] | None:
+        """Remove a file, unless `may_change` returns False just before it."""
 
 
 @dataclass(frozen=True)
@@ -175,11 +175,14 @@ class FileTree:
             raise FileRefused(FileError.FILE_NOT_FOUND)
         return crc32(content)
 
-    def remove(self, path: str) -> Awaitable[None] | None:
-        """Remove a file of a folder. Raises `FileRefused`, at once or when awaited."""
+    def remove(self, path: str, may_change: Callable[[], bool] = lambda: True) -> Awaitable[None] | None:
+        """Remove a file of a folder. Raises `FileRefused`, at once or when awaited.
+
+        `may_change`: False once the client may not remove it any longer.
+        """
         if (found := self._in_folder(path)) is not None:
             folder, below = found
-            return folder.remove(below)
+            return folder.remove(below, may_change)
         raise FileRefused(FileError.FILE_PROTECTED)
 
     def room(self, path: str) -> int | None:

@@ -14,9 +14,10 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support import ext_params
 from support.fault_scenarios import ACCEPTED, DENIED, FAILED, watched
 from support.flavours import both
-from support.ftp import ACK, NAK, TERMINATE, Ftp
+from support.ftp import ACK, NAK, PROTECTED, REMOVE, TERMINATE, Ftp, taken_apart
 from support.gimbal import LEVEL, NAN, PITCHYAW, looks
-from support.mav import Client
+from support.mav import CAMERA, Client
+from support.media import DAY, add_photo
 from support.params import read, send_set, write
 from support.plans import RALLY, begin_download, rally, upload
 from support.setpoints import COPTER_GUIDED, VELOCITY_ONLY, engage, local, motion, said, streaming, texts
@@ -517,6 +518,24 @@ async def test_parameter_write_that_waits_is_refused_once_another_station_is_the
         error = await student.wait("PARAM_ERROR", since=mark)
         assert error.error == own.MAV_PARAM_ERROR_PERMISSION_DENIED
         assert (await read(teacher, "ANF_RTH_ALT")).param_value == 77.0
+
+
+async def test_removal_of_a_photo_that_waits_is_refused_once_another_station_is_the_operator() -> None:
+    async with world(options=[ON], web=True) as w:
+        teacher, student = await stations(w, OPTIONS_PORT, OPTIONS_PORT)
+        photo = add_photo(w.drone)
+        assert w.drone.web is not None
+        w.drone.web.mute = True  # the list of the media is awaited first
+        path, mark = f"/media/{DAY}/{photo.id}".encode(), student.mark()
+        Ftp(student, component=CAMERA).send(REMOVE, path, seq=8)
+        await asyncio.sleep(0.2)
+        assert await sent(teacher, control_request(teacher)) == ACCEPTED
+        w.drone.web.mute = False
+        reply = await student.wait(
+            "FILE_TRANSFER_PROTOCOL", lambda m: taken_apart(m).seq == 9, since=mark, timeout=15.0
+        )
+        assert taken_apart(reply).error == PROTECTED
+        assert w.drone.firmware.payload.media.resource(photo.id) is not None
 
 
 async def test_camera_setting_that_waits_is_refused_once_another_station_is_the_operator() -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Hashable, Iterator, Mapping, Sequence
 from functools import partial
 
 from anafi_mav.clock import NEVER
@@ -219,11 +219,16 @@ class _ClientFiles:
         self.open = tree.open
         self.list = tree.list
         self.checksum = tree.checksum
-        self.remove = tree.remove
         self._tree = tree
         self._files = files
         self._inbound = inbound
         self._host = host
+
+    def remove(self, path: str) -> Awaitable[None] | None:
+        return self._tree.remove(path, self._may_change)
+
+    def _may_change(self) -> bool:
+        return self._host.change_objection(self._inbound) is None
 
     def room(self, path: str) -> int | None:
         file = self._writable(path)
@@ -231,7 +236,7 @@ class _ClientFiles:
 
     def write(self, path: str, content: bytes) -> bool:
         file = self._writable(path)
-        if file is None or file.write is None or self._host.change_objection(self._inbound) is not None:
+        if file is None or file.write is None or not self._may_change():
             return False
         return file.write(self._inbound, content)
 

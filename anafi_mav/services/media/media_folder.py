@@ -85,12 +85,17 @@ class MediaFolder:
             raise FileRefused(FileError.FAIL, texts.FILE_DAMAGED)
         return crc
 
-    async def remove(self, path: str) -> None:
-        """Delete a file on the drone. Refused while a camera records or saves."""
+    async def remove(self, path: str, may_change: Callable[[], bool]) -> None:
+        """Delete a file on the drone. Refused while a camera records or saves.
+
+        Also to a client that may not change anything any longer: the list may take seconds.
+        """
         with refusing():
             resource = find(await self._drone.media.listing(), path)
             if (reason := busy(self._drone)) is not None:
                 raise FileRefused(FileError.FAIL, texts.REFUSED.fill(what=texts.DELETE, reason=reason))
+            if not may_change():
+                raise FileRefused(FileError.FILE_PROTECTED)
             await self._drone.media.delete_resource(resource.resource_id)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Awaitable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 
 from anafi_mav.drone import Drone
 from anafi_mav.drone.payload.media import Listing, Resource
@@ -41,7 +41,7 @@ class ThumbnailFolder:
     async def checksum(self, path: str) -> int:
         return crc32(await self._content(path))
 
-    def remove(self, path: str) -> None:
+    def remove(self, path: str, may_change: Callable[[], bool]) -> None:
         """Refuse: a thumbnail goes with its file."""
         raise FileRefused(FileError.FILE_PROTECTED)
 
