@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support import ext_params
+from support.cameras import VIDEO, enter
 from support.fault_scenarios import ACCEPTED, DENIED, FAILED, watched
 from support.flavours import both
 from support.ftp import ACK, NAK, PROTECTED, REMOVE, TERMINATE, Ftp, taken_apart
@@ -518,6 +519,27 @@ async def test_parameter_write_that_waits_is_refused_once_another_station_is_the
         error = await student.wait("PARAM_ERROR", since=mark)
         assert error.error == own.MAV_PARAM_ERROR_PERMISSION_DENIED
         assert (await read(teacher, "ANF_RTH_ALT")).param_value == 77.0
+
+
+async def test_camera_command_that_waits_is_refused_once_another_station_is_the_operator() -> None:
+    async with world(options=[ON]) as w:
+        teacher, student = await stations(w, OPTIONS_PORT, OPTIONS_PORT)
+        await enter(student, VIDEO)
+        w.drone.faults.mute = True  # the start waits for its answer, and the end for its turn
+        mark, stop = student.mark(), dialect.MAV_CMD_VIDEO_STOP_CAPTURE
+        student.send_command(dialect.MAV_CMD_VIDEO_START_CAPTURE, target=(1, CAMERA))
+        student.send_command(stop, target=(1, CAMERA))
+        await asyncio.sleep(0.2)
+        assert await sent(teacher, control_request(teacher)) == ACCEPTED
+        w.drone.faults.mute = False
+        ack = await student.wait(
+            "COMMAND_ACK",
+            lambda m: m.command == stop and m.result != dialect.MAV_RESULT_IN_PROGRESS,
+            since=mark,
+            timeout=10.0,
+        )
+        assert ack.result == NOT_IN_CONTROL
+        assert not w.commands("camera.stop_recording")
 
 
 async def test_removal_of_a_photo_that_waits_is_refused_once_another_station_is_the_operator() -> None:

@@ -48,6 +48,7 @@ from anafi_mav.vehicle.base.flight_task import FlightAction, FlightActions
 from anafi_mav.vehicle.base.refusal import NotInControl, Refused, Unsupported, text_of
 from anafi_mav.vehicle.base.right import Extent
 from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.operator_control import Need
 
 logger = logging.getLogger(__name__)
 
@@ -309,6 +310,7 @@ class CommandService(Service):
             group, handler = command.group, self._actions[command.id].handler
             if group in IN_ORDER:
                 async with self.host.payload_history.turn(group):
+                    self._require_role(inbound)
                     await handler(command)
             else:
                 await handler(command)
@@ -339,6 +341,12 @@ class CommandService(Service):
         client = inbound.channel.name
         now = self.host.clock.monotonic()
         self.log.refuse(Refusal(now, inbound.sysid, inbound.compid, client, command, result, reason))
+
+    def _require_role(self, inbound: Inbound) -> None:
+        """Raise `NotInControl` when another station has become the operator meanwhile."""
+        reason = self.host.vehicle.operators.objection(inbound.sysid, Need.COMMAND)
+        if reason is not None:
+            raise NotInControl(texts.FLIGHT_COMMAND, reason)
 
     def _spawn(self, work: Coroutine[Any, Any, None], running: RunningAction) -> asyncio.Task[None]:
         task = self.host.spawn(work)
