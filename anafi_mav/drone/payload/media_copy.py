@@ -37,7 +37,11 @@ _DISK = DiskWriter("media-disk", threads=4)
 
 T = TypeVar("T")
 
-_XMP = re.compile(rb"<x:xmpmeta.*?</x:xmpmeta>", re.DOTALL)
+_XMP_BEGIN, _XMP_END = b"<x:xmpmeta", b"</x:xmpmeta>"
+
+# Each looks at few bytes at few places: a search holds the interpreter, and a file may hold anything.
+_XMP_ATTRIBUTE = re.compile(r'(?<=[\w-]):(\w{1,100})="([^"<>]{0,200})"')
+_XMP_ELEMENT = re.compile(r"<[\w-]{1,100}:(\w{1,100})>([^<>]{0,200})</")
 _ANGLES = {"roll": "CameraRollDegree", "pitch": "CameraPitchDegree", "yaw": "CameraYawDegree"}
 """Parrot's names in the namespace drone-parrot."""
 
@@ -247,13 +251,12 @@ def read_xmp(data: bytes) -> dict[str, str]:
 
     They are elements or attributes of the one description (ISO 16684-1).
     """
-    found = _XMP.search(data)
-    if found is None:
+    begin = data.find(_XMP_BEGIN)
+    end = data.find(_XMP_END, begin)
+    if begin < 0 or end < 0:
         return {}
-    text = found[0].decode("utf-8", "replace")
-    values = dict(re.findall(r'[\w-]+:(\w+)="([^"<>]{0,200})"', text))
-    values |= dict(re.findall(r"<[\w-]+:(\w+)>([^<>]{0,200})</", text))
-    return values
+    text = data[begin:end].decode("utf-8", "replace")
+    return dict(_XMP_ATTRIBUTE.findall(text)) | dict(_XMP_ELEMENT.findall(text))
 
 
 def _place_in(xmp: dict[str, str]) -> Place | None:

@@ -8,13 +8,14 @@ import json
 import os
 import sys
 import threading
+import time
 from collections.abc import AsyncGenerator
 from pathlib import Path
 
 import pytest
 from msgspec.structs import replace
 
-from anafi_mav.drone.payload.media_copy import TRIES, copy, read_xmp, sidecar, sidecar_of
+from anafi_mav.drone.payload.media_copy import TRIES, XMP_LIMIT, copy, read_xmp, sidecar, sidecar_of
 from anafi_mav.drone.payload.media_file import Place, Resource, fetch
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost, RemoteProtocolError
 
@@ -273,3 +274,13 @@ async def test_copies_of_unknown_size_are_made_once(tmp_path: Path) -> None:
     with pytest.raises(RemoteProtocolError, match="no bytes"):
         await copy(Source(b""), replace(unknown, resource_id="empty.JPG"), tmp_path)
     assert names(tmp_path) == [f"{DAY}/{unknown.resource_id}", f"{DAY}/{unknown.resource_id}.json"]
+
+
+@pytest.mark.parametrize("repeated", [b"<x:xmpmeta>", b"a", b"<a", b"a:", b":a", b':a="', b"<a:a>", b"<a:a>b"])
+@pytest.mark.parametrize("end", [b"", b"</x:xmpmeta>"])
+def test_metadata_of_any_photo_are_read_at_once(repeated: bytes, end: bytes) -> None:
+    """A search holds the interpreter, and with it the event loop that flies the other drones."""
+    data = b"<x:xmpmeta>" + repeated * (XMP_LIMIT // len(repeated))
+    began = time.process_time()
+    read_xmp(data[: XMP_LIMIT - len(end)] + end)
+    assert time.process_time() - began < 1.0
