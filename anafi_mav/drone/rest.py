@@ -152,7 +152,8 @@ class Rest:
     ) -> bytes:
         """Return the body of an answer of at most `limit` bytes; None: `ANSWER_LIMIT`.
 
-        `work`: s that it may take longer. Raises `CommandTimeout` also for one that arrives bit by bit for longer than `WHOLE_TIMEOUT`.
+        `work`: s that it may take longer. Raises `CommandTimeout` also for one that arrives bit by bit for longer than
+        `WHOLE_TIMEOUT`.
         """
         limit = ANSWER_LIMIT if limit is None else limit
         silence = ANSWER_TIMEOUT + work
