@@ -5,7 +5,6 @@ The controller reports the motion of the target.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -27,6 +26,7 @@ from anafi_mav.errors import (
     LocalProtocolError,
     NotSupported,
 )
+from anafi_mav.units import LARGEST
 
 
 class Trajectory(msgspec.Struct, frozen=True):
@@ -68,7 +68,7 @@ def _lacking(bits: int) -> frozenset[Input]:
 
 def _trajectory(state: FollowMeState, m: follow_me.TargetTrajectory) -> FollowMeState:
     place = position(m.latitude, m.longitude, m.altitude)
-    if place is None or not math.isfinite(m.north_speed + m.east_speed + m.down_speed):
+    if place is None or not abs(m.north_speed) + abs(m.east_speed) + abs(m.down_speed) <= LARGEST:
         return replace(state, target=None)
     return replace(state, target=Trajectory(place, m.north_speed, m.east_speed, m.down_speed))
 

@@ -5,7 +5,6 @@ The verbs are in `piloting`.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import msgspec
@@ -20,6 +19,7 @@ from anafi_mav.arsdk.messages.piloting_style import PilotingStyleStyle
 from anafi_mav.drone.element import Position, Range, Reducer, finite, members, position, setting
 from anafi_mav.drone.piloting.sticks import Limits
 from anafi_mav.drone.status.alerts import spoken
+from anafi_mav.units import LARGEST
 
 MOTORS_OFF = frozenset({FlyingState.LANDED, FlyingState.EMERGENCY})
 ON_THE_GROUND = MOTORS_OFF | {FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF}
@@ -129,13 +129,13 @@ def in_state(flying: FlyingState | None) -> str:
 
 
 def _attitude(state: PilotingState, message: ardrone3.AttitudeChanged) -> PilotingState:
-    if not math.isfinite(message.roll + message.pitch + message.yaw):
+    if not abs(message.roll) + abs(message.pitch) + abs(message.yaw) <= LARGEST:
         return replace(state, attitude=None)
     return replace(state, attitude=Attitude(message.roll, message.pitch, message.yaw))
 
 
 def _velocity(state: PilotingState, message: ardrone3.SpeedChanged) -> PilotingState:
-    if not math.isfinite(message.speedX + message.speedY + message.speedZ):
+    if not abs(message.speedX) + abs(message.speedY) + abs(message.speedZ) <= LARGEST:
         return replace(state, velocity=None)
     return replace(state, velocity=Velocity(message.speedX, message.speedY, message.speedZ))
 

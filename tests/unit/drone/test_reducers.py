@@ -13,8 +13,8 @@ from anafi_mav.arsdk.codec import wire
 from anafi_mav.arsdk.codec.envelope import ProtobufMessage
 from anafi_mav.arsdk.codec.protobuf import FieldType, Map, Submessage, record_fields
 from anafi_mav.arsdk.codec.wire import Message, OpenEnum
+from anafi_mav.arsdk.messages import ardrone3, gimbal
 from anafi_mav.arsdk.messages import camera as old
-from anafi_mav.arsdk.messages import gimbal
 from anafi_mav.arsdk.messages.proto import camera2 as new
 from anafi_mav.drone.automatic.animations import Animations
 from anafi_mav.drone.automatic.flight_plan import FlightPlan
@@ -29,6 +29,7 @@ from anafi_mav.drone.payload.media import Media
 from anafi_mav.drone.payload.storage import Storage
 from anafi_mav.drone.payload.thermal import Thermal
 from anafi_mav.drone.piloting.piloting import Piloting
+from anafi_mav.drone.piloting.state import PilotingState, Velocity
 from anafi_mav.drone.status.calibration import Calibration
 from anafi_mav.drone.status.home import Home
 from anafi_mav.drone.status.sound import Sound
@@ -132,3 +133,12 @@ def test_number_that_no_float_of_32_bits_holds_is_unknown() -> None:
     for number in (1e300, -1e300, math.inf, math.nan):
         assert finite(number) is None
         assert position(48.0, 2.0, number) is None
+
+
+@pytest.mark.parametrize("speed", [3e38, -3e38, math.inf, math.nan])
+def test_speed_whose_amount_no_float_of_32_bits_holds_is_unknown(speed: float) -> None:
+    """Each component fits one, and the ground speed of VFR_HUD does not."""
+    reduce = Piloting.REDUCERS[ardrone3.SpeedChanged]
+    known = reduce(PilotingState(), ardrone3.SpeedChanged(3.0, -4.0, 1.0))
+    assert known.velocity == Velocity(3.0, -4.0, 1.0)
+    assert reduce(known, ardrone3.SpeedChanged(speed, speed, 0.0)).velocity is None
