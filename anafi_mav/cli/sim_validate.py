@@ -299,7 +299,7 @@ class ValidationFlight:
 def _standstill(arrivals: list[float]) -> str | None:
     """Why the sticks were not held all the time; None when they were."""
     wait = max((after - before for before, after in pairwise(arrivals)), default=PATIENCE)
-    return None if wait < STANDSTILL else f"this machine was too slow for them and stood still for {wait:.1f} s"
+    return None if wait < STANDSTILL else f"this machine was too slow for them, the host stalled for {wait:.1f} s"
 
 
 async def _fly_all(models: list[str], speed: float) -> list[ValidationFlight]:

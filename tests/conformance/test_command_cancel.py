@@ -24,7 +24,7 @@ from support.fault_scenarios import (
 )
 from support.mav import NAN, Client
 from support.missions import put, way
-from support.world import HOME, RETURN, world
+from support.world import HOME, RETURN, World, world
 
 from anafi_mav import geo
 from anafi_mav.mavlink import dialect
@@ -41,14 +41,20 @@ def call_off(client: Client, command: int) -> None:
     client.send(dialect.MAVLink_command_cancel_message(1, 1, command))
 
 
+async def begin_goto(w: World) -> int:
+    """Take off and send a goto that the drone does not receive yet; return the mark before it."""
+    await w.take_off()
+    deaf(w, 1.5)
+    mark = w.client.mark()
+    place = geo.destination(*HOME[:2], 40.0, 0.0)
+    w.client.send_command(GOTO, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=10.0)
+    await being_tried(w.client, mark, GOTO)
+    return mark
+
+
 async def test_cancelled_goto_is_not_flown() -> None:
     async with world(speed=1.0) as w:
-        await w.take_off()
-        deaf(w, 1.5)
-        mark = w.client.mark()
-        place = geo.destination(*HOME[:2], 40.0, 0.0)
-        w.client.send_command(GOTO, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=10.0)
-        await being_tried(w.client, mark, GOTO)
+        mark = await begin_goto(w)
         call_off(w.client, GOTO)
         assert await until(w.client, mark, 1) == [(GOTO, CANCELLED)]
         await w.drone.wait_log(lambda e: e.kind == "command" and e.name.endswith("CancelMoveTo"))
@@ -155,11 +161,6 @@ async def test_start_of_another_client_that_waits_for_a_cancelled_one_is_flown()
 async def test_goto_is_cancelled_by_another_client() -> None:
     async with world(speed=1.0) as w:
         other = await w.connect(sysid=250)
-        await w.take_off()
-        deaf(w, 1.5)
-        mark = w.client.mark()
-        place = geo.destination(*HOME[:2], 40.0, 0.0)
-        w.client.send_command(GOTO, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=10.0)
-        await being_tried(w.client, mark, GOTO)
+        mark = await begin_goto(w)
         call_off(other, GOTO)
         assert await until(w.client, mark, 1) == [(GOTO, CANCELLED)]

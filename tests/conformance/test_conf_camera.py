@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from support.cameras import ACCEPTED, PHOTO, VIDEO, command, enter, photos, press, request, shoot, texts, videos
 from support.ext_params import CHOICE, value_of, write
+from support.fault_scenarios import watched
 from support.flavours import both
 from support.ftp import Ftp
 from support.mav import CAMERA, Client
@@ -233,7 +234,7 @@ async def test_conf_087_photo_mode_is_restored_after_a_series(model: str, count:
 async def lose_link(w: World, seconds: float) -> None:
     """No datagram passes for this time; return when the vehicle is heard again."""
     w.drone.faults.mute = True
-    await asyncio.sleep(seconds)
+    await watched(seconds)
     w.drone.faults.mute = False
     mark = w.client.mark()
     await w.client.wait("GLOBAL_POSITION_INT", since=mark, timeout=30.0)
@@ -271,7 +272,7 @@ async def test_conf_087_series_goes_on_after_a_lost_link_and_ends_as_commanded(e
         assert await command(w.client, START_PHOTO, 0, 2, 8) == ACCEPTED
         mark = w.client.mark()
         w.drone.faults.mute = True
-        await asyncio.sleep(6.0)
+        await watched(6.0)
         if ends:
             press(w, camera_messages.StopPhoto(0))
         await lose_link(w, 1.0)
@@ -524,7 +525,7 @@ async def test_conf_096_change_without_a_link_is_pushed_after_it() -> None:
         assert await command(w.client, START_VIDEO, 0, 0) == ACCEPTED
         mark = w.client.mark()
         w.drone.faults.mute = True
-        await asyncio.sleep(6.0)
+        await watched(6.0)
         press(w, camera_messages.StopRecording(0))
         press(w, camera_messages.SetCameraMode(0, camera_messages.CameraCameraMode.PHOTO))
         await lose_link(w, 1.0)
@@ -537,7 +538,7 @@ async def test_conf_092_storage_that_changes_without_a_link_is_pushed_after_it(m
     async with world(speed=1.0) as w:
         mark = w.client.mark()
         w.drone.faults.mute = True
-        await asyncio.sleep(6.0)
+        await watched(6.0)
         report = user_storage.State(PhyState.AVAILABLE, FsState.FORMAT_NEEDED, 0, 1, 5)
         monkeypatch.setattr(w.drone.firmware.payload.storage.place, "states_report", lambda: [report])
         await lose_link(w, 1.0)

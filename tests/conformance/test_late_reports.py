@@ -330,7 +330,7 @@ async def test_hand_launch_that_another_command_replaces_stops_although_it_ignor
         w.drone.faults.up = w.drone.faults.down = Impairment(delay=0.2)
         began, mark = now(), w.client.mark()
         w.client.send_command(ARM, 1)
-        await asyncio.sleep(0.1)  # of the client, between its commands
+        await watched(0.1)  # of the client, between its commands
         w.client.send_command(*newer)
         assert (ARM, CANCELLED) in await until(w.client, mark, 2)
         await flies(w, "usertakeoff", began)
@@ -349,9 +349,9 @@ async def test_takeoff_is_not_accepted_that_a_landing_before_its_motors_has_prev
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
         w.drone.faults.up = w.drone.faults.down = Impairment(delay=1.0)
         w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
-        await asyncio.sleep(1.9)  # of the client, between its commands
+        await watched(1.9)  # of the client, between its commands
         w.client.send_command(*stop)
-        await asyncio.sleep(gap)
+        await watched(gap)
         ack = await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=4.0, timeout=15.0)
         await watched(6.0)
         assert (ack.result == ACCEPTED) == (w.drone.pose.up > 0.5)
@@ -409,7 +409,7 @@ async def test_stop_that_a_region_of_interest_replaces_ends_an_older_stream(gap:
             await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 5.0, 20.0)
             w.drone.faults.up = w.drone.faults.down = Impairment(delay=0.25)
             w.client.send_command(SET_MODE, *BRAKE)
-            await asyncio.sleep(gap)  # of the client, between its two commands
+            await watched(gap)  # of the client, between its two commands
             mark = w.client.mark()
             w.client.send_command(ROI, 0, 0, 0, 0, frame=6, x=48.8795, y=2.3677, z=0.0)
             await w.client.wait("COMMAND_ACK", lambda ack: (ack.command, ack.result) == (ROI, ACCEPTED), since=mark)

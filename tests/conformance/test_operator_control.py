@@ -529,7 +529,7 @@ async def test_camera_command_that_waits_is_refused_once_another_station_is_the_
         mark, stop = student.mark(), dialect.MAV_CMD_VIDEO_STOP_CAPTURE
         student.send_command(dialect.MAV_CMD_VIDEO_START_CAPTURE, target=(1, CAMERA))
         student.send_command(stop, target=(1, CAMERA))
-        await asyncio.sleep(0.2)
+        await watched(0.2)
         assert await sent(teacher, control_request(teacher)) == ACCEPTED
         w.drone.faults.mute = False
         ack = await student.wait(
@@ -550,7 +550,7 @@ async def test_removal_of_a_photo_that_waits_is_refused_once_another_station_is_
         w.drone.web.mute = True  # the list of the media is awaited first
         path, mark = f"/media/{DAY}/{photo.id}".encode(), student.mark()
         Ftp(student, component=CAMERA).send(REMOVE, path, seq=8)
-        await asyncio.sleep(0.2)
+        await watched(0.2)
         assert await sent(teacher, control_request(teacher)) == ACCEPTED
         w.drone.web.mute = False
         reply = await student.wait(

@@ -215,5 +215,5 @@ async def test_validation_flights_on_a_stalled_host_are_invalid() -> None:
             process.kill()
             await process.wait()
     assert process.returncode == 1
-    assert b"the flights are invalid: this machine was too slow for them and stood still for" in err
+    assert b"the flights are invalid: this machine was too slow for them, the host stalled for" in err
     assert b"agrees" not in out
