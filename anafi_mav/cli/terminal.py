@@ -12,6 +12,7 @@ import errno
 import io
 import json
 import math
+import os
 import sys
 from collections.abc import Callable, Container, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple, TextIO
@@ -178,6 +179,22 @@ def _write(stream: TextIO, line: str, style: str) -> None:
             encoding = stream.encoding or "utf-8"  # a terminal without umlauts is no reason to end a flight
             print(line.encode(encoding, "backslashreplace").decode(encoding), file=stream, flush=True)
     except OSError as error:  # the reader may be gone (`anafi-mav | head`): no reason to end a flight
+        _discard(stream)
         if stream is sys.stdout and error.errno in _FULL and not _losses:
             _losses.append(f"stdout cannot be written: {error.strerror}")
             complain(_losses[0])
+
+
+def _discard(stream: TextIO) -> None:
+    """Empty the stream's buffer into the null device.
+
+    Python keeps there what could not be written and tries again when it ends: the exit status would be 120.
+    """
+    with contextlib.suppress(OSError, ValueError):
+        number = stream.fileno()
+        kept, null = os.dup(number), os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, number)
+        stream.flush()
+        os.dup2(kept, number)
+        os.close(kept)
+        os.close(null)

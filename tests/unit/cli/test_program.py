@@ -78,10 +78,23 @@ def test_program_with_closed_standard_streams_does_its_work(closed: str, tmp_pat
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full, which only Linux has")
-def test_output_on_a_full_disk_is_reported_and_an_error(tmp_path: Path) -> None:
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_output_on_a_full_disk_is_reported_and_an_error(unbuffered: str, tmp_path: Path) -> None:
+    environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
     words = [sys.executable, "-m", "anafi_mav", "keygen", "field", "--state", str(tmp_path)]
     assert subprocess.run(words, stdout=subprocess.DEVNULL).returncode == 0
     with Path("/dev/full").open("wb") as full:
-        done = subprocess.run([*words, "--show"], stdout=full, stderr=subprocess.PIPE, text=True)
+        done = subprocess.run([*words, "--show"], stdout=full, stderr=subprocess.PIPE, text=True, env=environment)
     assert done.returncode == 1
-    assert done.stderr.splitlines()[0] == "anafi-mav: stdout cannot be written: No space left on device"
+    assert done.stderr.splitlines() == ["anafi-mav: stdout cannot be written: No space left on device"]
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_reader_that_has_left_is_no_error(unbuffered: str, tmp_path: Path) -> None:
+    environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+    words = [sys.executable, "-m", "anafi_mav", "keygen", "field", "--state", str(tmp_path)]
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run(words, stdout=writer, stderr=subprocess.PIPE, text=True, env=environment)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (0, "")
