@@ -16,12 +16,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support import clock, flavours
+from support import clock, flavours, programs
 from support.conformance_items import ITEMS
 
 from anafi_mav.arsdk.link import watchdog
 
 clock.install()
+programs.install()
 
 # Whatever the user's shell says, the programs that tests start share compiled modules: without them each start of
 # anafi-mav compiles all of it again, which takes longer than most tests.

@@ -44,6 +44,8 @@ _computing: int | None = None
 """Identity of the thread whose loop runs callbacks, while no other process or thread can change anything."""
 _may_have_children = True
 """False from when no child process was left until the next one is started."""
+_groups: set[int] = set()
+"""Process groups beside our own that children are in."""
 
 
 def now() -> float:
@@ -57,22 +59,27 @@ def now() -> float:
 
 
 def childless() -> bool:
-    """Whether no process that this one has started is left."""
+    """Whether no process that this one has started is left, in its own process group and in those of `_groups`."""
     global _may_have_children
     if not _may_have_children:
         return True
-    try:
-        os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT)
-    except ChildProcessError:
-        _may_have_children = False
-        return True
-    return False
+    for group in (os.getpgrp(), *_groups):
+        try:
+            os.waitid(os.P_PGID, group, os.WEXITED | os.WNOHANG | os.WNOWAIT)
+        except ChildProcessError:
+            _groups.discard(group)
+        else:
+            return False
+    _may_have_children = False
+    return True
 
 
-def _note_child() -> None:
-    """A process is started: from now on the kernel is asked whether it is left."""
+def note_child(group: int | None = None) -> None:
+    """A process is started: from now on the kernel is asked whether it is left; in a process group of its own here."""
     global _may_have_children
     _may_have_children = True
+    if group is not None:
+        _groups.add(group)
 
 
 class Turns:
@@ -285,13 +292,13 @@ def turns() -> Iterator[Turns]:
 def install() -> None:
     """From here on `time.monotonic`, which event loops read, is this clock."""
     time.monotonic = now
-    os.register_at_fork(after_in_parent=_note_child)
+    os.register_at_fork(after_in_parent=note_child)
     start = subprocess.Popen.__init__
 
     def noted_start(self: Any, *args: Any, **options: Any) -> None:
         try:
             start(self, *args, **options)
         finally:
-            _note_child()
+            note_child()
 
     subprocess.Popen.__init__ = noted_start

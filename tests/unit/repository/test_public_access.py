@@ -22,6 +22,7 @@ OTHERS = {
     "support/video_server.py": {"_updated": "a class in this module"},
     "clients/dronekit_ground.py": {"_capabilities": "dronekit has no event for them"},
     "interop/olympe_base.py": {"_name_": "Olympe's enums"},
+    "support/programs.py": {"_execute_child": "subprocess has no other place where a process is started for it"},
     "support/whep.py": {"_connection": "aiortc has no option for the address of its sockets"},
     "interop/olympe_device.py": {
         "_value_": "Olympe's enums",
