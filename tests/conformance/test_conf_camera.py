@@ -415,7 +415,8 @@ async def test_conf_089_recording_runs_and_ends(flavour: str, model: str) -> Non
         assert await command(w.client, STOP_VIDEO, 0) == ACCEPTED
 
 
-async def test_conf_089_recording_that_ends_by_itself_is_a_text() -> None:
+@pytest.mark.parametrize("is_state_first", [False, True])
+async def test_conf_089_recording_that_ends_by_itself_is_a_text(is_state_first: bool) -> None:
     async with world() as w:
         await enter(w.client, VIDEO)
         assert await command(w.client, START_VIDEO, 0, 0) == ACCEPTED
@@ -424,8 +425,12 @@ async def test_conf_089_recording_that_ends_by_itself_is_a_text() -> None:
         w.drone.inject(camera_messages.RecordingProgress(0, results.ERROR_BAD_STATE, ""))  # it goes on
         await w.client.wait("HEARTBEAT")
         assert not texts(w.client, mark)
-        w.drone.inject(camera_messages.RecordingProgress(0, results.STOPPED_NO_STORAGE_SPACE, ""))
-        w.drone.inject(camera_messages.RecordingState(0, Availability.AVAILABLE, State.INACTIVE, 0))
+        ends = (
+            camera_messages.RecordingProgress(0, results.STOPPED_NO_STORAGE_SPACE, "9"),
+            camera_messages.RecordingState(0, Availability.AVAILABLE, State.INACTIVE, 0),
+        )
+        for end in reversed(ends) if is_state_first else ends:
+            w.drone.inject(end)
         text = await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Recording ended"), since=mark)
         assert text.severity == dialect.MAV_SEVERITY_WARNING
 
@@ -439,6 +444,19 @@ async def test_recording_on_a_full_storage_is_refused_at_once(model: str) -> Non
         mark = w.client.mark()
         assert await command(w.client, START_VIDEO, 0, 0) == REJECTED
         assert any("storage space" in text for text in texts(w.client, mark))
+
+
+@pytest.mark.parametrize("model", ["4k", "ai"])
+async def test_recording_just_after_another_one_counts_from_its_own_begin(model: str) -> None:
+    async with world(model=model) as w:
+        await enter(w.client, VIDEO)
+        assert await command(w.client, START_VIDEO, 0, 5) == ACCEPTED
+        await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.recording_time_ms > 2000)
+        assert await command(w.client, STOP_VIDEO, 0) == ACCEPTED
+        assert await command(w.client, START_VIDEO, 0, 0) == ACCEPTED
+        status = await request(w.client, "CAMERA_CAPTURE_STATUS")
+        assert status.video_status
+        assert status.recording_time_ms < 1000
 
 
 async def test_late_end_of_a_recording_is_not_that_of_the_next_one() -> None:

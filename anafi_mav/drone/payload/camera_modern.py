@@ -351,7 +351,12 @@ def photo_news(m: Any) -> CaptureUpdate | None:
 
 
 def recording_news(m: Any) -> CaptureUpdate | None:
-    """Return the progress that a recording event reports, or None."""
+    """Return the progress that a recording event reports, or None.
+
+    The state begins and ends nothing: it has no media id.
+    """
+    if isinstance(m, wire.State):
+        return None
     if m.type == wire.RecordingEvent.START:
         return CaptureUpdate(m.camera_id, CaptureProgress.STARTED)
     if m.type != wire.RecordingEvent.STOP:
@@ -546,7 +551,7 @@ class ModernCamera:
 
     zoom_event: type[Message] = wire.ZoomLevel
     photo_events: tuple[type[Message], ...] = (wire.Photo,)
-    recording_events: tuple[type[Message], ...] = (wire.Recording,)
+    recording_events: tuple[type[Message], ...] = (wire.Recording, wire.State)
     photo_news = staticmethod(photo_news)
     recording_news = staticmethod(recording_news)
     camera_of = staticmethod(camera_of)

@@ -129,15 +129,23 @@ class CaptureService(Service):
 
     def _on_recording(self, message: events.Message, now: float) -> None:
         update = Camera.recording_update(message)
-        if update is None:
-            return
-        if update.progress is CaptureProgress.STARTED:
+        if update is not None and update.progress is CaptureProgress.STARTED:
             self._recording_failure = ""
             if self._recording_since is None:
                 self._recording_since = now
-        else:  # the state decides whether it runs: this may be a late report about the recording before
+        elif update is not None:  # the state decides whether it runs: this may be a late report about the one before
             self._recording_failure = update.reason
+            if update.media and self._recording_since is None and not self._records:
+                self._end_recording()  # the state was reported first
+        self._follow_recording(now)
         self._send_changed()
+
+    def _follow_recording(self, now: float) -> None:
+        """Note the begin and the end of a recording by the reported state."""
+        if self._recording_since is None:
+            self._recording_since = self._found_recording(now)
+        elif not self._records:
+            self._end_recording()
 
     def _end_recording(self) -> None:
         """Note the end of the recording; one that no command has ended is a text."""
@@ -155,10 +163,7 @@ class CaptureService(Service):
 
     def tick(self, now: float) -> float:
         self._reporter.tick(now, is_series=self._photos.is_series)
-        if self._recording_since is None:
-            self._recording_since = self._found_recording(now)
-        elif not self._records:
-            self._end_recording()
+        self._follow_recording(now)
         self._send_changed()
         for channel, (interval, due) in tuple(self._rates.items()):
             if not self._records:
