@@ -200,9 +200,13 @@ class ShotTracker:
         return lost
 
     def _open(self, update: CaptureUpdate, now: float) -> list[CapturedShot]:
-        """Begin a capture, unless one is under way; return lost pictures of an earlier one."""
-        if self._now.is_open:
+        """Begin a capture, unless one is under way; return lost pictures of an earlier one.
+
+        One of another camera is over, although its end was not reported: a drone takes photos with one at a time.
+        """
+        if self._now.is_open and self._now.camera == update.camera:
             return []
+        self._now.end(now)
         lost = self._before.report_all(is_saved=False)
         self._before, self._now = self._now, _Capture(self._now.number + 1, now, update.camera, is_open=True)
         return lost

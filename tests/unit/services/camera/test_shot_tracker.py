@@ -184,6 +184,17 @@ def test_last_picture_of_a_series_is_stored_after_the_next_photo_has_begun() -> 
     assert tracker.receive(saved("b", 1), 3.5) == [CapturedShot(2, 1, 3.2, True)]
 
 
+def test_photo_of_another_camera_is_one_of_its_own() -> None:
+    """The end of the photo before was not reported: a thermal mode has ended it."""
+    tracker = ShotTracker()
+    feed(tracker, (1.0, STARTED, None), (1.2, TAKEN, None))
+    assert tracker.receive(CaptureUpdate(2, STARTED), 3.0) == []
+    tracker.receive(CaptureUpdate(2, TAKEN), 3.2)
+    assert tracker.camera == 2
+    assert tracker.receive(CaptureUpdate(2, SAVED, "b"), 3.4) == [CapturedShot(2, 1, 3.2, True)]
+    assert tracker.expire(3.0 + LOST, is_series=False) == [CapturedShot(1, 1, 1.2, False)]
+
+
 def test_failure_before_the_shutter_is_one_lost_picture() -> None:
     tracker = ShotTracker()
     assert feed(tracker, (1.0, FAILED, None)) == []  # a photo that never began
