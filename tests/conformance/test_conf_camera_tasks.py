@@ -11,6 +11,7 @@ import pytest
 from support import camera_commands
 from support.cameras import ACCEPTED, PHOTO, VIDEO, command, enter, photos, press, request, shoot, texts, videos
 from support.ext_params import CHOICE, fetch, write
+from support.fault_scenarios import watched
 from support.flavours import both
 from support.mav import CAMERA, Client
 from support.missions import ACTIVE, PAUSED, put, start, state, takeoff, way
@@ -154,6 +155,40 @@ async def test_series_that_a_thermal_mode_ends_restores_its_settings() -> None:
         await w.drone.wait_log(lambda e: e.name == camera_messages.SetPhotoMode.NAME and e.args["mode"] == 0, 5.0)
         restored = [entry.args for entry in w.commands(camera_messages.SetPhotoMode.NAME)][-1]
         assert (restored["cam_id"], restored["mode"]) == (0, camera_messages.CameraPhotoMode.SINGLE)
+
+
+async def test_series_that_a_thermal_mode_ends_without_a_link_restores_its_settings() -> None:
+    async with world(model="thermal", speed=1.0) as w:
+        await enter(w.client, PHOTO)
+        assert await command(w.client, dialect.MAV_CMD_IMAGE_START_CAPTURE, 0, 2, 0) == ACCEPTED
+        w.drone.faults.mute = True
+        await watched(6.0)
+        press(w, thermal_messages.SetMode(ThermalMode.BLENDED))
+        await watched(1.0)
+        w.drone.faults.mute = False
+        await w.drone.wait_log(lambda e: e.name == camera_messages.SetPhotoMode.NAME and e.args["mode"] == 0, 20.0)
+        assert w.commands(camera_messages.SetPhotoMode.NAME)[-1].args["cam_id"] == 0
+
+
+async def test_photo_of_another_camera_ends_a_series_whose_end_was_not_reported() -> None:
+    """It is reported as any other, and the settings of before the series are those of its own camera."""
+    unreported = frozenset((camera_messages.PhotoProgress.NAME, camera_messages.PhotoState.NAME))
+    results = camera_messages.PhotoResult
+    async with world(model="thermal", speed=1.0) as w:
+        await enter(w.client, PHOTO)
+        assert await command(w.client, dialect.MAV_CMD_IMAGE_START_CAPTURE, 0, 2, 0) == ACCEPTED
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", since=0)
+        w.drone.faults.unreported = unreported
+        press(w, thermal_messages.SetMode(ThermalMode.BLENDED))
+        await watched(1.0)
+        w.drone.faults.unreported = frozenset()
+        blended, mark = min(w.gateway.systems[0].drone.camera.state.active), w.client.mark()
+        for result, count, media in ((results.TAKING_PHOTO, 0, ""), (results.PHOTO_TAKEN, 1, "")):
+            w.drone.inject(camera_messages.PhotoProgress(blended, result, count, media))
+        await w.drone.wait_log(lambda e: e.name == camera_messages.SetPhotoMode.NAME and e.args["mode"] == 0, 5.0)
+        assert w.commands(camera_messages.SetPhotoMode.NAME)[-1].args["cam_id"] == 0
+        w.drone.inject(camera_messages.PhotoProgress(blended, results.PHOTO_SAVED, 1, "9"))
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", since=mark)
 
 
 async def test_camera_source_of_a_model_without_thermal_camera_is_unsupported() -> None:

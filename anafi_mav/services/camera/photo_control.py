@@ -27,6 +27,8 @@ SERIES = (PhotoMode.TIME_LAPSE, PhotoMode.GPS_LAPSE)
 class PhotoSeries:
     """A series that a command began, or begins."""
 
+    camera: int
+    """The camera that takes it."""
     limit: int | None
     """Pictures after which it is ended."""
     restore: PhotoSettings | None
@@ -54,13 +56,15 @@ class PhotoControl:
         """
         self._commands = asyncio.Lock()
         series, self._series, self._restoring = self._series, None, None
-        if series is None or series.generation != self.host.memory.generation or not self.is_series:
+        if series is None or series.generation != self.host.memory.generation:
             return
-        if self.camera.taking:
+        camera = self.host.drone.camera[series.camera]
+        if camera.photo is None or camera.photo.mode not in SERIES:
+            return
+        if camera.taking:
             series.has_begun, self._series = True, series
-        elif series.restore is not None:
-            id = self.host.drone.camera.active_id
-            self._restoring = self.host.spawn(self._restore_photo(series.restore, id))
+        else:
+            self._restore(series)
 
     @property
     def camera(self) -> CameraState:
@@ -81,17 +85,17 @@ class PhotoControl:
         series = self._series
         if series is None or update.is_refused:
             return
-        if update.progress in (CaptureProgress.STARTED, CaptureProgress.TAKEN):
+        is_own = update.camera == series.camera  # else another camera takes photos, and the series is over
+        if is_own and update.progress in (CaptureProgress.STARTED, CaptureProgress.TAKEN):
             series.has_begun = True
-        if update.progress is CaptureProgress.TAKEN and series.limit is not None and taken >= series.limit:
+        if is_own and update.progress is CaptureProgress.TAKEN and series.limit is not None and taken >= series.limit:
             series.limit = None
-            self.host.spawn(self._end_series())
+            self.host.spawn(self._end_series(series.camera))
         is_saved = update.progress is CaptureProgress.SAVED and update.is_last and is_present
-        ended = is_saved or update.progress is CaptureProgress.ENDED
-        if (ended and series.has_begun) or update.progress is CaptureProgress.FAILED:
+        ended = not is_own or is_saved or update.progress is CaptureProgress.ENDED
+        if (ended and series.has_begun) or (is_own and update.progress is CaptureProgress.FAILED):
             self._series = None
-            if series.restore is not None:
-                self._restoring = self.host.spawn(self._restore_photo(series.restore, update.camera))
+            self._restore(series)
 
     # Commands.
 
@@ -105,9 +109,9 @@ class PhotoControl:
             self._require_photo()
             if self.is_series:
                 require_free(self.host.vehicle, texts.PHOTO)
-                await self._shoot_series(PhotoSeries(1, None, self.host.memory.generation))
+                await self._shoot_series(1, None)
             else:
-                await self._shoot()
+                await self._shoot(self.host.drone.camera.active_id)
 
     async def begin_series(self, mode: PhotoMode, interval: float | None, limit: int | None) -> None:
         """Begin a series; the settings are restored at its end.
@@ -123,8 +127,7 @@ class PhotoControl:
             is_set = before is not None and before.mode is mode and interval in (None, before.interval)
             if not is_set:
                 await self._set_series(mode, interval)
-            restore = None if is_set else before
-            await self._shoot_series(PhotoSeries(limit, restore, self.host.memory.generation))
+            await self._shoot_series(limit, None if is_set else before)
 
     async def follow_distance(self, distance: float) -> None:
         """Take a photo each `distance` m, in place of a series under way."""
@@ -176,19 +179,20 @@ class PhotoControl:
             raise Refused(texts.PHOTO, texts.CAMERA_TAKES_PHOTOS)
         require_storage(self.host.drone, texts.PHOTO)
 
-    async def _shoot(self) -> None:
-        await self.host.drone.camera.take_photo(self.host.drone.camera.active_id, until_saved=False)
+    async def _shoot(self, camera: int) -> None:
+        await self.host.drone.camera.take_photo(camera, until_saved=False)
 
-    async def _shoot_series(self, series: PhotoSeries) -> None:
-        """Begin it; its pictures, and its end, may be reported before this returns."""
-        self._series = series
+    async def _shoot_series(self, limit: int | None, restore: PhotoSettings | None) -> None:
+        """Begin a series; its pictures, and its end, may be reported before this returns."""
+        camera = self.host.drone.camera.active_id
+        series = self._series = PhotoSeries(camera, limit, restore, self.host.memory.generation)
         try:
-            await self._shoot()
+            await self._shoot(camera)
         except AnafiMavError:
             if self._series is series:
                 self._series = None
-                if series.restore is not None:
-                    await self._restore_photo(series.restore, self.host.drone.camera.active_id)
+                if restore is not None:
+                    await self._restore_photo(restore, camera)
             raise
 
     async def _set_series(self, mode: PhotoMode, interval: float | None) -> None:
@@ -203,12 +207,17 @@ class PhotoControl:
         else:
             self.host.text(Severity.NOTICE, texts.PHOTO_INTERVAL.fill(seconds=settings.interval))
 
-    async def _end_series(self) -> None:
+    async def _end_series(self, camera: int) -> None:
         """End the series that has all its pictures."""
         try:
-            await self.host.drone.camera.stop_photo(self.host.drone.camera.active_id)
+            await self.host.drone.camera.stop_photo(camera)
         except AnafiMavError as error:
             self.host.text(Severity.WARNING, texts.PHOTO_SERIES_FAILED.fill(error=texts.from_below(error)))
+
+    def _restore(self, series: PhotoSeries) -> None:
+        """Restore the settings of before a series that has ended."""
+        if series.restore is not None:
+            self._restoring = self.host.spawn(self._restore_photo(series.restore, series.camera))
 
     async def _restore_photo(self, settings: PhotoSettings, camera: int) -> None:
         try:
