@@ -32,9 +32,11 @@ from support.fault_scenarios import (
 )
 from support.params import write
 from support.setpoints import POSITION_ONLY, VELOCITY_ONLY, local, streaming
-from support.world import ARMED, World, world
+from support.world import ARMED, HOME, World, world
 
+from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3, common, rth
+from anafi_mav.drone.piloting.moves import MoveEnd
 from anafi_mav.sim import SimulatedDrone
 from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.sim.world.quirks import Quirk
@@ -190,6 +192,28 @@ async def test_hold_is_accepted_after_a_goto_whose_end_is_never_reported(lands: 
         stopped = w.drone.pose.north
         await watched(3.0)
         assert abs(w.drone.pose.north - stopped) < 1.0
+
+
+async def test_goto_whose_end_is_never_reported_ends_for_its_caller_with_the_stop() -> None:
+    """The end that is reported after all is not that of a later goto to the same place."""
+    async with world(speed=1.0) as w:
+        await w.take_off(5.0)
+        piloting = w.gateway.systems[0].drone.piloting
+        place = (*geo.destination(*HOME[:2], 80.0, 0.0), 5.0)
+        began = now()
+        move = await piloting.move_to(*place)
+        await flies(w, "flying", began)
+        w.drone.faults.unreported = frozenset({MOVED_TO})
+        await watched(0.5)
+        await piloting.stop()
+        assert await asyncio.wait_for(move.result(), 0.5) is MoveEnd.CANCELED
+        again = asyncio.ensure_future(piloting.move_to(*place))
+        await flies(w, "flying", now())
+        late = ardrone3.MoveToChanged(*place, ardrone3.OrientationMode.NONE, 0.0, ardrone3.MoveToStatus.CANCELED)
+        w.drone.inject(late)
+        await watched(0.5)
+        assert not again.done()
+        again.cancel()
 
 
 async def test_landing_that_is_reported_late_is_not_ended_by_an_older_stream() -> None:

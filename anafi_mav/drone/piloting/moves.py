@@ -333,6 +333,13 @@ class Moves:
             self._stray_until = now + STRAY_FOR
         move.end(MoveEnd.CANCELED)
 
+    def end_cancelled(self) -> None:
+        """The moveTo that was cancelled is over; the drone may still report its end."""
+        move, self._cancelling = self._cancelling, None
+        if move is not None:
+            self._note_unanswered(move)
+            move.end(MoveEnd.CANCELED)
+
     def aborted(self) -> None:
         """The drone has had an abort, and had time to answer."""
         self.aborting = False

@@ -420,6 +420,7 @@ class Piloting(PilotingSettings):
             hover.close()
         if not move_to.future.done() and self.state.flying == FlyingState.HOVERING:
             self.set_state(replace(self.state, move_to=None))
+            self._moves.end_cancelled()
             move_to.succeed(True)
 
     def _stop_following(self, state: PilotingState) -> None:
