@@ -362,27 +362,37 @@ def _fly(items: Sequence[Item], version: Version, start: Start, cursor: Cursor) 
 def _way_up(items: Sequence[Item], first: int, jumps: Mapping[int, int]) -> Sequence[int]:
     """Return the items flown up to the one that says how high to rise from the ground.
 
-    They begin with `first`. Empty when there is nowhere to fly to. Jumps are followed as in flight, each once.
+    They begin with `first`; each is listed once. Empty when there is nowhere to fly to. Jumps are followed as in
+    flight, each once.
     """
-    way: list[int] = []
-    followed: set[int] = set()
+    way: dict[int, None] = {}
+    passed: dict[int, int] = {}
+    """Items that lead on from now on, and a later item that they lead to: a long way is not walked again and again."""
     number = first
     while number < len(items):
-        here, item, row = number, items[number], TABLE[items[number].command]
-        way.append(here)
+        item, row = items[number], TABLE[items[number].command]
+        is_again = number in way
+        way[number] = None
         if item.command == mav_enums.MAV_CMD_NAV_TAKEOFF or row.place:
-            return way
-        if row.ends:
+            return [*way]
+        is_endless = item.command == DO_JUMP and item.params[1] == _ENDLESS
+        if row.ends or (is_endless and is_again):
             return ()
-        number += 1
-        if item.command == DO_JUMP:
-            often = item.params[1] or 0.0
-            if here not in followed and (often == _ENDLESS or jumps.get(here, 0) < often):
-                number = int(item.params[0] or 0.0)
-            elif often == _ENDLESS:
-                return ()
-            followed.add(here)
+        following = number + 1
+        if not is_endless:
+            passed[number] = following
+        if is_endless or (item.command == DO_JUMP and jumps.get(number, 0) < (item.params[1] or 0.0)):
+            following = int(item.params[0] or 0.0)
+        number = _behind(passed, following)
     return ()
+
+
+def _behind(passed: dict[int, int], number: int) -> int:
+    """Return the first item from a number on that has not been passed; shorten the way to it."""
+    while (later := passed.get(number)) is not None:
+        passed[number] = passed.get(later, later)
+        number = later
+    return number
 
 
 def _height_named(item: Item, height: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import chain
@@ -15,7 +16,7 @@ from support.plan_samples import LAT, LON, action, waypoint
 from anafi_mav import mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.formats.parrot import Version
-from anafi_mav.plans.plan import DO_JUMP, GLOBAL, GLOBAL_INT, RELATIVE, TERRAIN, Item, Loss
+from anafi_mav.plans.plan import DO_JUMP, GLOBAL, GLOBAL_INT, MAX_ITEMS, RELATIVE, TERRAIN, Item, Loss
 from anafi_mav.plans.rules.rule import Fidelity
 from anafi_mav.plans.rules.rules import TABLE
 from anafi_mav.plans.translation.translate import (
@@ -245,6 +246,16 @@ def test_start_at_a_jump_to_the_return_rises_nowhere() -> None:
     items = [waypoint(1, 0), action(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH), action(DO_JUMP, 1.0, 1.0)]
     with pytest.raises(PlanError, match="no place to fly to"):
         translate(items, 1, GROUND, 2)
+
+
+def test_longest_mission_of_jumps_is_examined_at_once() -> None:
+    """Each jump leads back to the begin; the items before it are not looked at again for each."""
+    half = MAX_ITEMS // 2
+    speed, back = action(mav_enums.MAV_CMD_DO_CHANGE_SPEED, 1.0, 5.0, -1.0), action(DO_JUMP, 0.0, 1.0)
+    items = [*[speed] * half, *[back] * (half - 1), waypoint(1, 0)]
+    began = time.process_time()
+    assert examine(items, 1).faults == ()
+    assert time.process_time() - began < 2.0
 
 
 def test_a_jump_without_end_is_flown_file_after_file() -> None:
