@@ -299,6 +299,7 @@ class Commander:
 
         Raises `CommandTimeout` about `what`, or the error of a stop command that failed.
         """
+        require_number(timeout)
         pending_stops = list(self.pending_stops)
         if not pending_stops:
             return

@@ -15,7 +15,7 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages.proto import antiflicker as mains
 from anafi_mav.arsdk.messages.proto import camera2
 from anafi_mav.drone.element import Reducer
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, require_number
 from anafi_mav.drone.payload import camera_classic, camera_modern
 from anafi_mav.drone.payload.camera_classic import ClassicCamera
 from anafi_mav.drone.payload.camera_enums import (
@@ -474,6 +474,7 @@ class Camera(Commanding[CamerasState]):
 
         `first` is the timeout, s; each report restarts it with `next` s, unless that is None.
         """
+        require_number(next)
 
         def listen(message: Any) -> Any:
             update = read(message)

@@ -255,6 +255,7 @@ class ReturnHome:
         self._abortion = None
 
     async def return_home(self, timeout: float) -> Move | None:
+        require_number(timeout)
         self._commander.require_link()
         if self._home.state.returning and not self._moves.aborting:
             return None
@@ -304,6 +305,7 @@ class ReturnHome:
         return not move.answer.future.done()
 
     async def cancel_return_home(self, timeout: float, *, even_its_own: bool = False) -> bool:
+        require_number(timeout)
         self._commander.require_link()
         home = self._home.state
         if home.returning_by_itself and not even_its_own:

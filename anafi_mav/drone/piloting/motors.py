@@ -14,7 +14,7 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.drone.element import Element
-from anafi_mav.drone.expectation import Commander, loop_time
+from anafi_mav.drone.expectation import Commander, loop_time, require_number
 from anafi_mav.drone.piloting.state import MOTORS_OFF, PilotingState, in_state
 from anafi_mav.drone.piloting.stick_stream import StickStream
 from anafi_mav.drone.sent_commands import AUTOMATIC, QUIET, TAKEN_OFF, Phase, SentCommand, Slot
@@ -204,6 +204,7 @@ class Motors:
         return ", ".join(self._takeoff_blockers()) or otherwise
 
     async def land(self, timeout: float) -> None:
+        require_number(timeout)
         self._commander.require_link()
         self._commander.abort_pending("the drone is to land")
         if self._lands and not self.about_to_fly:

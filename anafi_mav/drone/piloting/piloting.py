@@ -26,7 +26,7 @@ from anafi_mav.arsdk.messages.ardrone3 import FlyingState, MoveToStatus, Orienta
 from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.drone.element import Reducer
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation, loop_time
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation, loop_time, require_number
 from anafi_mav.drone.piloting.guided_moves import GuidedMoves, ReturnHome
 from anafi_mav.drone.piloting.landing import LandingEnd
 from anafi_mav.drone.piloting.motors import Motors
@@ -374,6 +374,7 @@ class Piloting(PilotingSettings):
 
         A hover that lasts confirms that of a moveTo, too: the report of its end may be missing.
         """
+        require_number(timeout)
         answers, move_to = [], None
         if (self._moves.to is not None and self._moves.to.running) or self.state.move_to == MoveToStatus.RUNNING:
             move_to = self._commander.expect((ardrone3.MoveToChanged,), _ends_move_to)

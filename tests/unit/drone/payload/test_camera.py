@@ -248,6 +248,13 @@ async def test_verbs_that_an_older_camera_lacks_are_not_supported(drone: Drone) 
 PROGRESS = old.PhotoResult
 
 
+async def test_photo_with_a_timeout_of_nan_raises_and_is_not_taken(device: ScriptedDevice, drone: Drone) -> None:
+    device.script[old.TakePhoto] = lambda _: [old.PhotoProgress(0, PROGRESS.TAKING_PHOTO, 0, "")]
+    with pytest.raises(LocalProtocolError, match="timeout"):
+        await drone.camera.take_photo(timeout=NAN)
+    assert device.got(old.TakePhoto) == []
+
+
 async def test_a_photo_is_done_when_it_is_stored(device: ScriptedDevice, drone: Drone) -> None:
     device.script[old.TakePhoto] = lambda _: [
         old.PhotoState(0, old.Availability.AVAILABLE, old.State.ACTIVE),

@@ -241,6 +241,9 @@ async def test_timeout_of_nan_raises_and_sends_nothing(drone: Drone, device: Scr
     before = len(device.received)
     for call in (
         drone.piloting.land(timeout=math.nan),
+        drone.piloting.stop(timeout=math.nan),
+        drone.piloting.return_home(timeout=math.nan),
+        drone.piloting.cancel_return_home(timeout=math.nan),
         drone.piloting.move_by(1.0, 0.0, 0.0, 0.0, timeout=math.nan),
         drone.piloting.move_to(48.8, 2.3, 5.0, timeout=math.nan),
         drone.wait_for(FlyingState.LANDED, timeout=math.nan),
