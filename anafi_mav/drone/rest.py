@@ -35,10 +35,6 @@ WHOLE_TIMEOUT = 60.0
 """s for all of an answer that is read as a whole: the start of a mission waits for some. The longest list of media
 takes half of it at 5 Mbit/s."""
 
-WHOLE_TIMEOUT = 60.0
-"""s for all of an answer that is read as a whole: the start of a mission waits for some. The longest list of media
-takes half of it at 5 Mbit/s."""
-
 CONNECTIONS = 8
 """At a time: two files, notifications, a list, a checksum and a flight plan, which must not wait for them."""
 
