@@ -224,6 +224,23 @@ async def test_drone_whose_stations_were_lost_on_the_ground_does_not_take_off() 
         await w.take_off(5.0)
 
 
+async def test_take_off_that_is_reported_after_the_loss_of_the_stations_is_acted_against() -> None:
+    """It was commanded before the loss, and nothing else would act in the air."""
+    beat = dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+    async with world(speed=1.0) as w:
+        await write(w.client, "ANF_GCS_LOSS", 2, dialect.MAV_PARAM_TYPE_INT32)
+        await write(w.client, "ANF_GCS_LOSS_T", 2.0)
+        w.drone.faults.late = {ardrone3.FlyingStateChanged.NAME: 1.5}
+        mark = w.client.mark()
+        w.client.send(beat)
+        await watched(1.0)
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        w.client.send_command(dialect.MAV_CMD_NAV_TAKEOFF, x=0.0, y=0.0, z=20.0)
+        await w.drone.wait_log(lambda e: e.name == "rth.return_to_home", 10.0)
+        found = [m.text for _, m in w.client.since(mark, "STATUSTEXT") if m.text.startswith("No ground station")]
+        assert found == ["No ground station for 2 s", "No ground station for 2 s: return"]
+
+
 async def test_stall_of_the_host_is_no_silence_of_the_ground_station() -> None:
     async with world() as w:
         await write(w.client, "ANF_GCS_LOSS", 2, dialect.MAV_PARAM_TYPE_INT32)

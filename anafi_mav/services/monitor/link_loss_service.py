@@ -21,14 +21,20 @@ from anafi_mav.vehicle.vehicle import Landed
 RETRY = 10.0
 """s until an action that has failed is tried again: a bad link, or a lost GPS fix, may be better by then."""
 
+LOOK_EVERY = 1.0
+"""s between two looks at a drone whose stations were lost while it was not in the air."""
+
 
 class LaterAction(NamedTuple):
-    """An action for a loss that has failed, or that a return precedes."""
+    """An action for a loss that is to be tried later.
+
+    It has failed, a return precedes it, or the drone was not in the air.
+    """
 
     at: float
     """When it is tried next."""
-    epoch: int
-    """Of the vehicle's control: what was commanded since has priority."""
+    epoch: int | None
+    """Of the vehicle's control: what was commanded since has priority. None: the drone was not in the air."""
 
 
 class LinkLossService(Service):
@@ -57,9 +63,11 @@ class LinkLossService(Service):
             self._lost(policy.after)
         elif self._later is not None and now >= self._later.at:
             later, self._later = self._later, None
-            is_newest = later.epoch == self.host.vehicle.control.epoch
+            is_newest = later.epoch in (None, self.host.vehicle.control.epoch)
             if is_newest and self._watch.lost and policy.action is not LossAction.NOTHING:
-                if self.host.vehicle.mode is FlightMode.RETURN:
+                if later.epoch is None and not self._is_in_air:
+                    self._later = later._replace(at=now + LOOK_EVERY)
+                elif later.epoch is not None and self.host.vehicle.mode is FlightMode.RETURN:
                     self._later = later._replace(at=now + RETRY)
                 else:
                     self._lost(policy.after)
@@ -77,10 +85,16 @@ class LinkLossService(Service):
         if silence is not None:
             self._lost(round(silence, 1))
 
+    @property
+    def _is_in_air(self) -> bool:
+        return self.host.vehicle.landed in (Landed.IN_AIR, Landed.TAKEOFF)
+
     def _lost(self, seconds: float) -> None:
         vehicle, policy = self.host.vehicle, self.host.vehicle.gcs_loss
-        if vehicle.landed not in (Landed.IN_AIR, Landed.TAKEOFF):
+        if not self._is_in_air:
             self.host.text(Severity.WARNING, texts.STATION_LOST.fill(seconds=seconds))
+            # A take-off may be on its way to the drone, or a landing be ended.
+            self._later = LaterAction(self.host.clock.monotonic() + LOOK_EVERY, None)
         elif vehicle.mode is FlightMode.RETURN:
             self.host.text(Severity.WARNING, texts.STATION_LOST_STATE.fill(seconds=seconds, state=texts.RETURNS))
             if policy.action is LossAction.LAND:  # the return may end in a hover
