@@ -281,6 +281,23 @@ async def test_conf_087_series_goes_on_after_a_lost_link_and_ends_as_commanded(e
         assert len(photos(w)[0].resources) <= 8
 
 
+async def test_conf_087_series_whose_end_was_lost_with_the_link_is_ended_after_it() -> None:
+    async with world(speed=1.0) as w:
+        await enter(w.client, PHOTO)
+        assert await command(w.client, START_PHOTO, 0, 2, 2) == ACCEPTED
+        taken = camera_messages.PhotoProgress(0, camera_messages.PhotoResult.PHOTO_TAKEN, 2, "")
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", since=0, timeout=10.0)
+        w.drone.faults.up = Impairment(loss=1.0)
+        w.drone.inject(taken)
+        await watched(0.5)
+        assert w.gateway.systems[0].drone.camera[0].taking
+        w.drone.faults.mute = True
+        await watched(6.0)
+        w.drone.faults.up = Impairment()
+        await lose_link(w, 1.0)
+        await w.drone.wait_log(lambda e: e.kind == "command" and e.name == "camera.stop_photo", 10.0)
+
+
 async def test_conf_087_long_series_is_listed_when_it_has_grown(monkeypatch: pytest.MonkeyPatch) -> None:
     """A list names all pictures of the series: with each of them it would take the radio of the flight."""
     count = 30

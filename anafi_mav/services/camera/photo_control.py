@@ -37,6 +37,8 @@ class PhotoSeries:
     """Of the host's memory: which drone takes it."""
     has_begun: bool = False
     """The drone has reported its begin; an end before that is another photo's."""
+    ending: asyncio.Task[None] | None = None
+    """Ends it when it has all its pictures; tried again with the next picture."""
 
 
 class PhotoControl:
@@ -88,9 +90,9 @@ class PhotoControl:
         is_own = update.camera == series.camera  # else another camera takes photos, and the series is over
         if is_own and update.progress in (CaptureProgress.STARTED, CaptureProgress.TAKEN):
             series.has_begun = True
-        if is_own and update.progress is CaptureProgress.TAKEN and series.limit is not None and taken >= series.limit:
-            series.limit = None
-            self.host.spawn(self._end_series(series.camera))
+        is_full = is_own and series.limit is not None and taken >= series.limit
+        if is_full and update.progress is CaptureProgress.TAKEN and (series.ending is None or series.ending.done()):
+            series.ending = self.host.spawn(self._end_series(series.camera))
         is_saved = update.progress is CaptureProgress.SAVED and update.is_last and is_present
         ended = not is_own or is_saved or update.progress is CaptureProgress.ENDED
         if (ended and series.has_begun) or (is_own and update.progress is CaptureProgress.FAILED):
