@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fault_scenarios import goto
 from support.flavours import both
 from support.gimbal import (
     CONFIGURE,
@@ -463,6 +464,26 @@ async def test_angles_while_a_region_begins_free_the_gimbal(is_command: bool) ->
         await looks(w, pitch_absolute=20.0)
         starts = [entry.args["mode"] for entry in w.commands("ardrone3.Piloting.StartPilotedPOIV2")]
         assert starts == [PoiMode.LOCKED_GIMBAL, PoiMode.FREE_GIMBAL]
+
+
+@pytest.mark.parametrize("is_command", [True, False])
+async def test_angles_while_a_goto_ends_for_a_region_keep_the_gimbal(is_command: bool) -> None:
+    """The region has been commanded before them, and begins after them."""
+    async with world(speed=1.0) as w:
+        await w.take_off(6.0)
+        assert await goto(w, 200.0, 6.0) == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 10.0, 20.0)
+        w.drone.faults.up = w.drone.faults.down = Impairment(delay=0.3)
+        w.client.send_command(ROI, x=EAST[0], y=EAST[1], z=0.0, frame=6)
+        await w.drone.wait_log(lambda e: e.name == "ardrone3.Piloting.CancelMoveTo", 5.0)
+        if is_command:
+            assert (await w.client.command(PITCHYAW, 20.0, NAN, NAN, NAN, x=LEVEL)).result == ACCEPTED
+        else:
+            pitch = math.radians(20.0)
+            w.client.send(dialect.MAVLink_gimbal_manager_set_pitchyaw_message(1, 1, LEVEL, 1, pitch, NAN, NAN, NAN))
+        start = await w.drone.wait_log(lambda e: e.name == "ardrone3.Piloting.StartPilotedPOIV2", 5.0)
+        assert start.args["mode"] == PoiMode.FREE_GIMBAL
+        await looks(w, pitch_absolute=20.0)
 
 
 async def test_conf_139_mount_commands_and_messages_have_the_same_signs() -> None:

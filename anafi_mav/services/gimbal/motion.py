@@ -191,6 +191,7 @@ class GimbalMotion:
                     self._command.cancel()  # a newer target replaces it
                 self._command = self._host.spawn(self._free())
             return
+        self._roi.free_prepared()
         self._apply(client, target, drop)
 
     def _apply(self, client: ClientId, target: GimbalTarget, drop: Drop) -> None:

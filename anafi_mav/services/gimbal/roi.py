@@ -221,6 +221,7 @@ class RegionOfInterest(PlainTask):
         Sends nothing for a region that ends: the drone frees the gimbal by itself, and until it has reported that, the
         gimbal would turn to the region and look as if it obeyed.
         """
+        self.free_prepared()
         if self._update is not None:
             await asyncio.wait({self._update})
         while (region := self._region) is not None and region.starting is not None and region.freeing is None:
@@ -240,6 +241,11 @@ class RegionOfInterest(PlainTask):
             if self._region is not None:
                 raise
             await self._released()
+
+    def free_prepared(self) -> None:
+        """Let the region that is about to begin leave the gimbal to a newer target."""
+        if self._prepared is not None:
+            self._prepared.mode = PoiMode.FREE_GIMBAL
 
     async def _released(self) -> None:
         """Return when the drone reports that it does not aim the gimbal. Raises `CommandTimeout`."""
