@@ -154,6 +154,19 @@ async def test_turn_is_not_accepted_by_the_late_end_of_a_like_one_before_it_can_
         assert math.degrees(w.drone.pose.yaw - heading) > 38.0
 
 
+async def test_turn_that_is_faster_than_commanded_is_accepted_although_it_replaced_another_one() -> None:
+    """As of a drone with a limit of its own, and of a simulator whose time is accelerated."""
+    async with world(speed=4.0) as w:
+        await w.take_off(5.0)
+        began, mark = now(), w.client.mark()
+        w.client.send_command(YAW, 60, 20, 1, 1)
+        await flies(w, "flying", began)
+        w.client.send_command(YAW, 45, 30, 1, 1)
+        while (YAW, ACCEPTED) not in (found := results(w.client, mark)):
+            await until(w.client, mark, len(found) + 1)
+        assert found[0] == (YAW, CANCELLED)
+
+
 @pytest.mark.parametrize("command", [(SET_MODE, *BRAKE), (dialect.MAV_CMD_DO_PAUSE_CONTINUE, 0), (RTL,)])
 async def test_unconfirmed_stop_does_not_return_the_drone_to_an_older_stream(command: tuple[float, ...]) -> None:
     async with world(speed=1.0, flavour="ardupilot") as w:

@@ -62,6 +62,8 @@ FASTEST = 16.0
 and another limit is given."""
 _FASTEST_CLIMB, _FASTEST_TURN = 6.0, 3.5
 """m/s and rad/s that no ANAFI exceeds: a moveBy takes longer than its offset at these."""
+_ON_ITS_WAY = 1.0
+"""s after a moveBy was given up here in which the drone may still complete it: what ends it there is on its way."""
 
 
 class MoveEnd(enum.Enum):
@@ -111,7 +113,7 @@ class Move:
         """The wait of the verb that started it."""
         self.target = target
         self.offset = offset
-        self.turn_rate = _FASTEST_TURN if turn_rate is None else min(turn_rate, _FASTEST_TURN)
+        self.turn_rate = turn_rate
         self.begun = asyncio.get_running_loop().time()
         """When it was about to be sent, s."""
         self.echo: Position | None = None
@@ -138,17 +140,18 @@ class Move:
         if not self.ended.done():
             self.ended.set_result(how)
 
-    @property
-    def earliest_end(self) -> float:
-        """When a moveBy can be over at the earliest (s).
+    def earliest_end(self, *, by_rate: bool) -> float:
+        """Return when a moveBy can be over at the earliest (s).
 
-        At the speed of the fastest drone, and as near to its end as counts as there.
+        At the speed of the fastest drone, and as near to its end as counts as there. `by_rate`: a drone that keeps to
+        the limit of the turn; some turn faster, and so does a simulated one whose time is accelerated.
         """
         if (offset := self.offset) is None:
             return self.begun
+        rate = min(self.turn_rate, _FASTEST_TURN) if by_rate and self.turn_rate is not None else _FASTEST_TURN
         length, angle = _TINY
         over_ground = (math.hypot(offset.front, offset.right) - length) / FASTEST
-        climb, turn = (abs(offset.down) - length) / _FASTEST_CLIMB, (abs(offset.turn) - angle) / self.turn_rate
+        climb, turn = (abs(offset.down) - length) / _FASTEST_CLIMB, (abs(offset.turn) - angle) / rate
         return self.begun + max(over_ground, climb, turn, 0.0)
 
     def is_to(self, message: ardrone3.MoveToChanged) -> bool:
@@ -245,6 +248,11 @@ class Moves:
         self._ended: deque[tuple[Position, float]] = deque(maxlen=MAX_UNANSWERED)
         """Targets of moveTos that the drone has ended, and when: it may report that twice."""
         self._stray_until = 0.0
+        self._given_up: deque[tuple[Displacement | None, float]] = deque(maxlen=MAX_UNANSWERED)
+        """Offsets of moveBys that the drone may have completed, and until when it may report that.
+
+        None: of one that is not ours.
+        """
         self.inherited = True
         """True when a moveBy of an earlier connection may be under way.
 
@@ -322,16 +330,21 @@ class Moves:
         for move in moves:
             move.answer.fail(CommandRejected(why))
             move.end(MoveEnd.CANCELED)
-        if moves:
-            self._stray_until = now + STRAY_FOR
+            self._note_given_up(move, now)
         return moves
 
     def drop_by(self, move: Move, now: float) -> None:
         """The verb of this moveBy has given it up."""
         if move in self.by:
             self.by.remove(move)
-            self._stray_until = now + STRAY_FOR
+            self._note_given_up(move, now)
         move.end(MoveEnd.CANCELED)
+
+    def _note_given_up(self, move: Move, now: float) -> None:
+        """Expect the end of a moveBy that is not awaited any longer."""
+        self._stray_until = now + STRAY_FOR
+        if move.earliest_end(by_rate=True) <= now + _ON_ITS_WAY:
+            self._given_up.append((move.offset, self._stray_until))
 
     def end_cancelled(self) -> None:
         """The moveTo that was cancelled is over; the drone may still report its end."""
@@ -349,8 +362,10 @@ class Moves:
 
         The event of one that is not ours is not about ours.
         """
-        self.inherited = False
         self._stray_until = now + STRAY_FOR
+        if self.inherited:
+            self._given_up.append((None, self._stray_until))
+        self.inherited = False
 
     def clear(self, how: MoveEnd) -> None:
         """All have ended, as far as we are concerned."""
@@ -362,6 +377,7 @@ class Moves:
         self.by.clear()
         self._unanswered.clear()
         self._ended.clear()
+        self._given_up.clear()
         self._stray_until = 0.0
         self.aborting = False
         self.inherited = True
@@ -452,7 +468,8 @@ class Moves:
         """Return True when this event belongs to a moveBy that was cancelled before the present one.
 
         Nothing but a newer moveBy interrupts one, a move that asks for more than a drone tells from nothing does not
-        succeed by staying, and none is flown faster than a drone flies, or than it was to turn.
+        succeed by staying, and none is flown faster than a drone flies. One that turns faster than it was to turn is
+        that of a like one, if there was any.
         """
         if now >= self._stray_until:
             return False
@@ -463,7 +480,8 @@ class Moves:
         went_nowhere = max(abs(message.dX), abs(message.dY), abs(message.dZ), abs(message.dPsi)) < _NO_MOVE
         move = self.by[0]
         offset = move.offset
-        is_early = now < move.earliest_end and not _is_short(message, offset)
+        may_be_late = any(now < until and (one is None or not _is_short(message, one)) for one, until in self._given_up)
+        is_early = now < move.earliest_end(by_rate=may_be_late) and not _is_short(message, offset)
         return is_early or (went_nowhere and not _is_tiny(offset)) or _leads_elsewhere(message, offset)
 
     def on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
