@@ -463,6 +463,18 @@ async def test_recording_on_a_full_storage_is_refused_at_once(model: str) -> Non
         assert any("storage space" in text for text in texts(w.client, mark))
 
 
+async def test_recording_is_not_refused_by_the_late_end_of_another_one() -> None:
+    """The drone has ended that for a change of its settings; such an end may have no media."""
+    reconfigured = camera_messages.RecordingResult.STOPPED_RECONFIGURED
+    async with world(speed=1.0) as w:
+        await enter(w.client, VIDEO)
+        w.drone.faults.up = w.drone.faults.down = Impairment(delay=0.3)
+        started = asyncio.ensure_future(command(w.client, START_VIDEO, 0, 0))
+        await asyncio.sleep(0.1)
+        w.drone.inject(camera_messages.RecordingProgress(0, reconfigured, ""))
+        assert await started == ACCEPTED
+
+
 @pytest.mark.parametrize("model", ["4k", "ai"])
 async def test_recording_just_after_another_one_counts_from_its_own_begin(model: str) -> None:
     async with world(model=model) as w:

@@ -200,9 +200,7 @@ class Camera(Commanding[CamerasState]):
         def judge(update: CaptureUpdate) -> bool | AnafiMavError | None:
             if update.progress is CaptureProgress.STARTED:
                 return True
-            # The older feature reports a full storage as the end of a recording that never began, without a media.
-            has_ended = update.progress is CaptureProgress.ENDED and update.reason != "" and not update.media
-            is_refused = update.progress is CaptureProgress.FAILED or has_ended
+            is_refused = update.progress is CaptureProgress.FAILED or update.is_refused
             return CommandRejected(f"recording: {update.reason}") if is_refused else None
 
         command = speech.start_recording(id)

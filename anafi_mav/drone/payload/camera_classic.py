@@ -335,16 +335,17 @@ def photo_news(m: Any) -> CaptureUpdate | None:
 def recording_news(m: Any) -> CaptureUpdate | None:
     """Return the progress that a recording event reports, or None.
 
-    The state alone ends nothing: the media id arrives with the progress.
+    The state alone ends nothing: the media id arrives with the progress. A full storage is reported as the end of a
+    recording that never began, without a media.
     """
     if isinstance(m, wire.RecordingState):
         return CaptureUpdate(m.cam_id, CaptureProgress.STARTED) if m.state == State.ACTIVE else None
     if m.result == RecordingResult.STARTED:
         return CaptureUpdate(m.cam_id, CaptureProgress.STARTED)
     if m.result in _STORED:
-        return CaptureUpdate(
-            m.cam_id, CaptureProgress.ENDED, m.media_id, "" if m.result == RecordingResult.STOPPED else spoken(m.result)
-        )
+        reason = "" if m.result == RecordingResult.STOPPED else spoken(m.result)
+        refused = m.result == RecordingResult.STOPPED_NO_STORAGE_SPACE and not m.media_id
+        return CaptureUpdate(m.cam_id, CaptureProgress.ENDED, m.media_id, reason, is_refused=refused)
     return CaptureUpdate(m.cam_id, CaptureProgress.FAILED, reason=spoken(m.result))
 
 

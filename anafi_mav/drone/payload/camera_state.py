@@ -282,4 +282,7 @@ class CaptureUpdate(msgspec.Struct, frozen=True):
     is_last: bool = False
     """SAVED: it is also the end of the photo or series."""
     is_refused: bool = False
-    """FAILED: a command was refused for the camera's state; a photo that is being taken goes on."""
+    """FAILED: a command was refused for the camera's state; a photo that is being taken goes on.
+
+    ENDED: the recording never began.
+    """
