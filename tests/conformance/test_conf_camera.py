@@ -281,6 +281,24 @@ async def test_conf_087_series_goes_on_after_a_lost_link_and_ends_as_commanded(e
         assert len(photos(w)[0].resources) <= 8
 
 
+async def test_conf_087_settings_that_the_end_of_the_link_kept_from_being_restored_are_restored_after_it() -> None:
+    async with world(speed=1.0) as w:
+        await enter(w.client, PHOTO)
+        before = sim_value(w.drone, "CAM_PHOTOMODE")
+        w.drone.faults.up = w.drone.faults.down = Impairment(delay=0.3)
+        assert await command(w.client, START_PHOTO, 0, 2, 0) == ACCEPTED
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", since=0, timeout=10.0)
+        assert await command(w.client, STOP_PHOTO, 0) == ACCEPTED
+        mark = w.client.mark()
+        w.drone.faults.mute = True
+        await watched(6.0)
+        assert sim_value(w.drone, "CAM_PHOTOMODE") == TIME_LAPSE
+        await lose_link(w, 1.0)
+        await photo_mode_shown(w.client, before, mark)
+        assert sim_value(w.drone, "CAM_PHOTOMODE") == before
+        assert not texts(w.client, mark)
+
+
 async def test_conf_087_series_whose_end_was_lost_with_the_link_is_ended_after_it() -> None:
     async with world(speed=1.0) as w:
         await enter(w.client, PHOTO)

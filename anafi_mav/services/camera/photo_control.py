@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from anafi_mav import texts
 from anafi_mav.drone.payload.camera_enums import CameraMode, PhotoMode
 from anafi_mav.drone.payload.camera_state import CameraState, CaptureProgress, CaptureUpdate, PhotoSettings
-from anafi_mav.errors import AnafiMavError
+from anafi_mav.errors import AnafiMavError, LinkLost
 from anafi_mav.services.camera.camera_targets import require_free, require_idle, require_storage
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.base.refusal import Refused
@@ -32,13 +32,15 @@ class PhotoSeries:
     limit: int | None
     """Pictures after which it is ended."""
     restore: PhotoSettings | None
-    """Photo settings to restore at its end."""
+    """Photo settings to restore at its end; None: none, or they are restored."""
     generation: int
     """Of the host's memory: which drone takes it."""
     has_begun: bool = False
     """The drone has reported its begin; an end before that is another photo's."""
     ending: asyncio.Task[None] | None = None
     """Ends it when it has all its pictures; tried again with the next picture."""
+    restoring: asyncio.Task[None] | None = None
+    """Restores the photo settings once it has ended; the next photo waits for it."""
 
 
 class PhotoControl:
@@ -48,25 +50,27 @@ class PhotoControl:
         self.host = host
         self._commands = asyncio.Lock()
         self._series: PhotoSeries | None = None
-        self._restoring: asyncio.Task[None] | None = None
-        """Restores the settings of before a series that has ended; the next photo waits for it."""
+        self._ended: PhotoSeries | None = None
+        """The last one that has ended."""
 
     def link_up(self) -> None:
         """Go on with the series of an earlier connection.
 
-        Restore its settings if it has ended meanwhile.
+        Restore its settings if it has ended meanwhile, or has ended as the link was lost.
         """
         self._commands = asyncio.Lock()
-        series, self._series, self._restoring = self._series, None, None
+        under_way, ended, self._series, self._ended = self._series, self._ended, None, None
+        unrestored = None if ended is None or ended.restore is None else ended
+        series = under_way or unrestored
         if series is None or series.generation != self.host.memory.generation:
             return
         camera = self.host.drone.camera[series.camera]
         if camera.photo is None or camera.photo.mode not in SERIES:
             return
-        if camera.taking:
-            series.has_begun, self._series = True, series
-        else:
+        if not camera.taking:
             self._restore(series)
+        elif series is under_way or not series.has_begun:  # else another one
+            series.has_begun, self._series = True, series
 
     @property
     def camera(self) -> CameraState:
@@ -167,8 +171,8 @@ class PhotoControl:
 
     async def _restored(self) -> None:
         """Wait until the settings of before the last series are restored."""
-        if self._restoring is not None:
-            await asyncio.wait({self._restoring})
+        if self._ended is not None and self._ended.restoring is not None:
+            await asyncio.wait({self._ended.restoring})
 
     def _require_photo(self) -> None:
         """Refuse a photo that cannot be taken in this mode, or not be stored."""
@@ -193,8 +197,8 @@ class PhotoControl:
         except AnafiMavError:
             if self._series is series:
                 self._series = None
-                if restore is not None:
-                    await self._restore_photo(restore, camera)
+                self._restore(series)
+                await self._restored()
             raise
 
     async def _set_series(self, mode: PhotoMode, interval: float | None) -> None:
@@ -218,11 +222,19 @@ class PhotoControl:
 
     def _restore(self, series: PhotoSeries) -> None:
         """Restore the settings of before a series that has ended."""
+        self._ended = series
         if series.restore is not None:
-            self._restoring = self.host.spawn(self._restore_photo(series.restore, series.camera))
+            series.restoring = self.host.spawn(self._restore_photo(series, series.restore))
 
-    async def _restore_photo(self, settings: PhotoSettings, camera: int) -> None:
+    async def _restore_photo(self, series: PhotoSeries, settings: PhotoSettings) -> None:
+        """Restore photo settings.
+
+        Without a link they are left to be restored at the next connection.
+        """
         try:
-            await self.host.drone.camera.set_photo(replace(settings, megapixels=None), camera)
+            await self.host.drone.camera.set_photo(replace(settings, megapixels=None), series.camera)
+        except LinkLost:
+            return
         except AnafiMavError as error:
             self.host.text(Severity.WARNING, texts.PHOTO_MODE_KEPT.fill(error=texts.from_below(error)))
+        series.restore = None
