@@ -17,6 +17,10 @@ from anafi_mav.drone.payload.camera_state import CaptureProgress, CaptureUpdate
 COUNT = 256
 """The drone's count of pictures is modulo this (u8)."""
 
+OLDER = 4
+"""Pictures by which a count may be older than the last one at the begin of a connection: pictures are stored after the
+next ones are taken. Otherwise such a count is one of many pictures that were taken without a connection."""
+
 MOST = 1000
 """Pictures that wait for a report: a burst has 14, and those of a series leave while it lasts."""
 
@@ -70,13 +74,15 @@ class _Capture:
         """Return how many pictures a count adds; none for one that is older than the last."""
         more = (count - self.taken) % COUNT
         if self.reported is None:
+            if more >= COUNT - OLDER:
+                return 0
             self.taken += max(more - 1, 0)  # without a connection
             return min(more, 1)
         return more if more < COUNT // 2 else 0
 
     def take(self, pictures: int, now: float) -> None:
         """Add pictures, spread over the time since the last report."""
-        if self.reported is None:
+        if self.reported is None and pictures:
             self.reported = self.taken
         step = (now - self.since) / max(pictures, 1)
         room = max(MOST - len(self.shots), 0)

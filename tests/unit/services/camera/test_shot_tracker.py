@@ -114,6 +114,7 @@ def test_series_under_way_at_the_begin_of_a_connection_has_no_pictures_of_before
     """`number` of the picture, by hand: 50 is 306 modulo 256. 0: there is none."""
     tracker = ShotTracker(3)
     tracker.join(0, taken, 10.0)
+    assert tracker.receive(saved("a", (taken - 1) % 256), 11.0) == []  # stored late, and taken before
     feed(tracker, (12.0, TAKEN, count))
     expected = [CapturedShot(4, number, 12.0, True)] if number else []
     assert tracker.receive(saved("a", count), 12.3) == expected
