@@ -327,6 +327,8 @@ async def test_conf_076_breach_during_a_takeoff_is_acted_upon_when_the_drone_hov
         await w.client.heartbeat(lambda beat: beat.custom_mode == mode, since=mark, timeout=10.0)
         if action == "land":
             await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
+            await w.client.wait("FENCE_STATUS", lambda m: not m.breach_status)
+            assert "Inside the fence again" not in texts(w.client, mark)
         assert max(e.args["up"] for e in w.drone.log if e.kind == "pose") < 10.0
 
 

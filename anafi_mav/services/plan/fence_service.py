@@ -216,14 +216,17 @@ class FenceService(Service):
             return
         before = watch.state
         blind, breaches = watch.blind, watch.breaches
-        action = watch.look(self._sight(now), now)
+        sight = self._sight(now)
+        action = watch.look(sight, now)
         if watch.blind and not blind:
             self.host.text(Severity.WARNING, texts.FENCE_BLIND)
         if watch.breaches != breaches:
             self._breach_ms = self.host.times().boot_ms
         if action is not None:
             self._begin(action)
-        elif before is State.OUTSIDE and watch.state is not State.OUTSIDE:
+        elif (
+            before is State.OUTSIDE and watch.state is not State.OUTSIDE and sight.airborne
+        ):  # else it has landed there
             self.host.text(Severity.NOTICE, texts.FENCE_INSIDE)
         self._tell()
 
