@@ -25,7 +25,7 @@ from anafi_mav.arsdk.messages import ardrone3, common, drone_manager, rth, skyct
 from anafi_mav.arsdk.messages import flight_plan as modern_plan
 from anafi_mav.arsdk.messages.animation import Type as AnimationType
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, PoiStatus
-from anafi_mav.arsdk.messages.common import PlayingState
+from anafi_mav.arsdk.messages.common import MavlinkType, PlayingState
 from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState as Connection
 from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.arsdk.messages.proto import device_manager
@@ -163,6 +163,7 @@ class Drone:
         self.piloting = Piloting(self._commander, self.home, self.takeoff_blockers)
         self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over, self._stand_by)
         self.piloting.pilot_has_source = lambda: self.controller.pilot_has_source
+        self.piloting.plan_ended = self._plan_ended
         self.flight_plan.model = lambda: self._model
         self.piloting.is_modern = lambda: self._model.protobuf
         self._commander.gate = self._allows
@@ -193,6 +194,7 @@ class Drone:
             **self.piloting.reactions(),
             **self.controller.reactions(),
             **self.streams.reactions(),
+            ardrone3.FlyingStateChanged: self._flying_state_says,
             common.MavlinkFilePlayingStateChanged: self._plan_says,
             common.StartingErrorEvent: self._commander.sent.attribute,
             common.Disconnection: self._on_dismissal,
@@ -535,6 +537,17 @@ class Drone:
         if state.drone_serial and self._announced_serial not in ("", state.drone_serial):
             return f"the Skycontroller is connected to another drone, {state.drone_serial}"
         return None
+
+    def _flying_state_says(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
+        self.piloting.on_flying_state(message, now)
+        if self.piloting.state.plan is None and self.flight_plan.state.playing == PlayingState.PLAYING:
+            self._plan_ended(PlayingState.STOPPED)  # on the ground
+
+    def _plan_ended(self, state: PlayingState) -> None:
+        """Handle the end of a flight plan that the drone does not report as if it had reported it."""
+        plan = self.flight_plan.state
+        kind = MavlinkType.FLIGHT_PLAN if plan.type is None else plan.type
+        self._handle(common.MavlinkFilePlayingStateChanged(state, plan.uid or "", kind), loop_time())
 
     def _plan_says(self, message: common.MavlinkFilePlayingStateChanged, now: float) -> None:
         self.piloting.on_plan(message)

@@ -30,12 +30,15 @@ from support.fault_scenarios import (
     until,
     watched,
 )
+from support.missions import ACTIVE, on_the_way, put, start, state, takeoff, way
+from support.missions import LAND as LAND_ITEM
 from support.params import write
 from support.setpoints import POSITION_ONLY, VELOCITY_ONLY, local, streaming
-from support.world import ARMED, HOME, World, world
+from support.world import ARMED, HOLD, HOME, World, world
 
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3, common, rth
+from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.drone.piloting.moves import MoveEnd
 from anafi_mav.sim import SimulatedDrone
 from anafi_mav.sim.world.faults import Impairment
@@ -48,10 +51,11 @@ ROI, YAW, ALTITUDE = (
 )
 BRAKE = (1, 17)
 FORCED = 21196
-FLYING, MOVED_BY, MOVED_TO = (
+FLYING, MOVED_BY, MOVED_TO, PLAYING = (
     ardrone3.FlyingStateChanged.NAME,
     ardrone3.MoveByEnd.NAME,
     ardrone3.MoveToChanged.NAME,
+    common.MavlinkFilePlayingStateChanged.NAME,
 )
 FAR = local(POSITION_ONLY, at=(80.0, 0.0, -21.0))
 AHEAD = local(POSITION_ONLY, frame=dialect.MAV_FRAME_BODY_OFFSET_NED, at=(60.0, 0.0, 0.0))
@@ -227,6 +231,60 @@ async def test_goto_whose_end_is_never_reported_ends_for_its_caller_with_the_sto
         await watched(0.5)
         assert not again.done()
         again.cancel()
+
+
+@pytest.mark.parametrize("answer", [None, PlayingState.PAUSED, PlayingState.PLAYING])
+async def test_hold_of_a_mission_whose_pause_is_not_reported_is_what_the_drone_then_says(
+    answer: PlayingState | None,
+) -> None:
+    """It is asked for its states. Where these do not mention the plan, a hover counts."""
+    async with world(speed=1.0, web=True) as w:
+        await on_the_way(w, 2)
+        (uid,) = {e.args["filepath"] for e in w.drone.log if e.name == PLAYING}
+        w.drone.faults.unreported = frozenset({PLAYING})
+        mark = w.client.mark()
+        w.client.send_command(SET_MODE, *PX4_HOLD)
+        await w.drone.wait_log(lambda e: e.name == common.AllStates.NAME, 5.0, since=now())
+        if answer is not None:
+            w.drone.faults.unreported = frozenset()
+            w.drone.inject(common.MavlinkFilePlayingStateChanged(answer, uid, common.MavlinkType.FLIGHT_PLAN))
+            w.drone.faults.unreported = frozenset({PLAYING})
+        result = FAILED if answer is PlayingState.PLAYING else ACCEPTED
+        assert await until(w.client, mark, 1) == [(SET_MODE, result)]
+        await w.drone.wait_log(lambda e: e.name == FLYING and e.args["state"].name == "HOVERING", 10.0)
+        if answer is not PlayingState.PLAYING:
+            await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
+            assert await goto(w, 40.0, 8.0) == ACCEPTED  # it has the drone again
+
+
+async def test_mission_that_landed_without_a_report_of_its_end_has_ended() -> None:
+    async with world(speed=1.0, web=True) as w:
+        await put(w, [takeoff(5.0), way(8.0, 0.0, 5.0), LAND_ITEM])
+        await start(w)
+        await state(w, ACTIVE, seq=1)
+        began = now()
+        w.drone.faults.unreported = frozenset({PLAYING})
+        await flies(w, "landed", began)
+        await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED)
+        await w.take_off(5.0)  # then it holds, and flies no mission
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+
+
+async def test_hold_is_accepted_at_once_after_a_return_whose_end_on_the_ground_was_not_reported() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off(10.0)
+        assert await goto(w, 30.0, 10.0) == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 20.0, 20.0)
+        assert (await w.client.command(RTL)).result == ACCEPTED
+        w.drone.faults.unreported = frozenset({rth.State.NAME, ardrone3.NavigateHomeStateChanged.NAME})
+        assert (await w.client.command(LAND_CMD)).result == ACCEPTED
+        await flies(w, "landed", now())
+        await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED)
+        w.drone.faults.unreported = frozenset()
+        await w.take_off(5.0)
+        began = now()
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        assert now() - began < 0.5
 
 
 async def test_landing_that_is_reported_late_is_not_ended_by_an_older_stream() -> None:

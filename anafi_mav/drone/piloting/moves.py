@@ -493,6 +493,9 @@ class Moves:
                 self._cancelling.end(MoveEnd.CANCELED)
                 self._cancelling = None
             self.cancel_by("the motors are off", now)
+            if self.returning is not None and self.returning.running:
+                self.returning.end(MoveEnd.CANCELED)
+                self.returning = None
 
     def on_return(self, message: rth.State, now: float) -> None:
         """A return of ours goes on or ends, or has become one of the drone's own."""

@@ -57,6 +57,8 @@ class Piloting(PilotingSettings):
         self._moves = Moves(home)
         self.pilot_has_source: Callable[[], bool] = lambda: False
         """True while the pilot at a Skycontroller has the piloting source; set by `Drone`."""
+        self.plan_ended: Callable[[PlayingState], None] = lambda state: None
+        """Called when a flight plan is in this state, and the drone has not reported that; set by `Drone`."""
         self._sticks = StickStream(commander, self, home, lambda: self.pilot_has_source())
         self._motors = Motors(commander, self, self._sticks, takeoff_blockers)
         self._guided = GuidedMoves(commander, self, home, self._sticks, self._moves)
@@ -87,13 +89,13 @@ class Piloting(PilotingSettings):
         """Events to be shown to this element beyond its reducers."""
         return {
             **self._moves.reactions(),
-            ardrone3.FlyingStateChanged: self._on_flying_state,
             rth.State: self._returns.on_state,
             follow_me.State: lambda message, now: self._obeyed(follow_me.Stop),
             animation.State: lambda message, now: self._obeyed(animation.Cancel),
         }
 
-    def _on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
+    def on_flying_state(self, message: ardrone3.FlyingStateChanged, now: float) -> None:
+        """Follow the flying state, before `reactions`."""
         self._moves.on_flying_state(message, now)
         self._motors.on_flying_state(message, now)
         if message.state is FlyingState.LANDING:
@@ -372,17 +374,19 @@ class Piloting(PilotingSettings):
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """Hover, and return when the drone has confirmed the end of everything that was running.
 
-        A hover that lasts confirms that of a moveTo, too: the report of its end may be missing.
+        The report of an end may be missing. A hover that lasts confirms that of a moveTo, too. That of a flight plan is
+        confirmed by a hover after the drone was asked for its states and has not named it as playing.
         """
         require_number(timeout)
-        answers, move_to = [], None
+        answers, move_to, plan = [], None, None
         if (self._moves.to is not None and self._moves.to.running) or self.state.move_to == MoveToStatus.RUNNING:
             move_to = self._commander.expect((ardrone3.MoveToChanged,), _ends_move_to)
             answers.append(move_to)
         if self._moves.by:
             answers.append(self._commander.expect((ardrone3.MoveByEnd,), lambda message: True))
         if self.state.plan == PlayingState.PLAYING:
-            answers.append(self._commander.expect((common.MavlinkFilePlayingStateChanged,), _ends_playing))
+            plan = self._commander.expect((common.MavlinkFilePlayingStateChanged,), _ends_playing)
+            answers.append(plan)
         if self._moves.returning is not None and self._moves.returning.running:
             answers.append(self._commander.expect((rth.State,), self._returns.ends_ours))
         if self.state.following not in (None, FollowMeMode.NONE):
@@ -397,6 +401,9 @@ class Piloting(PilotingSettings):
             if move_to is not None:
                 await self._commander.stops_delivered("hover", timeout)
                 await self._wait_for_hover(move_to)
+            if plan is not None:
+                await self._commander.stops_delivered("hover", timeout)
+                await self._wait_for_end(plan)
             for answer in answers:
                 await answer.wait()
             # Of what was given up before it was confirmed no event may speak; but the order to stop has to arrive.
@@ -410,19 +417,42 @@ class Piloting(PilotingSettings):
 
         It is over when the drone has hovered for `QUIET` without a report.
         """
+        if await self._hovers_without(move_to):
+            self.set_state(replace(self.state, move_to=None))
+            self._moves.end_cancelled()
+            move_to.succeed(True)
+
+    async def _hovers_without(self, end: Expectation[bool]) -> bool:
+        """Return True when the drone has hovered for `QUIET` and has not reported this end."""
         hover = self._commander.expect(
             (ardrone3.FlyingStateChanged,), lambda message: True if message.state == FlyingState.HOVERING else None
         )
         try:
             if self.state.flying != FlyingState.HOVERING:
-                await asyncio.wait({move_to.future, hover.future}, return_when=asyncio.FIRST_COMPLETED)
-            await asyncio.wait({move_to.future}, timeout=QUIET)
+                await asyncio.wait({end.future, hover.future}, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait({end.future}, timeout=QUIET)
         finally:
             hover.close()
-        if not move_to.future.done() and self.state.flying == FlyingState.HOVERING:
-            self.set_state(replace(self.state, move_to=None))
-            self._moves.end_cancelled()
-            move_to.succeed(True)
+        return not end.future.done() and self.state.flying == FlyingState.HOVERING
+
+    async def _wait_for_end(self, plan: Expectation[bool]) -> None:
+        """Wait for the end of a flight plan for which the drone has received a Pause.
+
+        A drone that reports none is asked for its states. The plan has ended when it does not name it as playing and
+        then hovers: a hover alone may be one at a way point.
+        """
+        plays = self._commander.expect((common.MavlinkFilePlayingStateChanged,), lambda message: True)
+        states = self._commander.expect((common.AllStatesChanged,), lambda message: True)
+        try:
+            await asyncio.wait({plan.future}, timeout=QUIET)
+            if not plan.future.done():
+                self._home.request_states()
+                await asyncio.wait({plan.future, states.future}, return_when=asyncio.FIRST_COMPLETED)
+            if not plan.future.done() and await self._hovers_without(plan) and not plays.future.done():
+                self.plan_ended(PlayingState.PAUSED)
+        finally:
+            plays.close()
+            states.close()
 
     def _stop_following(self, state: PilotingState) -> None:
         if state.following not in (None, FollowMeMode.NONE):

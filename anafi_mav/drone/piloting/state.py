@@ -67,7 +67,7 @@ class PilotingState(msgspec.Struct, frozen=True):
     """Target of that moveTo; altitude above the take-off point."""
     poi: PoiStatus | None = None
     plan: PlayingState | None = None
-    """State of the flight plan."""
+    """State of the flight plan; None also after one whose end was not reported."""
     animation: animation.Type | None = None
     """The animation under way; NONE: none is flown."""
     following: FollowMeMode | None = None
@@ -151,13 +151,17 @@ def _move_to(state: PilotingState, message: ardrone3.MoveToChanged) -> PilotingS
 
 
 def _flying(state: PilotingState, message: ardrone3.FlyingStateChanged) -> PilotingState:
-    """Motors that stand end a moveTo, whose end may not be reported."""
-    is_over = message.state in MOTORS_OFF and state.move_to == MoveToStatus.RUNNING
+    """Motors that stand end a moveTo and a flight plan, whose ends may not be reported.
+
+    A plan that plays before the motors start has yet to begin.
+    """
+    stands = message.state in MOTORS_OFF
     return replace(
         state,
         flying=message.state,
         ready_for_hand_launch=state.ready_for_hand_launch and message.state == FlyingState.USERTAKEOFF,
-        move_to=None if is_over else state.move_to,
+        move_to=None if stands and state.move_to == MoveToStatus.RUNNING else state.move_to,
+        plan=None if stands and state.in_air and state.plan == PlayingState.PLAYING else state.plan,
     )
 
 

@@ -576,9 +576,6 @@ class MissionFlight(PlainTask):
         state = machine.state
         if state is State.ENDING or (state is State.FLYING_FILE and machine.progress.leg_done):
             self._handle(machine.reported(self._report()))
-        elif state is State.FLYING_FILE and self._vehicle.on_ground and machine.ending:
-            # It has landed at its last line, and reports neither that nor the end of its plan.
-            self._handle(machine.halted(stopped=True, report=self._report(), now=self._now))
 
     def _on_alarm(self) -> None:
         self._handle(self.machine.timeout(self._report()))
