@@ -380,7 +380,7 @@ class Drone:
         last = (*stops, *self.controller.hand_back_due)
         self._disconnected(reason, silent=True)
         for message in last:
-            token = session.send(message, unheard=True)
+            token = session.send(message, unheard=UNHEARD_FOR / len(last))
             asyncio.get_running_loop().call_later(UNHEARD_FOR, session.cancel, token)
 
     def _on_speaks(self, session: ControllerSession) -> None:

@@ -11,6 +11,7 @@ frame of that queue then begins with its rest, without a length (arsdk-ng libars
 from __future__ import annotations
 
 import enum
+import math
 import struct
 from collections import deque
 from typing import NamedTuple
@@ -189,13 +190,13 @@ class Waiting:
     `packed` counts the bytes that already are.
     """
 
-    __slots__ = ("command", "forever", "packed", "token", "yields")
+    __slots__ = ("command", "packed", "sendings", "token", "yields")
 
-    def __init__(self, token: int, command: bytes, forever: bool, *, yields: bool = False) -> None:
+    def __init__(self, token: int, command: bytes, sendings: float = math.inf, *, yields: bool = False) -> None:
         self.token = token
         self.command = command
-        self.forever = forever
-        """True when it is repeated until the link is down."""
+        self.sendings = sendings
+        """How often its frame is sent without an acknowledgement; infinite: until the link is down."""
         self.yields = yields
         """True when an urgent command that is sent later goes before it."""
         self.packed = 0

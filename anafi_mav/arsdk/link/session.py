@@ -154,7 +154,7 @@ class Session(asyncio.DatagramProtocol):
         rank: Rank = Rank.NORMAL,
         *,
         at_once: bool = False,
-        unheard: bool = False,
+        unheard: float = 0.0,
     ) -> int:
         """Send a message at the end of this event-loop iteration; the token is for `cancel`.
 

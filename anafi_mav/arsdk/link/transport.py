@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import enum
 import itertools
+import math
 import struct
 from collections import Counter, deque
 from collections.abc import Sequence
@@ -361,7 +362,7 @@ class Transport:
     # -- sending
 
     def send(
-        self, message: Message | UnknownMessage, now: float, rank: Rank = Rank.NORMAL, *, unheard: bool = False
+        self, message: Message | UnknownMessage, now: float, rank: Rank = Rank.NORMAL, *, unheard: float = 0.0
     ) -> int:
         """Queue a message; the token names it in `cancel`, `Delivered` and `Undelivered`.
 
@@ -369,7 +370,8 @@ class Transport:
         not delivered, in the same queue: its own (12) is read by no Parrot program that we know.
         `rank` is of an acknowledged message. In version 1 each takes a round trip of its own, and a stop must not wait
         behind a list of settings that a client loads.
-        `unheard`: it is sent to a silent peer, too, which may hear us; the caller cancels it.
+        `unheard` (s): it is sent to a silent peer, too, which may hear us; the caller cancels it. In version 1, where a
+        frame holds one command, the next one has its turn after this time at most, and without an acknowledgement.
         Raises `LocalProtocolError` when it cannot be encoded or is too long for its queue. On a link that is down
         the message is counted and forgotten.
         """
@@ -387,10 +389,10 @@ class Transport:
                 self.counters["dropped.noack"] += 1
             self._noack.append((token, data))
         else:
-            self._enqueue(buffer, token, data, rank)
+            self._enqueue(buffer, token, data, rank, unheard)
         return token
 
-    def _enqueue(self, buffer: Buffer, token: int, data: bytes, rank: Rank) -> None:
+    def _enqueue(self, buffer: Buffer, token: int, data: bytes, rank: Rank, unheard: float) -> None:
         if buffer is Buffer.HIGH_PRIO:
             # Nothing of before may follow it, nor may it wait for the acknowledgement of what is in flight.
             self.abandon("overtaken")
@@ -399,8 +401,12 @@ class Transport:
             self.counters["dropped.full"] += 1
             self._pending.append(Undelivered(token, "queue full"))
             return
-        forever = not self._gives_up or MessageId(*wire.HEADER.unpack_from(data)) in RETRIED_FOR_EVER
-        entry = Waiting(token, data, forever, yields=rank is Rank.SETTING)
+        sendings = math.inf
+        if self._silent and self.version == 1:
+            sendings = min(1.0 + MAX_RETRIES_V1, max(1.0, unheard // ACK_TIMEOUT))
+        elif self._gives_up and MessageId(*wire.HEADER.unpack_from(data)) not in RETRIED_FOR_EVER:
+            sendings = 1.0 + MAX_RETRIES_V1
+        entry = Waiting(token, data, sendings, yields=rank is Rank.SETTING)
         if buffer is not Buffer.HIGH_PRIO:
             place = len(queue.waiting)
             while (
@@ -447,7 +453,7 @@ class Transport:
         Each is (sequence number, bytes).
         """
         queue = self._queues[_ACK_ID[self.role]]
-        waiting = deque(Waiting(0, wire.encode(message), True) for message in messages)
+        waiting = deque(Waiting(0, wire.encode(message)) for message in messages)
         frames = []
         seq = queue.seq
         while waiting:
@@ -538,8 +544,8 @@ class Transport:
         return encode_frame(self.version, _WITHACK, queue.id, queue.seq, payload)
 
     def _give_up(self, queue: _AckQueue) -> None:
-        """Version 1, controller: a command is repeated five times, then the next one has its turn."""
-        if queue.sendings > MAX_RETRIES_V1 and not queue.flight[0].source.forever:
+        """Version 1, controller: a command is sent so often, then the next one has its turn."""
+        if queue.sendings >= queue.flight[0].source.sendings:
             self.counters["undelivered"] += 1
             self._pending.append(Undelivered(queue.flight[0].source.token, "no acknowledgement"))
             queue.land()

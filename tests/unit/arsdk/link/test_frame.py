@@ -118,7 +118,7 @@ def test_our_own_wrong_numbers_raise(version: int, seq: int) -> None:
 
 
 def waiting(*sizes: int) -> deque[Waiting]:
-    return deque(Waiting(token, bytes([token]) * size, True) for token, size in enumerate(sizes, 1))
+    return deque(Waiting(token, bytes([token]) * size) for token, size in enumerate(sizes, 1))
 
 
 def test_version_1_carries_one_command_per_frame() -> None:

@@ -14,6 +14,7 @@ from anafi_mav.arsdk.link.transport import (
     MAX_QUEUED,
     MAX_QUEUED_NOACK,
     MAX_REPLIES,
+    MAX_RETRIES_V1,
     Delivered,
     Event,
     Garbage,
@@ -650,6 +651,23 @@ def test_fading_link_drops_waiting_messages_and_recovers() -> None:
     transport.send(tilt(4.0), 12.0)
     (frame,) = frames(transport, transport.outgoing(12.0))
     assert (frame.seq, frame.payload[1:]) == (1, wire.encode(tilt(4.0)))
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_commands_to_a_silent_peer_are_all_sent_in_their_time(version: int) -> None:
+    """In version 1 each has a frame of its own, and no acknowledgement makes room for the next one."""
+    transport = Transport(Role.CONTROLLER, version, 0.0, ping_after=9.0, silence_limit=2.5, gives_up=False, fades=True)
+    assert Silent("nothing received for 2.5 s") in transport.expire(2.5)
+    stops = [ardrone3.CancelMoveTo(), ardrone3.MoveBy(0.0, 0.0, 0.0, 0.0), ardrone3.StopPilotedPOI(), tilt(1.0)]
+    for message in stops:
+        transport.send(message, 2.5, unheard=1.0)
+    sent: list[bytes] = []
+    for step in range(80):
+        now = 2.5 + 0.05 * step
+        transport.expire(now)
+        sent += [frame.payload for frame in frames(transport, transport.outgoing(now))]
+    for message in stops:
+        assert sum(wire.encode(message) in payload for payload in sent) > MAX_RETRIES_V1
 
 
 # What another process sends for us.
