@@ -18,7 +18,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.fault_scenarios import another_controller, watched
 from support.flavours import both
 from support.mav import NAN, Client
-from support.params import send_set, value_of
+from support.params import read, send_set, value_of
 from support.plans import ACCEPTED as TAKEN
 from support.plans import FENCE, RALLY, Item, around, circle, clear, content, download, rally, square, upload
 from support.setpoints import NO_ACCELERATION, NO_YAW, NO_YAW_RATE, allow_speed, engage, local, streaming
@@ -524,6 +524,29 @@ async def test_conf_143_do_fence_enable(flavour: str) -> None:
         await clear(client, FENCE)
         assert (await put(w, "ANF_FENCE_FLOOR", 0.0, 9)).param_value == 0.0
         await bits(client, False, False, True)
+
+
+async def test_conf_143_kinds_of_a_fence_and_its_switch_are_independent() -> None:
+    """As ArduPilot's FENCE_TYPE and FENCE_ENABLE: neither changes the other, and a command switches what is chosen."""
+    async with world(flavour="ardupilot") as w:
+        client, floor, polygon = w.client, 1 + 8, 1 + 4
+        assert (await upload(client, square(PLACE, 30.0), FENCE)).type == TAKEN
+        assert (await put(w, "ANF_FENCE_FLOOR", 3.0, 9)).param_value == 3.0
+        assert (await put(w, "FENCE_ENABLE", 0)).param_value == 0
+        assert (await put(w, "FENCE_TYPE", floor)).param_value == floor
+        assert (await read(client, "FENCE_ENABLE")).param_value == 0
+        await bits(client, True, False, True)
+        assert (await put(w, "FENCE_ENABLE", 1)).param_value == 1
+        assert (await read(client, "FENCE_TYPE")).param_value == floor
+        assert (await client.command(ENABLE, 1, 4)).result == DENIED
+        await said(client, "Fence refused: kind not in ANF_FENCE_TYPES")
+        await w.take_off()
+        far = around(PLACE, (60.0, 0.0))[0]
+        ack = await client.command(REPOSITION, -1, 1, 0, NAN, frame=6, x=far[0], y=far[1], z=5.0)
+        assert ack.result == ACCEPTED
+        assert (await put(w, "FENCE_TYPE", polygon)).param_value == polygon
+        ack = await client.command(REPOSITION, -1, 1, 0, NAN, frame=6, x=far[0], y=far[1], z=6.0)
+        assert ack.result == DENIED
 
 
 async def test_conf_076_a_motor_cut_needs_leave() -> None:

@@ -72,8 +72,8 @@ async def _enable(host: Host, value: float) -> None:
 FENCE_ENABLED = Parameter(
     "ANF_FENCE_ON",
     ParamType.INT32,
-    "An uploaded fence is in force",
-    read=lambda host: float(host.vehicle.fence.enabled),
+    "An uploaded fence is in force, with the kinds of boundaries in ANF_FENCE_TYPES",
+    read=lambda host: float(host.vehicle.fence.is_on),
     write=_enable,
     values=OFF_ON,
     polled=True,
@@ -85,13 +85,13 @@ FENCE_ENABLED = Parameter(
 
 
 def _put_types(host: Host, value: float) -> None:
-    host.vehicle.fence.types = int(value)
+    host.vehicle.fence.choose(int(value))
 
 
 FENCE_TYPES = Parameter(
     "ANF_FENCE_TYPES",
     ParamType.INT32,
-    "Kinds of boundaries in force",
+    "Kinds of boundaries of the fence, in force while it is on",
     read=lambda host: float(host.vehicle.fence.types),
     write=own(_put_types),
     put=_put_types,
@@ -188,10 +188,8 @@ async def _set_types(host: Host, value: float) -> None:
     types = int(value)
     if not types & CEILING:
         raise Refused(texts.FENCE, texts.CEILING_BIT, lasting=True)
-    watch = host.vehicle.fence
-    watch.disable(ZONES | HOME_CIRCLE | FLOOR)
     # Circles around home that were uploaded are zones like others; bit 1 is the drone's own circle of FENCE_RADIUS.
-    watch.enable((ZONES | HOME_CIRCLE if types & ZONES else 0) | types & FLOOR)
+    host.vehicle.fence.choose(CEILING | (ZONES | HOME_CIRCLE if types & ZONES else 0) | types & FLOOR)
     if bool(types & HOME_CIRCLE) != bool(host.drone.piloting.state.geofence):
         await host.drone.piloting.set_geofence(bool(types & HOME_CIRCLE))
 
@@ -201,7 +199,7 @@ _TYPE_WORDS = {CEILING: "ceiling", HOME_CIRCLE: "circle", ZONES: "polygon", FLOO
 FENCE_TYPE = Parameter(
     "FENCE_TYPE",
     ParamType.INT8,
-    "Kinds of boundaries enabled",
+    "Kinds of boundaries of the fence, and the drone's own circle",
     read=_types,
     write=_set_types,
     values={

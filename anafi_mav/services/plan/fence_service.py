@@ -174,7 +174,9 @@ class FenceService(Service):
         if vehicle.control.active is mission and not mission.flying:
             return True  # it has not begun
         flight, judgement = vehicle.control.epoch, self._judgement
-        fence = hash((watch.items.identity, watch.types, watch.action is Reaction.NONE)) if watch.fence.zones else None
+        fence = (
+            hash((watch.items.identity, watch.enabled, watch.action is Reaction.NONE)) if watch.fence.zones else None
+        )
         if judgement is None or judgement.flight != flight or judgement.fence != fence:
             is_first = judgement is None or judgement.flight != flight
             judgement = self._judgement = _WayJudgement(flight, fence, is_first)
@@ -317,6 +319,8 @@ class FenceService(Service):
         if what != ENABLE and wanted == CEILING:
             raise Refused(texts.FENCE, texts.CEILING_STAYS, lasting=True)
         if what == ENABLE:
+            if wanted != EVERYTHING and int(wanted) & ~watch.types:
+                raise Refused(texts.FENCE, texts.FENCE_KIND_NOT_CHOSEN, lasting=True)
             watch.enable(int(wanted))
         else:
             watch.disable(int(wanted))

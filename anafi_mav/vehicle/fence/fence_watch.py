@@ -250,7 +250,11 @@ class FenceWatch:
         self.action = Reaction.HOLD
         """PX4's default."""
         self.types = EVERYTHING
-        """Kinds of boundaries that are enabled."""
+        """Kinds of boundaries that are chosen."""
+        self._on = EVERYTHING
+        """Kinds that are switched on."""
+        self.enabled = EVERYTHING
+        """Kinds that are both."""
         self.predict = True
         """Act when the vehicle is too fast to stop before the boundary, not only when it is beyond."""
         self.floor = 0.0
@@ -279,21 +283,30 @@ class FenceWatch:
         self.items, self.fence = PlanItems(items), fence_of(items)
         self._sides, self.verdict = _sides(), None
 
+    def choose(self, types: int) -> None:
+        """Choose the kinds of boundaries that the fence has; which are switched on does not change."""
+        self.types, self.enabled = types, types & self._on
+
     def enable(self, types: int = EVERYTHING) -> None:
-        """Enable some kinds of boundaries."""
-        self.types |= types & EVERYTHING
+        """Switch some kinds of boundaries on; those that are not chosen stay without effect.
+
+        As in ArduPilot, whose FENCE_ENABLE and DO_FENCE_ENABLE leave FENCE_TYPE as it is (AC_Fence::enable).
+        """
+        self._on |= types & EVERYTHING
+        self.enabled = self.types & self._on
 
     def disable(self, types: int = EVERYTHING) -> None:
-        """Disable some kinds of boundaries."""
-        self.types &= ~types
+        """Switch some kinds of boundaries off."""
+        self._on &= ~types
+        self.enabled = self.types & self._on
 
     @property
-    def enabled(self) -> bool:
-        """True when some kind of boundary is enabled besides the ceiling.
+    def is_on(self) -> bool:
+        """True when some kind of boundary is switched on besides the ceiling.
 
-        The drone enforces the ceiling by itself, whatever is enabled.
+        The drone enforces the ceiling by itself, whatever is switched on.
         """
-        return bool(self.types & ~CEILING)
+        return bool(self._on & ~CEILING)
 
     @property
     def present(self) -> bool:
@@ -326,17 +339,17 @@ class FenceWatch:
     @property
     def zones(self) -> Fence:
         """Those that are enabled."""
-        if self.types & HOME_CIRCLE and self.types & ZONES:
+        if self.enabled & HOME_CIRCLE and self.enabled & ZONES:
             return self.fence
         return Fence(
             zone
             for zone in self.fence.zones
-            if self.types & (HOME_CIRCLE if isinstance(zone, CircleZone) and zone.centre is None else ZONES)
+            if self.enabled & (HOME_CIRCLE if isinstance(zone, CircleZone) and zone.centre is None else ZONES)
         )
 
     @property
     def _has_floor(self) -> bool:
-        return bool(self.types & FLOOR) and self.floor > 0.0
+        return bool(self.enabled & FLOOR) and self.floor > 0.0
 
     # Asking before.
 
@@ -458,7 +471,7 @@ class FenceWatch:
                 return Event.BREACH, FenceFinding(
                     breach, texts.FENCE_UNDER_FLOOR.fill(distance=below, floor=self.floor)
                 )
-        elif self.types & CEILING and sight.ceiling is not None:
+        elif self.enabled & CEILING and sight.ceiling is not None:
             above = sight.ato - sight.ceiling
             if above > SLACK:
                 return Event.BREACH, FenceFinding(

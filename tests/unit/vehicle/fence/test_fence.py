@@ -700,7 +700,7 @@ def test_ceiling_with_action_warn_does_not_stop_the_drone() -> None:
 
 def test_fence_watch_present_in_force_and_enabled() -> None:
     watch = FenceWatch()
-    assert (watch.present, watch.in_force, watch.enabled) == (False, False, True)
+    assert (watch.present, watch.in_force, watch.is_on) == (False, False, True)
     watch.take(
         [
             item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, LAT, LON, 100.0),
@@ -716,12 +716,22 @@ def test_fence_watch_present_in_force_and_enabled() -> None:
     watch.disable(ZONES)
     assert [zone.name for zone in watch.zones.zones] == ["home circle 1"]
     watch.disable()
-    assert (watch.present, watch.in_force, watch.enabled, watch.types) == (True, False, False, 0)
+    assert (watch.present, watch.in_force, watch.is_on, watch.enabled) == (True, False, False, 0)
     assert watch.look(sight(500.0, ato=0.0), 0.0) is None
     watch.enable(FLOOR)
-    assert (watch.in_force, watch.enabled) == (True, True)
+    assert (watch.in_force, watch.enabled) == (True, FLOOR)
     watch.enable()
-    assert watch.types == EVERYTHING
+    assert watch.enabled == EVERYTHING
+
+
+def test_chosen_kinds_of_boundaries_and_the_switch_of_the_fence_are_independent() -> None:
+    watch = FenceWatch()
+    watch.floor = 3.0
+    watch.disable()
+    watch.choose(CEILING | FLOOR)
+    assert (watch.is_on, watch.in_force, watch.enabled) == (False, False, 0)
+    watch.enable()
+    assert (watch.is_on, watch.in_force, watch.enabled) == (True, True, CEILING | FLOOR)
 
 
 def test_places_are_asked_for_before() -> None:
