@@ -811,6 +811,21 @@ async def test_conf_077_home_type_written_while_a_rally_point_becomes_home_follo
         assert preferred(w)[-1] == RthHomeType.TAKEOFF
 
 
+@pytest.mark.parametrize("by", ["a client", "a rally point"])
+async def test_conf_077_home_of_some_other_day_is_none_while_a_custom_one_is_set(by: str) -> None:
+    """The drone is given the place before it prefers custom homes."""
+    async with world() as w:
+        if by == "a rally point":
+            await put(w, "RTL_TYPE", 1)
+            assert (await upload(w.client, [rally(around(PLACE, (30.0, 0.0))[0], 20.0)], RALLY)).type == TAKEN
+        await w.take_off()
+        if by == "a client":
+            await set_home(w, 10.0)
+        await until(lambda: preferred(w) != [])
+        names = [e.name for e in w.drone.log if e.kind == "command" and e.name.startswith("rth.set")]
+        assert names == ["rth.set_custom_location", "rth.set_preferred_home_type"]
+
+
 async def test_conf_077_home_chosen_by_a_client_is_left_alone() -> None:
     async with world() as w:
         await put(w, "RTL_TYPE", 1)

@@ -178,11 +178,12 @@ async def test_altitude_change_does_not_fly_to_a_refused_position() -> None:
 
 
 @pytest.mark.parametrize("how", ["a return", "cancel"])
-async def test_cancelled_home_leaves_the_old_one(how: str) -> None:
-    """In between the drone prefers a place that was chosen some other day."""
+@pytest.mark.parametrize("step", [rth.SetCustomLocation.NAME, rth.SetPreferredHomeType.NAME])
+async def test_cancelled_home_leaves_the_old_one(step: str, how: str) -> None:
+    """The drone prefers a custom home only once it has the place, and no longer when that was cancelled."""
     async with world(speed=1.0) as w:
         await w.take_off()
-        muted = now_mute(w, "rth.set_custom_location", 0.5)
+        muted = now_mute(w, step, 0.5)
         mark = w.client.mark()
         w.client.send_command(SET_HOME, 0, frame=6, x=HOME[0] + 0.0003, y=HOME[1], z=NAN)
         await muted
@@ -193,7 +194,8 @@ async def test_cancelled_home_leaves_the_old_one(how: str) -> None:
             assert (await other.command(RTL)).result == ACCEPTED
         assert await until(w.client, mark, 1) == [(SET_HOME, CANCELLED)]
         types = [e.args["type"] for e in w.drone.log if e.kind == "command" and e.name == "rth.set_preferred_home_type"]
-        assert types == [rth.RthHomeType.CUSTOM, rth.RthHomeType.TAKEOFF]
+        has_place = step == rth.SetPreferredHomeType.NAME
+        assert types == ([rth.RthHomeType.CUSTOM, rth.RthHomeType.TAKEOFF] if has_place else [])
         if how != "cancel":
             assert heard(w, "set_preferred_home_type", "return_to_home")[-1] == "return_to_home"
 

@@ -32,7 +32,7 @@ from support.setpoints import (
 from support.world import ARMED, HOLD, HOME, OFFBOARD, World, world
 
 from anafi_mav import geo
-from anafi_mav.arsdk.messages import ardrone3, rth
+from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.drone import events
 from anafi_mav.sim.skycontroller import TAKEOFF_LAND
 from anafi_mav.sim.world.faults import Impairment
@@ -294,9 +294,7 @@ async def test_setpoints_do_not_take_off_a_vehicle_that_is_disarmed_meanwhile() 
         async with streaming(w.client, program):
             await ready(w.client, "px4")
             await asyncio.sleep(7.0)  # 3 s before the armed state expires
-            w.drone.faults.unreported = frozenset({rth.CustomLocation.NAME, rth.PreferredHomeType.NAME})
-            w.client.send_command(dialect.MAV_CMD_DO_SET_HOME, 0, frame=0, x=48.88, y=2.37, z=0.0)
-            await w.drone.wait_log(lambda e: e.kind == "command" and e.name.startswith("rth.set"), 5.0)
+            await home_being_undone(w)
             program.setpoint = attitude(thrust=0.7)
             await said(w.client, "Disarmed: no takeoff", 0)
             await asyncio.sleep(6.0)  # the home is undone within this time

@@ -108,6 +108,6 @@ def deaf(w: World, seconds: float) -> None:
 
 async def home_being_undone(w: World) -> None:
     """Begin to set the home; whatever replaces that has to wait for 5 s until it is undone."""
-    w.drone.faults.unreported = frozenset({rth.CustomLocation.NAME, rth.PreferredHomeType.NAME})
-    w.client.send_command(mav_enums.MAV_CMD_DO_SET_HOME, 0, frame=0, x=48.88, y=2.37, z=0.0)
-    await w.drone.wait_log(lambda e: e.kind == "command" and e.name.startswith("rth.set"), 5.0)
+    w.drone.faults.unreported = frozenset({rth.PreferredHomeType.NAME})
+    w.client.send_command(mav_enums.MAV_CMD_DO_SET_HOME, 0, frame=0, x=HOME[0], y=HOME[1], z=HOME[2])
+    await w.drone.wait_log(lambda e: e.kind == "command" and e.name == rth.SetPreferredHomeType.NAME, 5.0)

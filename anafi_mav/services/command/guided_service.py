@@ -288,14 +288,15 @@ class GuidedService(Service):
             ato = command.height(vehicle, flown=False) or 0.0
         check_on_earth(where, texts.HOME)
         async with vehicle.home_choice:
+            # First the place: preferred before it, the custom home of some other day would be home until it is sent.
+            require_no_own_return()
+            given = await home.set_custom_location(where.latitude, where.longitude, home_height(vehicle, ato))
             before = home.state.preferred_type
             try:
-                await home.set_preferred_type(RthHomeType.CUSTOM)
-                at = home_height(vehicle, ato)
                 require_no_own_return()
-                given = await home.set_custom_location(where.latitude, where.longitude, at)
+                await home.set_preferred_type(RthHomeType.CUSTOM)
             except BaseException:
-                # The custom home of some other day must not stay: a return that replaces this waits until it is gone.
+                # What is not reported to be home must not stay it: a return that replaces this waits until it is not.
                 if before is not None and before != RthHomeType.CUSTOM:
                     await asyncio.wait([self.host.spawn(self._prefer(before))])
                 raise

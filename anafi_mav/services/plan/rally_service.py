@@ -131,9 +131,9 @@ class RallyService(Service):
                     assert home.state.preferred_type is not None
                     self._given = home.state.custom_location
                     await self._remember(home.state.preferred_type.name)
-                await home.set_preferred_type(RthHomeType.CUSTOM)
                 at = home_height(self.host.vehicle, point.ato)
                 self._given = await home.set_custom_location(point.latitude, point.longitude, at)
+                await home.set_preferred_type(RthHomeType.CUSTOM)  # after the place: before it, home is an older one
             except AnafiMavError as error:
                 self._rejected[point] = now + REJECTED_FOR
                 self._chosen = None
