@@ -18,7 +18,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.fault_scenarios import another_controller, watched
 from support.flavours import both
 from support.mav import NAN, Client
-from support.params import read, send_set, value_of
+from support.params import read, send_set, value_of, write
 from support.plans import ACCEPTED as TAKEN
 from support.plans import FENCE, RALLY, Item, around, circle, clear, content, download, rally, square, upload
 from support.setpoints import NO_ACCELERATION, NO_YAW, NO_YAW_RATE, allow_speed, engage, local, streaming
@@ -809,6 +809,29 @@ async def test_conf_077_home_type_written_while_a_rally_point_becomes_home_follo
         value = await w.client.wait("PARAM_VALUE", lambda m: m.param_id == "ANF_HOME_TYPE", since=chosen, timeout=10.0)
         assert value_of(value) == RthHomeType.TAKEOFF
         assert preferred(w)[-1] == RthHomeType.TAKEOFF
+
+
+async def test_conf_077_home_type_written_while_a_rally_point_is_home_holds_until_the_landing() -> None:
+    """The rally point that is the closest from then on does not become home; in the next flight it does."""
+    async with world() as w:
+        await put(w, "RTL_TYPE", 1)
+        points = [rally(place, 20.0) for place in around(PLACE, (-30.0, 0.0), (60.0, 0.0))]
+        assert (await upload(w.client, points, RALLY)).type == TAKEN
+        await w.take_off()
+        await said(w.client, "Returns end at rally point 0", timeout=10.0)
+        answer = await write(w.client, "ANF_HOME_TYPE", RthHomeType.TAKEOFF, dialect.MAV_PARAM_TYPE_INT32)
+        assert value_of(answer) == RthHomeType.TAKEOFF
+        place = around(PLACE, (50.0, 0.0))[0]
+        ack = await w.client.command(REPOSITION, -1, 1, 0, NAN, frame=6, x=place[0], y=place[1], z=8.0)
+        assert ack.result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 48.0, 40.0)
+        await said(w.client, "Rally points not used: another home is set", timeout=10.0)
+        await looked(w)
+        assert preferred(w) == [RthHomeType.CUSTOM, RthHomeType.TAKEOFF]
+        assert (await w.client.command(mav_enums.MAV_CMD_NAV_LAND)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: not beat.base_mode & 128, timeout=60.0)
+        await w.take_off()
+        await said(w.client, "Returns end at rally point 1", timeout=10.0)
 
 
 @pytest.mark.parametrize("by", ["a client", "a rally point"])

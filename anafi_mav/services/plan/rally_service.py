@@ -1,7 +1,8 @@
 """Rally points in use: while the drone flies, the chosen one is its custom home.
 
 So a return needs no gateway. This applies only where RTL_TYPE is set to it. The drone's former preference is restored
-when it has landed, and when the rally points are removed. A custom home that another controller chose is left alone.
+when it has landed, and when the rally points are removed. A home that a client or another controller chose is left
+alone: a custom one until another kind is preferred, each other kind until the landing.
 """
 
 from __future__ import annotations
@@ -11,13 +12,14 @@ import math
 
 from anafi_mav import texts
 from anafi_mav.clock import NEVER
-from anafi_mav.drone import Position
+from anafi_mav.drone import Position, events
 from anafi_mav.drone.events import RthHomeType
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.services.service import Host, Service
 from anafi_mav.vehicle.base.bounds import home_height
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.base.subscriptions import Subscriptions
 from anafi_mav.vehicle.fence.rally import RallyPoint, RallyPoints, Return
 
 LOOK_EVERY = 0.9
@@ -47,6 +49,8 @@ class RallyService(Service):
 
         A different place is another controller's choice since.
         """
+        self._preferred: RthHomeType | None = None
+        """Kind of home that was chosen in this flight instead of a rally point."""
         self._rejected: dict[RallyPoint, float] = {}
         """Until when they are not proposed again."""
 
@@ -59,9 +63,16 @@ class RallyService(Service):
         self._rally.is_home = self._before() is not None
 
     def link_down(self) -> None:
-        self._task = self._chosen = self._given = None
+        self._task = self._chosen = self._given = self._preferred = None
         self._rejected.clear()
         self._looked = -math.inf
+
+    def subscriptions(self) -> Subscriptions:
+        return {events.FlyingStateChanged: self._on_flying_state}
+
+    def _on_flying_state(self, message: events.FlyingStateChanged, now: float) -> None:
+        if self.host.vehicle.on_ground:
+            self._preferred = None
 
     def tick(self, now: float) -> float:
         if now >= self._looked + LOOK_EVERY:
@@ -101,21 +112,24 @@ class RallyService(Service):
         return self._rally.choose(vehicle.place, home, vehicle.height.takeoff_amsl, self._chosen, usable)
 
     def _may_choose(self) -> bool:
-        """Return True if the drone can have a custom home, and has none of another controller."""
+        """Return True if the drone can have a custom home, and no other one was chosen."""
         state = self.host.drone.home.state
         if state.preferred_type is None or state.types is None or RthHomeType.CUSTOM not in state.types:
             return False
-        if state.preferred_type == RthHomeType.CUSTOM and self._before() is None:
+        is_custom = state.preferred_type == RthHomeType.CUSTOM and self._before() is None
+        if is_custom or state.preferred_type == self._preferred:
             self.host.warn_throttled(texts.RALLY_HOME_SET)
             return False
         return True
 
     def _taken_over(self) -> bool:
-        """Return True if another controller has chosen a custom home since we did."""
+        """Return True if a client or another controller has chosen a home since we did."""
         state, given = self.host.drone.home.state, self._given
         chosen = state.custom_location
-        if self._before() is None or state.preferred_type != RthHomeType.CUSTOM or chosen is None:
+        if self._before() is None:
             return False
+        if state.preferred_type != RthHomeType.CUSTOM or chosen is None:
+            return self._chosen is not None and state.preferred_type is not None
         return (
             given is None
             or max(abs(chosen.latitude - given.latitude), abs(chosen.longitude - given.longitude)) > SAME_PLACE
@@ -157,8 +171,10 @@ class RallyService(Service):
         home, before = self.host.drone.home, self._before()
         if before is None:
             return
-        self._chosen = None
         taken_over = self._taken_over()
+        self._chosen = None
+        if taken_over:
+            self._preferred = home.state.preferred_type
         try:
             if home.state.preferred_type == RthHomeType.CUSTOM and not taken_over:
                 await home.set_preferred_type(before)
