@@ -142,6 +142,8 @@ class Fence:
 
     def __init__(self, zones: Iterable[Zone] = ()) -> None:
         self.zones = tuple(zones)
+        self.is_around_home = any(isinstance(zone, CircleZone) and zone.centre is None for zone in self.zones)
+        """True when a zone moves with home."""
 
     def margin(self, point: LatLon, home: LatLon | None = None) -> Margin:
         """How far inside the fence a point is."""

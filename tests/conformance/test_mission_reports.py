@@ -374,6 +374,24 @@ async def stays_out(w: World) -> None:
     assert max(entry.args["north"] for entry in w.drone.log if entry.kind == "pose") < 28.0
 
 
+async def test_circle_around_a_home_that_is_set_on_the_way_is_not_left() -> None:
+    """It moves with home: the way that was inside of it leads out of it now."""
+    async with world(speed=1.0, web=True) as w:
+        circle = Item(dialect.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION + 2, 0.0, 0.0, p1=60.0, frame=3)
+        assert (await upload(w.client, [circle], FENCE)).type == 0
+        await w.take_off(10.0)
+        await put(w, [way(0.0, 0.0, 10.0), way(55.0, 0.0, 10.0)])
+        assert (await w.client.command(START, 0, 0)).result == ACCEPTED
+        await w.drone.wait_log(lambda entry: w.drone.pose.north > 5.0, 20.0)
+        mark = w.client.mark()
+        south = around(PLACE, (-20.0, 0.0))[0]
+        ack = await w.client.command(dialect.MAV_CMD_DO_SET_HOME, 0, x=south[0], y=south[1], z=HOME[2])
+        assert ack.result == ACCEPTED
+        await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Fence hold"), since=mark, timeout=30.0)
+        await watched(5.0)
+        assert max(entry.args["north"] for entry in w.drone.log if entry.kind == "pose") < 40.0
+
+
 async def test_fence_that_is_uploaded_while_a_start_prepares_is_not_entered(monkeypatch: pytest.MonkeyPatch) -> None:
     has_begun = take_time(monkeypatch)
     async with world(speed=1.0, web=True) as w:

@@ -168,15 +168,16 @@ class FenceService(Service):
         """Return True while the way of the flown plan or orbit is known to be inside the fence.
 
         That of a plan is judged as it begins and again by a newer fence, some points with each look; until then the
-        check before its start counts for the first fence. That of an orbit is not judged again.
+        check before its start counts for the first fence. A fence around a home that has moved is a newer one. That of
+        an orbit is not judged again.
         """
         vehicle, watch, mission = self.host.vehicle, self._watch, self.host.vehicle.mission
         if vehicle.control.active is mission and not mission.flying:
             return True  # it has not begun
         flight, judgement = vehicle.control.epoch, self._judgement
-        fence = (
-            hash((watch.items.identity, watch.enabled, watch.action is Reaction.NONE)) if watch.fence.zones else None
-        )
+        home = vehicle.fence_home if watch.fence.is_around_home else None
+        identity = (watch.items.identity, watch.enabled, watch.action is Reaction.NONE, home)
+        fence = hash(identity) if watch.fence.zones else None
         if judgement is None or judgement.flight != flight or judgement.fence != fence:
             is_first = judgement is None or judgement.flight != flight
             judgement = self._judgement = _WayJudgement(flight, fence, is_first)
