@@ -45,7 +45,8 @@ def _no_fix(w: World) -> None:
 
 
 def _needs_calibration(w: World) -> None:
-    w.drone.faults.unreported = frozenset({common.MagnetoCalibrationRequiredState.NAME})
+    reports = {common.MagnetoCalibrationRequiredState.NAME, alarms.TakeoffChecklist.NAME}
+    w.drone.faults.unreported = frozenset(reports)
     w.drone.faults.magneto_required = True
 
 
@@ -95,6 +96,27 @@ async def observed(w: World, part: Part, ok: bool, since: float) -> None:
     await w.drone.wait_log(
         lambda e: e.name == COMPONENT and e.args == {"component": part, "State": int(ok)}, since=since
     )
+
+
+@both
+@pytest.mark.parametrize("by_mode", [False, True])
+async def test_conf_049_mission_of_an_armed_drone_that_is_no_longer_ready_is_not_started(
+    flavour: str, by_mode: bool
+) -> None:
+    """It was ready when it was armed; a fault within the 10 s after that is found before the drone is commanded."""
+    async with world(flavour=flavour, web=True) as w:
+        await put(w, [takeoff(6.0), way(12.0, 0.0, 6.0)])
+        assert (await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == dialect.MAV_RESULT_ACCEPTED
+        w.drone.faults.refuse_take_off = frozenset({TakeoffChecklistType.VCAM})
+        await w.client.wait(
+            "SYS_STATUS", lambda m: not m.onboard_control_sensors_health & dialect.MAV_SYS_STATUS_PREARM_CHECK
+        )
+        mark = w.client.mark()
+        numbers = (MISSION_MODE[flavour],) if flavour == "ardupilot" else (4, 4)
+        mode, start = (dialect.MAV_CMD_DO_SET_MODE, 1, *numbers), (dialect.MAV_CMD_MISSION_START, 0, 0)
+        assert (await w.client.command(*(mode if by_mode else start))).result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
+        await said(w.client, "PreArm:", mark)
+        assert w.drone.log.find("command", common.Start.NAME) == []
 
 
 @both

@@ -287,7 +287,7 @@ class Aircraft(Conditions):
     @property
     def fence_problem(self) -> OperatorText | None:
         """The reason why the fence keeps the drone on the ground, in a sentence; None without one."""
-        if self.on_ground:
+        if self.fence.fence.zones and self.on_ground:
             try:
                 self.fence.check_place(self.place, self.fence_home)
             except OutsideFence as error:

@@ -151,7 +151,6 @@ class MissionFlight(PlainTask):
 
         def condition() -> None:
             self._require_freedom(attempt)
-            vehicle.require_ready()
             if not vehicle.on_ground:  # it has taken off, and waits for no arming
                 raise Refused(texts.MISSION, vehicle.activity)
 
@@ -496,11 +495,12 @@ class MissionFlight(PlainTask):
             await vehicle.drone.piloting.stop()
             condition()
             await vehicle.drone.piloting.cancel_return_home()
+            condition()
         if not prepared.resumes and plan.state.playing not in (None, PlayingState.STOPPED):
             await plan.stop()
+            condition()
         if prepared.resumes and plan.state.playing != PlayingState.PAUSED:  # it would begin the file again
             raise Refused(texts.MISSION, texts.MISSION_STOPPED)
-        condition()
 
     async def _start(self, work: StartFile) -> None:
         """Command the drone to fly a file, or to resume it; returns when it does."""
@@ -515,18 +515,21 @@ class MissionFlight(PlainTask):
             self._vehicle.text(Severity.WARNING, texts.MISSION_PAYLOAD_CHANGED)
 
     def _require_freedom(self, attempt: MissionAttempt, *, ends_return: bool = False) -> None:
-        """Raise `Refused` while the drone may not fly an attempt.
+        """Raise `Refused` while the drone may not fly an attempt, or not take off for it.
 
         `ends_return`: a return under way is the mission's own.
         """
         vehicle = self._vehicle
+        returns, stands = vehicle.returning, vehicle.on_ground
         self._require_same(attempt)
-        if vehicle.returning_by_itself:
+        if returns and vehicle.returning_by_itself:
             raise Refused(texts.MISSION, texts.RETURNS_BY_ITSELF)
-        if (vehicle.returning and not ends_return) or not (vehicle.in_air or vehicle.on_ground):
+        if (returns and not ends_return) or not (stands or vehicle.in_air):
             raise Refused(texts.MISSION, vehicle.activity)
         if (reason := vehicle.lacking(self.rules.needs)) is not None:
             raise Refused(texts.MISSION, reason)
+        if stands:
+            vehicle.require_ready()
 
     def _require_same(self, attempt: MissionAttempt) -> None:
         self._require_mission(attempt.mission)
