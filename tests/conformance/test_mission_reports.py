@@ -46,7 +46,7 @@ from support.plans import FENCE, Item, around, polygon, square, upload
 from support.setpoints import VELOCITY_ONLY, local, streaming
 from support.world import ARMED, HOME, World, world
 
-from anafi_mav.arsdk.messages import ardrone3, common, piloting_style
+from anafi_mav.arsdk.messages import ardrone3, common, piloting_style, rth
 from anafi_mav.arsdk.messages.rth import StateReason
 from anafi_mav.drone.automatic.flight_plan import FlightPlan
 from anafi_mav.mavlink import dialect as newer
@@ -340,6 +340,28 @@ async def test_mission_that_replaces_one_that_waits_for_arming_says_so() -> None
         mark = w.client.mark()
         await put(w, [takeoff(6.0), way(9.0, 0.0, 6.0)])
         await said(w, "Mission not started", mark)
+
+
+@pytest.mark.parametrize("late", [{PLAYING: 0.5}, {PLAYING: 0.5, EXECUTED: 0.5}, {PLAYING: 0.5, EXECUTED: 0.8}])
+@pytest.mark.parametrize("stands_there", [False, True])
+async def test_return_by_the_plan_is_the_missions_before_its_start_is_reported(
+    late: dict[str, float], stands_there: bool
+) -> None:
+    """At the place of its last way point the drone returns at once, maybe before it has reported the plan."""
+    async with world(speed=1.0, web=True) as w:
+        await write(w.client, "ANF_RTL_END", 1, dialect.MAV_PARAM_TYPE_INT32)
+        await w.take_off(6.0)
+        await put(w, [way(0.0 if stands_there else 6.0, 0.0, 6.0), RTL])
+        w.drone.faults.late = late
+        mark = w.client.mark()
+        assert (await w.client.command(START, 0, 0, timeout=10.0)).result == 0
+        await state(w, COMPLETE, since=mark, timeout=20.0)
+        await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Return ended"), since=mark, timeout=30.0)
+        sent = [m.text for _, m in w.client.since(mark, "STATUSTEXT")]
+        assert sent.count("Return: hovers at home") == 1
+        assert not [text for text in sent if "paused" in text or "refused" in text]
+        assert [e.args["state"] for e in w.drone.log if e.name == "plan"] == ["playing", "stopped"]
+        assert not [e for e in w.drone.log if e.name == rth.Abort.NAME]
 
 
 @pytest.mark.parametrize("task", ["orbit", "mission"])

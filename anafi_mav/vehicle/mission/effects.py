@@ -52,6 +52,8 @@ class DroneReport:
     """It may have stopped for another reason than the end of its plan."""
     lands_or_returns: bool = False
     """It lands, has landed or returns, and the plan may be the cause."""
+    returns_by_plan: bool = False
+    """It returns, and names its plan as the reason."""
     place: GeoPoint | None = None
     ato: float | None = None
     """m above take-off."""

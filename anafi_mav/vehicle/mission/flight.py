@@ -275,15 +275,22 @@ class MissionFlight(PlainTask):
 
     @property
     def owns_descent(self) -> bool:
-        return self.ending
+        return self.ending or (self._vehicle.returning and self.returns)
 
     @property
     def returns(self) -> bool:
-        """True when a return that begins now is that of the mission's last item."""
-        drone, machine = self._vehicle.drone, self.machine
-        by_plan = drone.home.state.reason == events.ReturnReason.FLIGHTPLAN
+        """True when a return that begins now is that of the mission's last item.
+
+        One for which the drone names its plan as the reason is, also before it has reported that it flies the plan: at
+        the place of the last way point it may begin with the return.
+        """
+        machine, drone = self.machine, self._vehicle.drone
+        if machine.returning:
+            return True
+        if drone.home.state.reason != events.ReturnReason.FLIGHTPLAN:
+            return False
         same = drone.flight_plan.state.uid == machine.progress.uid
-        return machine.returning or (by_plan and same and machine.returned)
+        return machine.leads_home or (same and machine.returned)
 
     def judge_way(self) -> Iterator[bool | None]:
         """Judge if the rest of the way that is laid out is inside the fence, a way point at a time.
@@ -595,6 +602,7 @@ class MissionFlight(PlainTask):
             pilot=pilot,
             is_in_trouble=not vehicle.in_air or returning or pilot or alert or forced or plan_error,
             lands_or_returns=not forced and (down or (vehicle.returning and not vehicle.returning_by_itself)),
+            returns_by_plan=returning and drone.home.state.reason == events.ReturnReason.FLIGHTPLAN,
             place=vehicle.place,
             ato=drone.piloting.state.altitude,
         )

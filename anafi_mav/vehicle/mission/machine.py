@@ -371,6 +371,16 @@ class MissionMachine:
         return self.mission.items[leg.origins[-1]].command == mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH
 
     @property
+    def leads_home(self) -> bool:
+        """The file that is flown, or about to be, has a return as its last line."""
+        leg: object = self.progress.leg if self.state is S.FLYING_FILE else None
+        if self.state is S.STARTING and self.phase.prepared is not None:
+            leg = self.phase.prepared.course.parts[0]
+        if not isinstance(leg, FlightPlanFile):
+            return False
+        return self.mission.items[leg.origins[-1]].command == mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH
+
+    @property
     def needs_gimbal(self) -> bool:
         """True while the mission is flown and an item to come needs the gimbal."""
         return self.flying and self.mission.payload.needs_gimbal(self.progress.current, self.progress.jumps)
@@ -634,6 +644,10 @@ class MissionMachine:
             yield from self._part_over()
         elif stopped and self.ending and progress.at_last_line:
             yield from self._await_end(None, report, now)
+        elif stopped and report.returns_by_plan and self.leads_home and (leg := progress.leg) is not None:
+            # Only the last line does that. The reports of the lines before it may have preceded that of the start.
+            yield from self._execute(len(leg.origins) - 1)
+            yield from self._part_over()
         elif report.pilot:
             yield from self._stop(texts.MISSION_PILOT)
         elif stopped and (last := self._last_way_point()) is not None:
