@@ -132,6 +132,23 @@ async def test_conf_037_low_charge_is_reported_by_either_alert(unreported: list[
         assert texts == ["Battery low (19 %)", "Battery critical (9 %)"]
 
 
+@both
+@pytest.mark.parametrize("alert", [battery.BatteryAlert.TOO_COLD, battery.BatteryAlert.LOST_COMM])
+async def test_conf_037_full_battery_with_another_alert_is_not_low(flavour: str, alert: battery.BatteryAlert) -> None:
+    """Stations speak of a low charge at LOW and CRITICAL."""
+    async with world(flavour=flavour) as w:
+        fault = dialect.MAV_BATTERY_FAULT_UNDER_TEMPERATURE if alert == battery.BatteryAlert.TOO_COLD else 0
+        for level, charge in (
+            (battery.AlertLevel.WARNING, dialect.MAV_BATTERY_CHARGE_STATE_OK),
+            (battery.AlertLevel.CRITICAL, dialect.MAV_BATTERY_CHARGE_STATE_UNHEALTHY),
+        ):
+            mark = w.client.mark()
+            w.drone.inject(battery.Alert(alert, level, 0))
+            await w.client.wait("STATUSTEXT", lambda m: "attery" in m.text, since=mark)
+            status = await w.client.wait("BATTERY_STATUS")
+            assert (status.battery_remaining, status.charge_state, status.fault_bitmask) == (100, charge, fault)
+
+
 async def test_conf_037_the_cells_of_an_ai() -> None:
     """149-0-6 to 149-0-9: three cells, kelvin, and charge in mAh."""
     async with world(model="ai") as w:

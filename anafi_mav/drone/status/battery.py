@@ -54,6 +54,10 @@ class BatteryState(msgspec.Struct, frozen=True):
         """
         return {BatteryAlert.POWER_LEVEL: self.charge_level, **self.alerts}
 
+    def charge_alert(self) -> AlertLevel:
+        """Return the level of a low charge."""
+        return self.levels()[BatteryAlert.POWER_LEVEL]
+
     def worst_alert(self) -> AlertLevel:
         """Return the most serious level of the alerts."""
         return max(self.levels().values())

@@ -62,6 +62,17 @@ _FAULTS = {
 }
 
 
+def _charge_state(state: BatteryState) -> int:
+    """Return MAV_BATTERY_CHARGE_STATE: a full battery that is cold or hot is not low.
+
+    Stations announce LOW and CRITICAL as a low charge. An alert of another kind at its critical level is UNHEALTHY.
+    """
+    charge = state.charge_alert()
+    if charge != AlertLevel.CRITICAL and state.worst_alert() == AlertLevel.CRITICAL:
+        return dialect.MAV_BATTERY_CHARGE_STATE_UNHEALTHY
+    return _CHARGE_STATES.get(charge, dialect.MAV_BATTERY_CHARGE_STATE_UNDEFINED)
+
+
 def battery_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """Return BATTERY_STATUS.
 
@@ -84,7 +95,7 @@ def battery_status(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | 
         used,
         -1,
         percent(state.percent),
-        charge_state=_CHARGE_STATES.get(state.worst_alert(), dialect.MAV_BATTERY_CHARGE_STATE_UNDEFINED),
+        charge_state=_charge_state(state),
         voltages_ext=more,
         fault_bitmask=sum(bit for alert, bit in _FAULTS.items() if state.alerts.get(alert, 0) > AlertLevel.NONE),
     )
