@@ -175,6 +175,17 @@ async def test_conf_044_parameter_set_ardupilot() -> None:
 
 
 @both
+async def test_conf_044_present_values_are_written_back_without_an_error(flavour: str) -> None:
+    """A station that loads a file of values writes the read-only ones, too."""
+    async with world(flavour=flavour) as w:
+        values = await fetch(w.client, flavour)
+        mark = w.client.mark()
+        for name, message in values.items():
+            await write(w.client, name, value_of(message, flavour), message.param_type, flavour)
+        assert [str(m) for _, m in w.client.since(mark, "PARAM_ERROR")] == []
+
+
+@both
 async def test_conf_045_encoding(flavour: str) -> None:
     async with world(flavour=flavour) as w:
         values = await fetch(w.client)

@@ -400,7 +400,7 @@ class ParameterService(Service):
             return
         value = carried(message.param_value, parameter.kind, bytewise=flavour.bytewise)
         if parameter.write is None:
-            if value == parameter.value(self.host):
+            if parameter.kind.is_same(value, parameter.value(self.host)):
                 self._answer(inbound)
             else:
                 self._refuse(inbound, dialect.MAV_PARAM_ERROR_READ_ONLY, texts.READ_ONLY)
