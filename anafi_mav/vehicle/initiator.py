@@ -40,6 +40,11 @@ class Initiators:
         self._returned: tuple[Initiator, float] | None = None
         """Initiator of the return that ended last, and its end time."""
 
+    @property
+    def last_return(self) -> Initiator | None:
+        """Initiator of the return that ended last; None without one."""
+        return None if self._returned is None else self._returned[0]
+
     def land_commanded(self, now: float) -> None:
         """Note that a Landing is about to be sent."""
         self._land_sent = now

@@ -162,8 +162,6 @@ class LinkFacts:
     """When the newest GPS location arrived (s)."""
     location_every: float = 0.0
     """s between it and the one before."""
-    intended: FlightMode | None = None
-    """The mode that a client last asked for by name or number."""
     lands_next: tuple[int, float] | None = None
     """A return has finished that the drone ends by landing: the epoch then, and until when it is due."""
     own_return: ReturnReason | None = None
@@ -309,6 +307,18 @@ class Vehicle(Aircraft):
             return False
         epoch, until = self.link_facts.lands_next
         return epoch == self.control.epoch and self._clock.monotonic() < until
+
+    @property
+    def acts_by_itself(self) -> bool:
+        """True during a landing or return that no client has commanded."""
+        initiators = self._initiators
+        if self.flying_state in LANDING:
+            initiator = initiators.landing
+        else:
+            initiator = initiators.returning if self.returning else None
+            if initiator is None and self._is_about_to_land:
+                initiator = initiators.last_return
+        return initiator in (Initiator.DRONE, Initiator.PILOT)
 
     @property
     def overridable(self) -> Override:
@@ -520,7 +530,6 @@ class Vehicle(Aircraft):
 
     async def set_mode(self, mode: FlightMode, by: Right) -> None:
         """Do what this mode means, for the client that chose it: Offboard flies its setpoints."""
-        self.link_facts = replace(self.link_facts, intended=mode)
         match mode:
             case FlightMode.HOLD | FlightMode.POSITION:
                 await self.hold(mode, by)

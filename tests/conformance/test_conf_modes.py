@@ -9,6 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.world import HOLD, LAND, POSITION, RETURN, World, world
 
+from anafi_mav.arsdk.messages import rth
 from anafi_mav.mavlink import dialect as newer
 
 FLAVOURS = ("px4", "ardupilot")
@@ -109,6 +110,39 @@ async def test_conf_057_current_mode(flavour: str) -> None:
         second = await w.client.wait("CURRENT_MODE", timeout=5.5)
         assert len(w.client.since(mark, "CURRENT_MODE")) == 2
         assert first.custom_mode == second.custom_mode == hold
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_conf_057_intended_mode_is_another_only_while_the_drone_acts_by_itself(flavour: str) -> None:
+    """QGroundControl and MAVSDK judge by the intended mode whether the drone is ready: one of long ago is not."""
+    position, hold, land, back = (
+        (POSITION, HOLD, LAND, RETURN)
+        if flavour == "px4"
+        else (COPTER["loiter"], COPTER["brake"], COPTER["land"], COPTER["rtl"])
+    )
+    async with world(flavour=flavour, speed=4.0) as w:
+
+        async def reports(mode: int, intended: int) -> None:
+            await w.client.wait("CURRENT_MODE", lambda m: (m.custom_mode, m.intended_custom_mode) == (mode, intended))
+
+        await w.take_off()
+        parameters = (1, 3, 0) if flavour == "px4" else (1, position)
+        assert (await w.client.command(SET_MODE, *parameters)).result == ACCEPTED
+        w.drone.inject(rth.State(rth.RthState.IN_PROGRESS, rth.StateReason.LOW_BATTERY))
+        await reports(back, position)
+        w.drone.inject(rth.State(rth.RthState.AVAILABLE, rth.StateReason.STOPPED))
+        await reports(hold, hold)
+        w.drone.inject(rth.EndingBehavior(rth.RthEndingBehavior.LANDING))
+        w.drone.inject(rth.State(rth.RthState.IN_PROGRESS, rth.StateReason.LOW_BATTERY))
+        await reports(back, hold)
+        mark = w.client.mark()
+        w.drone.inject(rth.State(rth.RthState.AVAILABLE, rth.StateReason.FINISHED))
+        await reports(hold, hold)  # no landing follows
+        assert {m.intended_custom_mode for _, m in w.client.since(mark, "CURRENT_MODE")} == {hold}
+        w.client.send_command(dialect.MAV_CMD_NAV_LAND)
+        await reports(land, land)
+        await reports(hold, hold)
+        assert w.drone.flying_state.name == "LANDED"
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)

@@ -63,16 +63,12 @@ def available(vehicle: Vehicle, flavour: Flavour) -> list[dialect.MAVLink_messag
     ]
 
 
-def current_mode(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
-    """CURRENT_MODE.
-
-    The intended mode is the one last asked for by a message that names modes; 0 before that.
-    """
-    mode, intended, flavour = vehicle.mode, vehicle.link_facts.intended, times.flavour
+def current_mode(mode: FlightMode, intended: FlightMode, flavour: Flavour) -> dialect.MAVLink_message:
+    """Return CURRENT_MODE."""
     return dialect.MAVLink_current_mode_message(
         STANDARD_MODES.get(mode, dialect.MAV_STANDARD_MODE_NON_STANDARD),
         flavour.custom_mode(mode),
-        0 if intended is None else flavour.custom_mode(intended),
+        flavour.custom_mode(intended),
     )
 
 
@@ -81,9 +77,12 @@ class ModesService(Service):
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
+        self._intended = FlightMode.HOLD
+        """The mode that the drone was in before it began to act by itself; otherwise its mode. Stations judge by it
+        whether the drone can be armed (QGroundControl MAVLinkEventManager.cc, MAVSDK events_impl.cpp)."""
         self._offered: frozenset[FlightMode] | None = None
         self._sequence = 0
-        self._sent: tuple[FlightMode, FlightMode | None] | None = None
+        self._sent: tuple[FlightMode, FlightMode] | None = None
         """Mode and intended mode of the last CURRENT_MODE that announced a change."""
 
     def requests(self) -> Mapping[int, Request]:
@@ -103,12 +102,13 @@ class ModesService(Service):
     def streams(self) -> Mapping[int, MessageStream]:
         return {
             # Both leave at each change, and stations of before 2024, whose dialect lacks them, count them as lost.
-            dialect.MAVLINK_MSG_ID_CURRENT_MODE: MessageStream(current_mode, every=5.0, flavoured=True),
+            dialect.MAVLINK_MSG_ID_CURRENT_MODE: MessageStream(self._current, every=5.0, flavoured=True),
             dialect.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: MessageStream(self._monitor, every=10.0),
         }
 
     def link_up(self) -> None:
         self._offered = self.host.vehicle.enterable_modes
+        self._intended = self.host.vehicle.mode
         self._sent = None
 
     def subscriptions(self) -> Subscriptions:
@@ -123,11 +123,17 @@ class ModesService(Service):
 
     def _announce(self) -> None:
         """CURRENT_MODE once per change; the stream repeats it, rarely."""
-        vehicle = self.host.vehicle
-        state = vehicle.mode, vehicle.link_facts.intended
+        mode = self.host.vehicle.mode
+        if not self.host.vehicle.acts_by_itself:
+            self._intended = mode
+        state = mode, self._intended
         if state != self._sent:
-            self._sent, times = state, self.host.times()
-            self.host.send_by_flavour(lambda flavour: current_mode(vehicle, times.for_flavour(flavour)))
+            self._sent = state
+            self.host.send_by_flavour(lambda flavour: current_mode(*state, flavour))
+
+    def _current(self, vehicle: Vehicle, times: Times) -> dialect.MAVLink_message:
+        mode = vehicle.mode
+        return current_mode(mode, self._intended if vehicle.acts_by_itself else mode, times.flavour)
 
     def tick(self, now: float) -> float:
         self._announce()
