@@ -119,9 +119,14 @@ class GuidedFlight:
         return ended if ended is not None and ended.epoch == self._vehicle.control.epoch else None
 
     @property
-    def has_failed(self) -> bool:
-        """True when the newest goto has ended short of its target, and nothing was commanded since."""
-        return self._ended is not None and self._ended.is_short
+    def holds(self) -> bool:
+        """True while the newest goto is flown, and at its target while nothing was commanded since.
+
+        False once it has ended short of it, or the drone has begun to land or return.
+        """
+        if self._vehicle.descent is not None:
+            return False
+        return isinstance(self._vehicle.control.active, Goto) or (self._ended is not None and not self._ended.is_short)
 
     @property
     def goto(self) -> Goto | None:

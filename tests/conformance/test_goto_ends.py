@@ -6,13 +6,23 @@ import asyncio
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import ACCEPTED, GOTO, IN_PROGRESS, REJECTED, another_controller, goto, heard, until
+from support.fault_scenarios import (
+    ACCEPTED,
+    GOTO,
+    IN_PROGRESS,
+    REJECTED,
+    another_controller,
+    goto,
+    heard,
+    return_by_itself,
+    until,
+)
 from support.mav import NAN
 from support.setpoints import POSITION_ONLY, earth, engage, said, streaming, texts
-from support.world import HOME, World, world
+from support.world import HOLD, HOME, RETURN, World, world
 
 from anafi_mav import geo
-from anafi_mav.arsdk.messages import ardrone3
+from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.skyctrl import Source
 
 DENIED = dialect.MAV_RESULT_DENIED
@@ -93,6 +103,40 @@ async def test_goto_ended_by_the_pilot_is_reported_and_refused_when_sent_again()
         await said(w.client, "Goto ended: Skycontroller pilot in control", mark)
         assert pilot.source is Source.SKY_CONTROLLER
         assert await goto(w, AWAY, 10.0) == REJECTED
+
+
+@pytest.mark.parametrize("returns", [True, False])
+async def test_goto_ended_by_the_drones_return_is_refused_meanwhile_and_flown_after_it(returns: bool) -> None:
+    """The same command within the time of a retransmission: what was accepted is not done any longer."""
+    async with world(speed=1.0) as w:
+        await on_its_way(w)
+        mark = w.client.mark()
+        return_by_itself(w)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN, since=mark)
+        if not returns:
+            another_controller(w, rth.Abort())
+            await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
+        assert await goto(w, AWAY, 10.0) == (REJECTED if returns else ACCEPTED)
+        if returns:
+            await said(w.client, "Goto refused: drone is returning", mark)
+        assert len(heard(w, "moveTo")) == (1 if returns else 2)
+
+
+@pytest.mark.parametrize(
+    "command", [(dialect.MAV_CMD_CONDITION_YAW, 90.0, 0.0, 0.0, 0.0), (dialect.MAV_CMD_DO_PAUSE_CONTINUE, 1)]
+)
+async def test_turn_or_continuation_is_refused_when_sent_again_during_the_drones_return(
+    command: tuple[float, ...],
+) -> None:
+    async with world(speed=1.0) as w:
+        await on_its_way(w)
+        if command[0] == dialect.MAV_CMD_DO_PAUSE_CONTINUE:
+            assert (await w.client.command(dialect.MAV_CMD_DO_PAUSE_CONTINUE, 0)).result == ACCEPTED
+        id, *params = command
+        assert (await w.client.command(int(id), *params)).result == ACCEPTED
+        return_by_itself(w)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == RETURN)
+        assert (await w.client.command(int(id), *params)).result == REJECTED
 
 
 async def test_goto_replaced_by_a_command_of_a_client_has_no_text_about_its_end() -> None:

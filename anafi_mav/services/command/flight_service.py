@@ -67,7 +67,7 @@ class FlightService(Service):
                 altitude=Altitude.BY_FRAME,
                 effect=_effect_of_reposition,
                 progress=ProgressPolicy.EARLY,
-                still_holds=lambda command: not self.host.vehicle.guided.has_failed,
+                still_holds=lambda command: self.host.vehicle.guided.holds,
             ),
             dialect.MAV_CMD_DO_SET_MODE: Action(
                 lambda command: change_mode(self.host.vehicle, command.mode, command.right),

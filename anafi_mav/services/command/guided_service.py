@@ -121,7 +121,7 @@ class GuidedService(Service):
                 location=False,
                 altitude=Altitude.UNUSED,
                 effect=Effect.CHANGE,
-                still_holds=lambda command: not self.host.vehicle.guided.has_failed,
+                still_holds=lambda command: self.host.vehicle.guided.holds,
             ),
             dialect.MAV_CMD_CONDITION_YAW: Action(
                 self._turn,
@@ -129,9 +129,14 @@ class GuidedService(Service):
                 altitude=Altitude.UNUSED,
                 effect=_effect_of_turn,
                 progress=ProgressPolicy.EARLY,
+                still_holds=lambda command: not self.host.vehicle.descends,
             ),
             dialect.MAV_CMD_DO_PAUSE_CONTINUE: Action(
-                self._pause_or_continue, location=False, altitude=Altitude.UNUSED, effect=_effect_of_pause
+                self._pause_or_continue,
+                location=False,
+                altitude=Altitude.UNUSED,
+                effect=_effect_of_pause,
+                still_holds=lambda command: not self.host.vehicle.descends,
             ),
             dialect.MAV_CMD_DO_SET_HOME: Action(
                 self._set_home,
