@@ -121,8 +121,10 @@ class ServedFile:
     """Shown to clients of flavours with `packed_files` alone."""
     metadata: int | None = None
     """COMP_METADATA_TYPE. Such a file is made once for each connection, and served compressed as well."""
-    write: Callable[[Inbound, bytes], bool] | None = None
-    """Replaces it with a client's content; False when that is not usable. None: read only."""
+    write: Callable[[Inbound, bytes], bool | Awaitable[bool]] | None = None
+    """Replaces it with a client's content; None: read only.
+
+    False, at once or when awaited, for content that is not usable."""
     room: int = 0
     """Bytes that may be written to it."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 
 import pytest
-from support.ftp import ACK, NAK, NOT_FOUND, OPEN, TERMINATE, Ftp
+from support.ftp import ACK, FAIL, NAK, NOT_FOUND, OPEN, TERMINATE, Ftp, taken_apart
 from support.plans import FENCE, MISSION, RALLY, Item, circle, content, download, rally, upload
 from support.world import HOME, World, world
 
@@ -96,7 +96,7 @@ async def test_invalid_plan_file_keeps_plan_and_names_the_reason(kind: int, data
 
 
 async def test_mission_file_that_cannot_fly_is_refused_with_text() -> None:
-    """It is examined after the file is closed."""
+    """The end of the session is answered when it has been examined and stored."""
     async with world(flavour="ardupilot") as w:
         mark = w.client.mark()
         assert await write(
@@ -105,9 +105,24 @@ async def test_mission_file_that_cannot_fly_is_refused_with_text() -> None:
             file_of(
                 [Item(mav_enums.MAV_CMD_NAV_WAYPOINT, *HOME), Item(mav_enums.MAV_CMD_NAV_VTOL_TAKEOFF, *PLACE)], MISSION
             ),
-        ) == (ACK, b"")
+        ) == (NAK, bytes((FAIL,)))
         await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Mission refused: item 1: "), since=mark)
         assert await download(w.client, MISSION) == []
+
+
+async def test_end_of_a_mission_file_that_is_sent_again_while_it_is_stored_is_answered_once_for_each() -> None:
+    async with world(flavour="ardupilot") as w:
+        ftp, data = Ftp(w.client), file_of(LISTS[MISSION], MISSION)
+        assert (await ftp.ask(CREATE, PATHS[MISSION].encode())).opcode == ACK
+        assert (await ftp.ask(WRITE, data, size=len(data))).opcode == ACK
+        mark = w.client.mark()
+        for _ in range(3):
+            ftp.send(TERMINATE, seq=ftp.seq)
+        await w.client.wait("STATUSTEXT", lambda m: "Mission: 2 items" in m.text, since=mark)
+        assert (await ftp.ask(TERMINATE, seq=ftp.seq)).opcode == ACK  # its answer is kept
+        answers = [taken_apart(m) for _, m in w.client.since(mark, "FILE_TRANSFER_PROTOCOL")]
+        assert {(answer.opcode, answer.seq) for answer in answers} == {(ACK, ftp.seq - 1)}
+        assert len([m for _, m in w.client.since(mark, "STATUSTEXT") if "Mission: " in m.text]) == 1
 
 
 async def test_files_of_lists_are_ardupilots_alone() -> None:

@@ -168,8 +168,11 @@ class Files(Protocol):
     def room(self, path: str) -> int | None:
         """Return the bytes that a client may write to a file; None when it is read-only or missing."""
 
-    def write(self, path: str, content: bytes) -> bool:
-        """Replace a file that has `room`; False when the content cannot be used."""
+    def write(self, path: str, content: bytes) -> bool | Awaitable[bool]:
+        """Replace a file that has `room`.
+
+        False, at once or when awaited, if the content cannot be used.
+        """
 
     def refused(self, refusal: FileRefused) -> None:
         """Notify the client of the reason of a refusal."""
@@ -487,7 +490,7 @@ class FtpServer:
                     self._close(client, number, Event.TERMINATE)
                 return self._ack(request)
             case Opcode.TERMINATE_SESSION:
-                return self._terminate(client, request, files)
+                return self._terminate(who, client, request, files)
             case Opcode.CREATE_FILE | Opcode.OPEN_FILE_WO:
                 return self._create(client, request, files, now)
             case Opcode.WRITE_FILE:
@@ -508,14 +511,17 @@ class FtpServer:
                 return FileError.FILE_PROTECTED
         return FileError.UNKNOWN_COMMAND
 
-    def _terminate(self, client: _Client, request: FtpRequest, files: Files) -> bytes | FileError:
+    def _terminate(self, who: Hashable, client: _Client, request: FtpRequest, files: Files) -> bytes | FileError | Wait:
         if request.session not in client.sessions:
             return FileError.INVALID_SESSION
         writing = client.sessions[request.session].state is State.WRITING
         session = self._close(client, request.session, Event.TERMINATE)
-        if writing and not files.write(session.path, bytes(session.written)):
-            return FileError.FAIL
-        return self._ack(request)
+        if not writing:
+            return self._ack(request)
+        return self._after(who, request, files, files.write(session.path, bytes(session.written)), self._written)
+
+    def _written(self, is_used: bool, request: FtpRequest) -> bytes | FileError:
+        return self._ack(request) if is_used else FileError.FAIL
 
     def _session_for(self, client: _Client, request: FtpRequest, now: float) -> _Session | FileError:
         """Return the session in which a file is to be opened or created."""

@@ -234,7 +234,7 @@ class _ClientFiles:
         file = self._writable(path)
         return None if file is None else file.room
 
-    def write(self, path: str, content: bytes) -> bool:
+    def write(self, path: str, content: bytes) -> bool | Awaitable[bool]:
         file = self._writable(path)
         if file is None or file.write is None or not self._may_change():
             return False

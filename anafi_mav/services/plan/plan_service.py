@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Awaitable, Mapping, Sequence
 from contextlib import nullcontext
 from functools import partial
 
@@ -105,10 +105,10 @@ class PlanService(Service):
         transfer = self._protocol.transfers[kind]
         return plan_files.pack_plan(transfer.kind.shown(transfer.items, flavour), kind)
 
-    def _written(self, kind: int, inbound: Inbound, content: bytes) -> bool:
-        """A client has written the file of a list.
+    def _written(self, kind: int, inbound: Inbound, content: bytes) -> bool | Awaitable[bool]:
+        """Replace a list by a client's file; False, at once or when awaited, if it is refused.
 
-        What is wrong with it is a text; the list then stays.
+        The reason is a text; the list then stays.
         """
         transfer = self._protocol.transfers[kind]
         items = plan_files.unpack_plan(content, kind)
@@ -119,8 +119,13 @@ class PlanService(Service):
         if isinstance(outcome, PlanFault):
             self.host.warn_throttled(texts.REFUSED.fill(what=transfer.kind.name.capitalize(), reason=outcome.reason))
             return False
-        self._perform(outcome)
-        return True
+        stored: asyncio.Future[bool] = asyncio.get_running_loop().create_future()
+        for effect in outcome:
+            if isinstance(effect, Commit):
+                self.host.spawn(self._commit(effect, stored))
+            else:
+                self._perform([effect])
+        return stored
 
     def _peer(self, inbound: Inbound) -> _ChannelPeer:
         operators, system = self.host.vehicle.operators, inbound.sysid
@@ -179,7 +184,7 @@ class PlanService(Service):
                 case Reply():
                     self._reply(effect)
                 case Commit():
-                    self.host.spawn(self._store(effect))
+                    self.host.spawn(self._commit(effect))
                 case Changed():
                     self._changed(effect.mission_type)
                 case Say():
@@ -193,7 +198,14 @@ class PlanService(Service):
         assert isinstance(reply.peer, _ChannelPeer)
         self.host.send(reply.message, reply.peer.channel)
 
-    async def _store(self, commit: Commit) -> None:
+    async def _commit(self, commit: Commit, stored: asyncio.Future[bool] | None = None) -> None:
+        """Store a plan; `stored` gets True if it is in force then."""
+        fault = await self._store(commit)
+        if stored is not None and not stored.done():  # else its client is disconnected
+            stored.set_result(fault is None)
+
+    async def _store(self, commit: Commit) -> PlanFault | None:
+        """Store a plan, and put it in force; return the fault of it, None if it is in force."""
         concerned = self._mission.mission_type in commit.plans
         with self.host.vehicle.mission.storing.going_on() if concerned else nullcontext():
             try:
@@ -207,6 +219,7 @@ class PlanService(Service):
                 what = "Plans" if transfer is None else transfer.kind.name.capitalize()
                 self.host.warn_throttled(texts.REFUSED.fill(what=what, reason=fault.reason))
             self._perform(self._protocol.stored(commit, self.host.clock.monotonic(), fault))
+        return fault
 
     @property
     def _flown_identity(self) -> int:
