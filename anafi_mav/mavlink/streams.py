@@ -70,7 +70,7 @@ class _Stream:
 
 
 _OFF = _Stream(None, None)
-"""A message that is not streamed: one object for all."""
+"""A message that is not streamed by default: one object for all."""
 
 
 class _Lane(Generic[ChannelT]):
@@ -143,11 +143,16 @@ class Streams(Generic[ChannelT]):
         streams = self._channels.setdefault(channel, {})
         known = streams.get(id)
         # A client that says again what it has (QGroundControl does 35 times, for ArduPilot) must not get more by it.
-        if known is None or known.interval != interval:
+        if known is None or known is _OFF or known.interval != interval:
             if known is not None:
                 known.users -= 1
             streams[id] = _Stream(interval, self._pace(channel))
             self._forget(id)
+
+    def is_off(self, channel: ChannelT, id: int) -> bool:
+        """Return True if a client has ended this message on its channel; False if it is not streamed by default."""
+        stream = self._channels.get(channel, {}).get(id)
+        return stream is not None and stream is not _OFF and stream.interval is None
 
     def reset(self, channel: ChannelT, id: int) -> None:
         """Stream at the default interval again."""

@@ -64,7 +64,8 @@ class MessageStream:
     """A state message: it also leaves at its interval without an update, and then carries the time of sending. A
     message without `updates` is one in any case."""
     on_change: bool = False
-    """A state message that also leaves at once when the vehicle's mode, armed or landed state changes."""
+    """A state message that also leaves at once when the vehicle's mode, armed or landed state changes, except to a
+    client that has switched it off."""
     fastest: float = FASTEST
     """s, the shortest interval that a client gets of a message that is also repeated."""
     from_pictures: bool = False

@@ -145,6 +145,23 @@ async def test_conf_108_off_default_and_refused_on_each_link_alone(flavour: str)
         assert await interval(first, "ATTITUDE") == pytest.approx(0.1, rel=0.05)
 
 
+@both
+async def test_conf_108_state_that_is_off_stays_off_at_a_change(flavour: str) -> None:
+    names = ["SYS_STATUS", "EXTENDED_SYS_STATE", "HOME_POSITION"]
+    async with world(clients=2, flavour=flavour) as w:
+        first, second = w.clients
+        for name in names:
+            assert (await first.command(SET, IDS[name], -1)).result == ACCEPTED
+        marks = first.mark(), second.mark()
+        await w.take_off()
+        for client in w.clients:
+            await client.wait("HEARTBEAT")
+        assert {name: first.since(marks[0], name) for name in names} == {name: [] for name in names}
+        assert all(second.since(marks[1], name) for name in names)
+        assert (await first.command(SET, IDS["SYS_STATUS"], 0)).result == ACCEPTED
+        await first.wait("SYS_STATUS")
+
+
 async def test_message_of_a_new_row_leaves_at_default_interval(monkeypatch: pytest.MonkeyPatch) -> None:
     """An element's value in a message of its own: builder, events that update it, and default interval in one row."""
 

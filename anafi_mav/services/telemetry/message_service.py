@@ -245,9 +245,14 @@ class MessageService(Service):
         return max(self._repeat_at, self._intervals.next_on(channels, self._repeated))
 
     def state_changed(self) -> None:
-        """They leave at once."""
+        """They leave at once, except to clients that have switched them off."""
         for id in self._on_change:
-            self._leave(id, [channel for channel in self.host.channels if channel.can_stream(id)], self._times(id))
+            to = [
+                channel
+                for channel in self.host.channels
+                if channel.can_stream(id) and not self._intervals.is_off(channel, id)
+            ]
+            self._leave(id, to, self._times(id))
         self._flush()
 
     # Streams.
