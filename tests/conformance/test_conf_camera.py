@@ -360,6 +360,20 @@ async def test_conf_087_series_whose_begin_is_reported_late_keeps_its_settings()
         assert names == ["camera.set_photo_mode", "camera.stop_photo"]
 
 
+async def test_conf_087_picture_that_is_reported_after_the_end_of_its_series_is_captured() -> None:
+    async with world(speed=1.0, web=True) as w:
+        await enter(w.client, PHOTO)
+        w.drone.faults.late = {camera_messages.PhotoProgress.NAME: 0.7}
+        assert await command(w.client, START_PHOTO, 0, 2, 0) == ACCEPTED
+        await w.drone.wait_log(lambda e: bool(photos(w)) and len(photos(w)[0].resources) == 2, 10.0)
+        assert await command(w.client, STOP_PHOTO, 0) == ACCEPTED
+        image = await w.client.wait("CAMERA_IMAGE_CAPTURED", lambda image: image.image_index == 1, since=0)
+        assert image.capture_result == 1
+        assert (await shoot(w.client)).image_index == 2
+        assert (await request(w.client, "CAMERA_CAPTURE_STATUS")).image_count == 3
+        assert [len(media.resources) for media in photos(w)] == [2, 1]
+
+
 @pytest.mark.parametrize("model", ["4k", "ai"])
 @pytest.mark.parametrize(("interval", "count", "mode"), [(0, 1, "SINGLE"), (2, 2, "TIMELAPSE")])
 async def test_conf_087_photo_after_a_series_is_taken_as_commanded(

@@ -80,6 +80,10 @@ class _Capture:
             return min(more, 1)
         return more if more < COUNT // 2 else 0
 
+    def has_taken(self, count: int | None) -> bool:
+        """Return True for a count that adds nothing."""
+        return count is not None and bool(self.taken) and self.reported is not None and not self.more(count)
+
     def take(self, pictures: int, now: float) -> None:
         """Add pictures, spread over the time since the last report."""
         if self.reported is None and pictures:
@@ -183,6 +187,8 @@ class ShotTracker:
             case CaptureProgress.STARTED:
                 return self._open(update, now)
             case CaptureProgress.TAKEN:
+                if not self._now.is_open and self._now.has_taken(update.count):
+                    return []  # the same report again; of another photo its media is reported too
                 lost = self._open(update, now)
                 self._now.take(1 if update.count is None else self._now.more(update.count), now)
                 return lost
@@ -250,7 +256,7 @@ class ShotTracker:
             self._before.ended = None
             return self._before.report_all(is_saved=True)
         if self.capture_of(update.media) not in (0, self.capture):
-            return []  # the same report again
+            return self._save_before(update, now)
         last, lost = self._now, list[CapturedShot]()
         is_known = last.is_open or bool(last.shots) or last.ended is not None
         if update.media and last.media not in ("", update.media):
@@ -268,6 +274,24 @@ class ShotTracker:
         capture.ended = None
         capture.is_open = capture.is_open and not update.is_last
         return lost + capture.report_all(is_saved=True)
+
+    def _save_before(self, update: CaptureUpdate, now: float) -> list[CapturedShot]:
+        """Return pictures of the capture before that are reported after its end; none if they have been reported.
+
+        The report of their shutter has begun another capture then, with a count that belongs to the one before.
+        """
+        before, late = self._before, self._now
+        if update.count is None or self.capture_of(update.media) != before.number or before.reported is None:
+            return []
+        more = before.more(update.count)
+        if not more:
+            return []  # the same report again
+        if late.taken == update.count and not late.reported and not late.media:
+            before.shots, before.taken = late.shots[-more:], update.count
+            self._now, self._before = before, _Capture(before.number)
+        else:
+            before.take(more, now)
+        return before.report_all(is_saved=True)
 
     def _name(self, capture: _Capture, media: str) -> None:
         """Note the media id of a capture."""

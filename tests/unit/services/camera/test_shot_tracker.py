@@ -196,6 +196,38 @@ def test_photo_of_another_camera_is_one_of_its_own() -> None:
     assert tracker.expire(3.0 + LOST, is_series=False) == [CapturedShot(1, 1, 1.2, False)]
 
 
+def test_pictures_of_a_series_that_are_reported_after_its_end_are_its_own() -> None:
+    """The drone promises no order between a photo's end and the reports of its pictures."""
+    tracker = ShotTracker()
+    feed(tracker, (0.0, STARTED, None), (1.0, TAKEN, 1))
+    tracker.receive(saved("a", 1), 1.3)
+    feed(tracker, (4.0, ENDED, None))
+    for number in (2, 3):
+        assert feed(tracker, (4.1 * number, TAKEN, number)) == []
+        assert tracker.receive(saved("a", number), 4.1 * number + 0.1) == [CapturedShot(1, number, 4.1 * number, True)]
+        assert tracker.receive(saved("a", number), 4.1 * number + 0.2) == []
+    feed(tracker, (20.0, STARTED, None), (20.2, TAKEN, 1))
+    assert tracker.receive(saved("b", 1), 20.4) == [CapturedShot(2, 1, 20.2, True)]
+    assert tracker.expire(20.4 + LOST, is_series=False) == []
+
+
+def test_shutter_of_a_series_that_is_reported_again_after_its_end_begins_no_photo() -> None:
+    tracker = ShotTracker()
+    feed(tracker, (0.0, STARTED, None), (1.0, TAKEN, 1), (1.3, SAVED, 1))
+    feed(tracker, (3.0, TAKEN, 2), (3.1, ENDED, None), (3.2, TAKEN, 2))
+    assert feed(tracker, (3.4, SAVED, 2)) == [CapturedShot(1, 2, 3.0, True)]
+    assert tracker.expire(3.4 + LOST, is_series=True) == []
+
+
+def test_picture_of_a_series_that_is_reported_after_the_next_photo_is_its_own() -> None:
+    tracker = ShotTracker()
+    feed(tracker, (0.0, STARTED, None), (1.0, TAKEN, 1))
+    tracker.receive(saved("a", 1), 1.3)
+    feed(tracker, (3.1, ENDED, None), (3.2, STARTED, None), (3.4, TAKEN, 1))
+    assert tracker.receive(saved("a", 2), 3.5) == [CapturedShot(1, 2, 3.5, True)]
+    assert tracker.receive(saved("b", 1), 3.6) == [CapturedShot(2, 1, 3.4, True)]
+
+
 def test_failure_before_the_shutter_is_one_lost_picture() -> None:
     tracker = ShotTracker()
     assert feed(tracker, (1.0, FAILED, None)) == []  # a photo that never began
