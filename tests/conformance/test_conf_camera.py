@@ -208,6 +208,36 @@ async def test_conf_087_one_picture_of_a_series_is_one(model: str) -> None:
         assert w.drone.firmware.payload.cameras.busy
 
 
+LATE_STATES = {kind.NAME: 0.7 for kind in (camera_messages.PhotoState, camera_messages.RecordingState, camera2.State)}
+"""The drone reports the state of photos and recordings s after their progress; it promises no order."""
+
+
+@pytest.mark.parametrize("model", ["4k", "ai"])
+@pytest.mark.parametrize(
+    ("mode", "start", "stop"), [(PHOTO, (START_PHOTO, 0, 2, 0), STOP_PHOTO), (VIDEO, (START_VIDEO, 0), STOP_VIDEO)]
+)
+async def test_conf_087_stop_just_after_a_start_ends_it(
+    model: str, mode: int, start: tuple[int, ...], stop: int
+) -> None:
+    async with world(model=model, speed=1.0, web=True) as w:
+        await enter(w.client, mode)
+        w.drone.faults.late = LATE_STATES
+        assert await command(w.client, *start) == ACCEPTED
+        assert await command(w.client, stop, 0) == ACCEPTED
+        assert not w.drone.firmware.payload.cameras.busy
+
+
+async def test_conf_087_one_picture_of_a_series_is_one_although_its_begin_is_reported_late() -> None:
+    async with world(speed=1.0, web=True) as w:
+        await enter(w.client, PHOTO)
+        assert (await write(w.client, "CAM_PHOTOMODE", 3.0, CHOICE)).param_result == dialect.PARAM_ACK_ACCEPTED
+        w.drone.faults.late = LATE_STATES
+        mark = w.client.mark()
+        assert await command(w.client, START_PHOTO, 0, 0, 1) == ACCEPTED
+        await w.drone.wait_log(lambda e: not w.drone.firmware.payload.cameras.busy, 10.0)
+        assert texts(w.client, mark) == []
+
+
 async def photo_mode_shown(client: Client, mode: float, since: int) -> None:
     """Wait until a change of CAM_PHOTOMODE to this mode is sent."""
     shown = "PARAM_EXT_VALUE"

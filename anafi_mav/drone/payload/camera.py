@@ -7,6 +7,7 @@ value that the drone does not take is clamped or refused by leaving it as it was
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, TypeAlias
@@ -39,12 +40,15 @@ from anafi_mav.drone.payload.camera_state import (
     RecordingSettings,
 )
 from anafi_mav.drone.settings import Commanding, Question, number
-from anafi_mav.errors import AnafiMavError, CommandRejected, LocalProtocolError, NotSupported
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
 from anafi_mav.units import clip
 
 MAIN = 0
 """Id of the camera that every model has."""
 
+STATE_TIMEOUT = 2.0
+"""s after the report that a photo or recording has begun in which the camera's state has it, too. Parrot promises no
+order between the two events."""
 SAVE_TIMEOUT = 30.0
 """s between two signs of life of a photo: a burst or a full resolution DNG takes a while to be stored."""
 ZOOM_TIMEOUT = 60.0
@@ -157,6 +161,8 @@ class Camera(Commanding[CamerasState]):
         result = await self._capture(
             id, speech.take_photo(id), speech.photo_events, speech.photo_news, judge, ANSWER_TIMEOUT, timeout
         )
+        if series:
+            await self._until_state(id, "taking")
         return result if isinstance(result, str) else None
 
     async def stop_photo(self, id: int = MAIN, timeout: float = SAVE_TIMEOUT) -> str | None:
@@ -205,6 +211,7 @@ class Camera(Commanding[CamerasState]):
 
         command = speech.start_recording(id)
         await self._capture(id, command, speech.recording_events, speech.recording_news, judge, ANSWER_TIMEOUT, None)
+        await self._until_state(id, "recording_now")
 
     async def stop_recording(self, id: int = MAIN, timeout: float = 2 * ANSWER_TIMEOUT) -> str:
         """Stop recording; return the media id once the video is stored."""
@@ -485,3 +492,16 @@ class Camera(Commanding[CamerasState]):
         answer = self._commander.expect(events, listen)
         self._commander.dispatch(answer, command, first)
         return await answer.wait()
+
+    async def _until_state(self, id: int, field: str) -> None:
+        """Wait until the state has what has begun, so that a command to stop finds it."""
+
+        def judge(message: Any) -> bool | None:
+            return None if getattr(self[id], field) is False else True
+
+        speech, now = self._known(id)
+        if getattr(now, field) is False:
+            answer = self._commander.expect(speech.state_events, judge)
+            answer.expire_after(STATE_TIMEOUT, field)
+            with contextlib.suppress(CommandTimeout):
+                await answer.wait()

@@ -498,6 +498,7 @@ class ClassicCamera:
     zoom_event: type[Message] = wire.ZoomLevel
     photo_events = PHOTO_EVENTS
     recording_events = RECORDING_EVENTS
+    state_events: tuple[type[Message], ...] = (wire.PhotoState, wire.RecordingState)
     photo_news = staticmethod(photo_news)
     recording_news = staticmethod(recording_news)
     camera_of = staticmethod(camera_of)

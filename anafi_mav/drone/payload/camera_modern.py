@@ -552,6 +552,7 @@ class ModernCamera:
     zoom_event: type[Message] = wire.ZoomLevel
     photo_events: tuple[type[Message], ...] = (wire.Photo,)
     recording_events: tuple[type[Message], ...] = (wire.Recording, wire.State)
+    state_events: tuple[type[Message], ...] = (wire.State,)
     photo_news = staticmethod(photo_news)
     recording_news = staticmethod(recording_news)
     camera_of = staticmethod(camera_of)

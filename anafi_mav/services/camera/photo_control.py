@@ -96,7 +96,7 @@ class PhotoControl:
             series.has_begun = True
         is_full = is_own and series.limit is not None and taken >= series.limit
         if is_full and update.progress is CaptureProgress.TAKEN and (series.ending is None or series.ending.done()):
-            series.ending = self.host.spawn(self._end_series(series.camera))
+            series.ending = self.host.spawn(self._end_series(series))
         is_saved = update.progress is CaptureProgress.SAVED and update.is_last and is_present
         ended = not is_own or is_saved or update.progress is CaptureProgress.ENDED
         if (ended and series.has_begun) or (is_own and update.progress is CaptureProgress.FAILED):
@@ -213,10 +213,12 @@ class PhotoControl:
         else:
             self.host.text(Severity.NOTICE, texts.PHOTO_INTERVAL.fill(seconds=settings.interval))
 
-    async def _end_series(self, camera: int) -> None:
-        """End the series that has all its pictures."""
+    async def _end_series(self, series: PhotoSeries) -> None:
+        """End the series that has all its pictures, after the command that begins it."""
         try:
-            await self.host.drone.camera.stop_photo(camera)
+            async with self._commands:
+                if self._series is series:
+                    await self.host.drone.camera.stop_photo(series.camera)
         except AnafiMavError as error:
             self.host.text(Severity.WARNING, texts.PHOTO_SERIES_FAILED.fill(error=texts.from_below(error)))
 
