@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from support.cameras import ACCEPTED, PHOTO, VIDEO, command, enter, photos, press, request, shoot, texts, videos
 from support.ext_params import CHOICE, value_of, write
-from support.fault_scenarios import watched
+from support.fault_scenarios import on_command, watched
 from support.flavours import both
 from support.ftp import Ftp
 from support.mav import CAMERA, Client
@@ -388,6 +388,16 @@ async def test_conf_087_series_whose_begin_is_reported_late_keeps_its_settings()
             if e.kind == "command" and e.name in ("camera.set_photo_mode", "camera.stop_photo")
         ]
         assert names == ["camera.set_photo_mode", "camera.stop_photo"]
+
+
+async def test_mode_that_is_reported_once_more_before_it_changes_is_not_refused() -> None:
+    async with world(speed=1.0) as w:
+        mark = w.client.mark()
+        before = camera_messages.CameraMode(0, camera_messages.CameraCameraMode.RECORDING)
+        reported = on_command(w, "camera.set_camera_mode", lambda: w.drone.inject(before))
+        await enter(w.client, PHOTO)
+        await reported
+        assert texts(w.client, mark) == []
 
 
 async def test_conf_087_picture_that_is_reported_after_the_end_of_its_series_is_captured() -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar, TypeAlias, TypeVar
 
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages.proto import antiflicker as mains
@@ -49,6 +49,9 @@ MAIN = 0
 STATE_TIMEOUT = 2.0
 """s after the report that a photo or recording has begun in which the camera's state has it, too. Parrot promises no
 order between the two events."""
+KEPT_AFTER = 0.5
+"""s after a report with the old value at which the drone counts as keeping it: the drone may have sent that report
+before it received the change."""
 SAVE_TIMEOUT = 30.0
 """s between two signs of life of a photo: a burst or a full resolution DNG takes a while to be stored."""
 ZOOM_TIMEOUT = 60.0
@@ -67,7 +70,20 @@ _SPEECH: Mapping[str, type[ClassicCamera] | type[ModernCamera]] = {
     camera_modern.FEATURE: ModernCamera,
 }
 
+SettingsT = TypeVar("SettingsT", PhotoSettings, RecordingSettings, ExposureSettings)
 Ask: TypeAlias = tuple[Message, type[Message]]
+
+
+def _has(settings: SettingsT | None, wish: SettingsT) -> bool:
+    """Return True if the settings have each value of the wish; a number to three digits, as the drone may round it."""
+    for field in wish.__struct_fields__:
+        wanted, value = getattr(wish, field), getattr(settings, field, None)
+        if isinstance(wanted, float) and value is not None:
+            if not math.isclose(wanted, value, rel_tol=1e-3):
+                return False
+        elif wanted is not None and wanted != value:
+            return False
+    return True
 
 
 class Camera(Commanding[CamerasState]):
@@ -126,13 +142,17 @@ class Camera(Commanding[CamerasState]):
 
     async def set_mode(self, mode: CameraMode, id: int = MAIN) -> CameraMode | None:
         """Change to photo or recording mode."""
-        return (await self._ask(id, "mode", lambda s, now: s.mode(id, now, mode))).mode
+        state = await self._ask(id, "mode", lambda s, now: s.mode(id, now, mode), lambda state: state.mode is mode)
+        return state.mode
 
     async def set_photo(self, wish: PhotoSettings, id: int = MAIN) -> PhotoSettings | None:
         """Change the photo settings; a field that is None stays as it is."""
         if wish.interval is not None:
             number(wish.interval, "interval")
-        return (await self._ask(id, "photo", lambda s, now: s.photo(id, now, wish))).photo
+        state = await self._ask(
+            id, "photo", lambda s, now: s.photo(id, now, wish), lambda state: _has(state.photo, wish)
+        )
+        return state.photo
 
     async def take_photo(
         self, id: int = MAIN, timeout: float = SAVE_TIMEOUT, *, until_saved: bool = True
@@ -193,7 +213,10 @@ class Camera(Commanding[CamerasState]):
 
     async def set_recording(self, wish: RecordingSettings, id: int = MAIN) -> RecordingSettings | None:
         """Change the recording settings; a field that is None stays as it is."""
-        return (await self._ask(id, "recording", lambda s, now: s.recording(id, now, wish))).recording
+        state = await self._ask(
+            id, "recording", lambda s, now: s.recording(id, now, wish), lambda state: _has(state.recording, wish)
+        )
+        return state.recording
 
     async def start_recording(self, id: int = MAIN) -> None:
         """Start to record; returns when the camera records. Raises `CommandRejected` in mode PHOTO."""
@@ -232,11 +255,20 @@ class Camera(Commanding[CamerasState]):
 
     async def set_storage_policy(self, policy: StoragePolicy, id: int = MAIN) -> StoragePolicy | None:
         """Choose the storage that pictures and videos are written to. Ai only."""
-        return (await self._ask(id, "storage_policy", lambda s, now: s.storage_policy(id, now, policy))).storage_policy
+        state = await self._ask(
+            id,
+            "storage_policy",
+            lambda s, now: s.storage_policy(id, now, policy),
+            lambda state: state.storage_policy is policy,
+        )
+        return state.storage_policy
 
     async def set_autorecord(self, on: bool, id: int = MAIN) -> bool | None:
         """Switch automatic recording from take-off to landing."""
-        return (await self._ask(id, "autorecord", lambda s, now: s.autorecord(id, now, on))).autorecord
+        state = await self._ask(
+            id, "autorecord", lambda s, now: s.autorecord(id, now, on), lambda state: state.autorecord == on
+        )
+        return state.autorecord
 
     # -- zoom
 
@@ -334,7 +366,12 @@ class Camera(Commanding[CamerasState]):
 
     async def set_zoom_may_degrade(self, allowed: bool, id: int = MAIN) -> bool | None:
         """Allow or forbid a zoom by rate beyond the lossless range."""
-        state = await self._ask(id, "zoom_may_degrade", lambda s, now: s.zoom_may_degrade(id, now, allowed))
+        state = await self._ask(
+            id,
+            "zoom_may_degrade",
+            lambda s, now: s.zoom_may_degrade(id, now, allowed),
+            lambda state: state.zoom_may_degrade == allowed,
+        )
         return state.zoom_may_degrade
 
     # -- light
@@ -345,7 +382,10 @@ class Camera(Commanding[CamerasState]):
 
     async def set_exposure(self, wish: ExposureSettings, id: int = MAIN) -> ExposureSettings | None:
         """Change the exposure; a field that is None stays. Shutter and ISO take the nearest step."""
-        return (await self._ask(id, "exposure", lambda s, now: s.exposure(id, now, wish))).exposure
+        state = await self._ask(
+            id, "exposure", lambda s, now: s.exposure(id, now, wish), lambda state: _has(state.exposure, wish)
+        )
+        return state.exposure
 
     async def lock_exposure(
         self, on: bool = True, at: tuple[float, float] | None = None, id: int = MAIN
@@ -356,30 +396,51 @@ class Camera(Commanding[CamerasState]):
         """
         if not self[id].exposure_lockable:
             self._require(None, "exposure lock")
-        return (await self._ask(id, "exposure", lambda s, now: s.lock_exposure(id, now, on, at))).exposure_locked
+        state = await self._ask(
+            id,
+            "exposure",
+            lambda s, now: s.lock_exposure(id, now, on, at),
+            lambda state: state.exposure_locked == on,
+        )
+        return state.exposure_locked
 
     async def set_white_balance(
         self, mode: WhiteBalance, temperature_k: float | None = None, id: int = MAIN
     ) -> tuple[WhiteBalance | None, float | None]:
         """Set the white balance; `temperature_k` (to the nearest 250 K) is for CUSTOM. Return both."""
-        state = await self._ask(id, "white_balance", lambda s, now: s.white_balance(id, now, mode, temperature_k))
+        state = await self._ask(
+            id,
+            "white_balance",
+            lambda s, now: s.white_balance(id, now, mode, temperature_k),
+            lambda state: state.white_balance is mode,
+        )
         return state.white_balance, state.temperature_k
 
     async def lock_white_balance(self, on: bool = True, id: int = MAIN) -> bool | None:
         """Lock or unlock the white balance."""
         if not self[id].white_balance_lockable:
             self._require(None, "white balance lock")
-        state = await self._ask(id, "white_balance", lambda s, now: s.lock_white_balance(id, now, on))
+        state = await self._ask(
+            id,
+            "white_balance",
+            lambda s, now: s.lock_white_balance(id, now, on),
+            lambda state: state.white_balance_locked == on,
+        )
         return state.white_balance_locked
 
     async def set_hdr(self, on: bool, id: int = MAIN) -> bool | None:
         """Switch HDR on or off."""
-        return (await self._ask(id, "hdr", lambda s, now: s.hdr(id, now, on))).hdr
+        return (await self._ask(id, "hdr", lambda s, now: s.hdr(id, now, on), lambda state: state.hdr == on)).hdr
 
     async def set_style(self, style: Style, id: int = MAIN) -> Style | None:
         """Choose the style of the picture."""
-        now = (await self._ask(id, "style", lambda s, now: s.style(id, now, style))).style
-        return None if now is None else now.style
+        state = await self._ask(
+            id,
+            "style",
+            lambda s, now: s.style(id, now, style),
+            lambda state: state.style is not None and state.style.style is style,
+        )
+        return None if state.style is None else state.style.style
 
     async def set_style_params(
         self, saturation: float, contrast: float, sharpness: float, id: int = MAIN
@@ -390,7 +451,10 @@ class Camera(Commanding[CamerasState]):
 
     async def set_streaming(self, mode: Streaming, id: int = MAIN) -> Streaming | None:
         """Choose between low latency and reliability of the live video."""
-        return (await self._ask(id, "streaming", lambda s, now: s.streaming(id, now, mode))).streaming
+        state = await self._ask(
+            id, "streaming", lambda s, now: s.streaming(id, now, mode), lambda state: state.streaming is mode
+        )
+        return state.streaming
 
     async def set_alignment(self, yaw: float, pitch: float, roll: float, id: int = MAIN) -> CameraState:
         """Set the corrections against the other camera, deg."""
@@ -441,11 +505,15 @@ class Camera(Commanding[CamerasState]):
         return now.zoom_max
 
     async def _ask(
-        self, id: int, field: str, ask: Callable[[type[ClassicCamera] | type[ModernCamera], CameraState], Ask]
+        self,
+        id: int,
+        field: str,
+        ask: Callable[[type[ClassicCamera] | type[ModernCamera], CameraState], Ask],
+        is_done: Callable[[CameraState], bool] = lambda state: True,
     ) -> CameraState:
         """Change a setting; returns the state after the drone's answer.
 
-        `field` must have been reported.
+        `field` must have been reported. An answer for which `is_done` is False counts if no other follows.
         """
         speech, now = self._known(id)
         self._require(getattr(now, field), f"camera {id}: {field.replace('_', ' ')}")
@@ -456,14 +524,29 @@ class Camera(Commanding[CamerasState]):
             if isinstance(command, camera2.Configure) and command.config == camera2.Config():
                 raise LocalProtocolError("nothing to change")
 
-            def judge(message: Any) -> CameraState | None:
-                mine = speech.camera_of(message) == id
-                # A state of camera2 can be about something else, such as the end of a photo.
-                if isinstance(command, camera2.Configure) and message.config is None:
-                    mine = False
-                return self[id] if mine else None
+            is_answered = False
 
-            return await self._commander.confirm(command, (answer,), judge, ANSWER_TIMEOUT)
+            def judge(message: Any) -> CameraState | None:
+                nonlocal is_answered
+                # A state of camera2 can be about something else, such as the end of a photo.
+                is_other = isinstance(command, camera2.Configure) and message.config is None
+                if is_other or speech.camera_of(message) != id:
+                    return None
+                if is_done(self[id]):
+                    return self[id]
+                if not is_answered:
+                    is_answered = True
+                    expectation.expire_after(KEPT_AFTER, command.NAME)
+                return None
+
+            expectation = self._commander.expect((answer,), judge)
+            self._commander.dispatch(expectation, command, ANSWER_TIMEOUT)
+            try:
+                return await expectation.wait()
+            except CommandTimeout:
+                if not is_answered:
+                    raise
+                return self[id]
 
     async def _capture(
         self,

@@ -221,6 +221,14 @@ async def test_a_wish_changes_only_what_it_names(device: ScriptedDevice, drone: 
         await drone.camera.set_photo(PhotoSettings(interval=NAN))
 
 
+async def test_report_of_before_a_change_is_not_its_answer(device: ScriptedDevice, drone: Drone) -> None:
+    before, after = old.CameraCameraMode.PHOTO, old.CameraCameraMode.RECORDING
+    device.script[old.SetCameraMode] = lambda m: [old.CameraMode(0, before), old.CameraMode(0, m.value)]
+    assert await drone.camera.set_mode(CameraMode.RECORDING) is CameraMode.RECORDING
+    device.script[old.SetCameraMode] = lambda m: [old.CameraMode(0, after)]  # it keeps its mode
+    assert await drone.camera.set_mode(CameraMode.PHOTO) is CameraMode.RECORDING
+
+
 async def test_another_cameras_answer_is_none(device: ScriptedDevice, drone: Drone) -> None:
     device.script[old.SetEvCompensation] = lambda m: [
         old.EvCompensation(1, m.value),
@@ -473,6 +481,15 @@ async def test_a_setting_of_an_ai_is_one_selected_field(ai: ScriptedDevice, ai_d
         await camera.set_recording(RecordingSettings(hyperlapse=15), id=3)
     with pytest.raises(LocalProtocolError):
         await camera.set_recording(RecordingSettings(), id=3)
+
+
+async def test_report_of_another_setting_of_an_ai_is_not_the_answer_to_a_change(
+    ai: ScriptedDevice, ai_drone: Drone
+) -> None:
+    other = new.State(camera_id=3, config=new.Config(ev_compensation=new.EvCompensation._1_00))
+    ai.script[new.Configure] = lambda m: [other, new.State(camera_id=3, config=m.config)]
+    assert await ai_drone.camera.set_mode(CameraMode.PHOTO, id=3) is CameraMode.PHOTO
+    assert await ai_drone.camera.set_hdr(False, id=3) is False
 
 
 async def test_photo_and_film_of_an_ai(ai: ScriptedDevice, ai_drone: Drone) -> None:
