@@ -202,11 +202,13 @@ class KeyRing:
             self._saving = asyncio.get_running_loop().create_task(self._save_due())
 
     async def _save_due(self) -> None:
-        now = self._clock.time()
-        for signing in tuple(self._keys.values()):
+        now, writing = self._clock.time(), []
+        for signing in self._keys.values():
             signing.advance(now)
             if self._saves and signing.name not in self._replaced and (timestamp := signing.due(now)) is not None:
-                await self._write(signing, timestamp)
+                writing.append(self._write(signing, timestamp))
+        # Not one after the other: behind a disk that hangs each key has to learn of it.
+        await asyncio.gather(*writing)
 
     async def _write(self, signing: Signing, timestamp: int) -> None:
         assert self._folder is not None

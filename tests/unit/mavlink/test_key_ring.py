@@ -212,3 +212,28 @@ async def test_hanging_disk_refuses_frames_ahead_of_it_for_a_second_only(folder:
     assert one.problem == ""
     assert verdict() is Verdict.VERIFIED
     await one.close()
+
+
+async def test_hanging_disk_locks_out_stations_of_no_key(folder: Path) -> None:
+    """The timestamp of one key is late: that of the other must not wait for its turn meanwhile."""
+    write_key(folder, "office", CONTENT)
+    one = ring(folder)
+    keys = [opened(one), opened(one, "office")]
+    await one.start()
+    stations = [Signing("station", SECRET + (ticks(time.time()) + 3600 * TICKS).to_bytes(8, "little")) for _ in keys]
+    beat = pack(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+
+    def verdicts() -> list[Verdict]:
+        return [
+            signing.judge(station.sign(frame(beat, 0, 255, 190, SIGNED), 1), 0, {})
+            for signing, station in zip(keys, stations, strict=True)
+        ]
+
+    with hanging(STATE_WRITER):
+        assert verdicts() == 2 * [Verdict.UNSAVED]
+        await until(lambda: not any(signing.is_kept for signing in keys))
+        assert verdicts() == 2 * [Verdict.VERIFIED]
+    await until(lambda: all(signing.is_kept for signing in keys))
+    assert one.problem == ""
+    assert verdicts() == 2 * [Verdict.VERIFIED]
+    await one.close()
