@@ -112,6 +112,10 @@ class SerialLine(Reopening):
             self._port = await loop.run_in_executor(None, opening)
         except ValueError as error:
             raise OSError(f"{baud} baud: {error}") from error
+        except OSError:
+            raise
+        except Exception as error:  # termios.error, which POSIX alone has: the device has vanished meanwhile
+            raise OSError(*error.args) from error
         line = baud / BITS_PER_BYTE
         budget = line
         if baud <= RADIO_BAUD and self.parsed.options.bytes_per_second is None:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import errno
+import os
 import socket
+import termios
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -432,6 +435,30 @@ async def test_serial_line_connected_later_is_opened(tmp_path: Path) -> None:
             d.node.send(ATTITUDE, sysid=1, compid=1)
             await client.wait("ATTITUDE", since=0)
             await client.close()
+
+
+@pytest.mark.parametrize("is_at_start", [True, False])
+async def test_serial_line_that_vanishes_while_it_is_opened_is_opened_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, is_at_start: bool
+) -> None:
+    """termios then reports an error that is no OSError."""
+    device, flush, failures = tmp_path / "ttyUSB0", termios.tcflush, [termios.error(errno.EIO, os.strerror(errno.EIO))]
+
+    def tcflush(file: int, queue: int) -> None:
+        if failures:
+            raise failures.pop()
+        flush(file, queue)
+
+    monkeypatch.setattr(termios, "tcflush", tcflush)
+    async with pseudo_terminal() as (_, name):
+        if is_at_start:
+            device.symlink_to(name)
+        async with bench(f"serial://{device}:57600") as d:
+            if not is_at_start:
+                device.symlink_to(name)
+            await d.until(lambda: not failures, 10.0)
+            assert f"not connected ({os.strerror(errno.EIO)}), retrying" in d.node.endpoints[0].describe()
+            await d.until(lambda: len(d.node.channels) == 1, 10.0)
 
 
 async def test_a_failing_service_costs_no_connection() -> None:
