@@ -229,7 +229,7 @@ class Node:
         `give_way`: a full channel drops this before an answer, because the next one of its kind replaces it. Raises
         `LocalProtocolError` for a field that does not fit; nothing is then sent.
         """
-        self._router.own_sources.add((sysid, compid))
+        self._router.own((sysid, compid))
         packed = pack(message)
         if packed.id == dialect.MAVLINK_MSG_ID_HEARTBEAT and compid != dialect.MAV_COMP_ID_AUTOPILOT1:
             self._heartbeats[sysid, compid] = packed
@@ -243,7 +243,7 @@ class Node:
 
     def send_batch(self, batch: Batch, to: Iterable[Channel]) -> None:
         """Send messages of streams of one of our components to some channels."""
-        self._router.own_sources.add(batch.sender)
+        self._router.own(batch.sender)
         for channel in to:
             channel.send_batch(batch)
 

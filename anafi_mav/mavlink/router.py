@@ -99,6 +99,16 @@ class Router(Generic[KeyT, HostT]):
         found = [hosts.get(component, hosts.get(EVERY_COMPONENT)) for hosts in systems.values()]
         return tuple([host for host in found if host is not None])
 
+    def own(self, source: tuple[int, int]) -> None:
+        """Note that frames leave in this name.
+
+        Another sender that had it before is no destination any longer: its answers are dropped from now on.
+        """
+        if source not in self.own_sources:
+            self.own_sources.add(source)
+            for sources in self._channels.values():
+                sources.discard(source)
+
     def is_ours(self, sysid: int) -> bool:
         """Return True for a system that has a host of ours, also one that is not there at present."""
         return sysid in self._hosts or sysid in self._absent_hosts

@@ -166,6 +166,18 @@ async def test_message_for_our_system_is_not_forwarded() -> None:
         assert (numbers(twenty), numbers(thirty)) == ([3], [3])
 
 
+async def test_message_for_our_system_reaches_no_vehicle_that_had_its_name_before() -> None:
+    async with three(loopback()) as (d, ten, twenty, thirty):
+        d.node.add_host(10, 190, d.inbound.append)
+        d.node.send(BEAT, sysid=10, compid=190)
+        twenty.send(ping(10, 190, 1))
+        twenty.send(ping(0, 0, 2))
+        await thirty.wait("PING", since=0)
+        await ten.wait("PING", lambda message: message.seq == 2, since=0)
+        assert numbers(ten) == [2]
+        assert [message.seq for message in d.got("PING", 20)] == [1, 2, 2]  # to all: both of our hosts
+
+
 async def test_component_added_as_host_receives_its_messages() -> None:
     """A camera component beside the autopilot: one line at its owner's, and nothing else knows of it."""
     async with three(loopback()) as (d, ten, twenty, _):

@@ -175,6 +175,23 @@ def test_our_own_echo_is_dropped_and_teaches_nothing(router: Router[str, str]) -
     assert router.heard_on(OURS) == []
 
 
+def test_another_vehicle_with_our_name_of_before_receives_nothing() -> None:
+    """It was heard while our drone was not connected yet: it must not fly what is commanded to ours."""
+    router = Router[str, str]()
+    for name in ("a", "b"):
+        router.add(name)
+    router.add_absent_host(OURS, "absent")
+    router.route("b", heartbeat(source=(OURS, 1)), 0.0)
+    assert router.route("a", command(OURS, 1, seq=1), 0.0).forward == ("b",)
+    router.add_host(OURS, 1, "autopilot")
+    router.own((OURS, 1))
+    route = router.route("a", command(OURS, 1, seq=2), 0.0)
+    assert (route.hosts, route.forward) == (("autopilot",), ())
+    router.remove_hosts(OURS)
+    route = router.route("a", command(OURS, 1, seq=3), 0.0)
+    assert (route.hosts, route.forward) == (("absent",), ())
+
+
 def test_frame_received_twice_is_forwarded_once(router: Router[str, str]) -> None:
     frame = heartbeat(seq=9)
     assert router.route("a", frame, 10.0).forward == ("b", "c")
