@@ -75,6 +75,8 @@ ENDPOINTS = """
 | `serial:///dev/ttyUSB0:57600` | a serial line, here with 57600 baud |
 | `zenoh://HOST:PORT` | connects to a zenoh router, for stations anywhere ([fabric](fabric.md)) |
 
+Over UDP a host name stands for its IPv4 address, where it has one: ground stations listen there.
+
 An endpoint has the options of [this table](#endpoints). They have two forms with the same meaning, in a URL and as
 keys. In a URL they follow `?`, are joined by `&`, and a list is joined by commas. In a shell, put the URL in quotes:
 

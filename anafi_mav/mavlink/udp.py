@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import ipaddress
 import logging
 import socket
 from collections.abc import Callable
@@ -46,6 +47,30 @@ whatever is in it, and telemetry may take 20 ms."""
 
 def _datagram_limit(url: EndpointUrl) -> int:
     return url.options.datagram_bytes if url.options.frames == "many" else ONE_FRAME
+
+
+async def _family(url: EndpointUrl) -> socket.AddressFamily:
+    """Return the kind of addresses to choose from: of IPv4, where a name has one.
+
+    Ground stations listen on IPv4, and with UDP it does not show when none listens. Debian's `localhost` has ::1
+    first.
+    """
+    if _is_address(url.place):
+        return socket.AF_UNSPEC
+    loop = asyncio.get_running_loop()
+    try:
+        await loop.getaddrinfo(url.place, url.number, family=socket.AF_INET, type=socket.SOCK_DGRAM)
+    except socket.gaierror:
+        return socket.AF_UNSPEC
+    return socket.AF_INET
+
+
+def _is_address(place: str) -> bool:
+    try:
+        ipaddress.ip_address(place.partition("%")[0])
+    except ValueError:
+        return False
+    return True
 
 
 class _Datagrams(asyncio.DatagramProtocol):
@@ -145,9 +170,10 @@ class UdpOut(Endpoint):
         transport, self._transport = self._transport, None
         await _shut(transport)
         self.channel.resume()  # the one that may have paused it is gone
-        address = (self.parsed.place, self.parsed.number)
         self._transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
-            lambda: _Datagrams(self._received, self._failed, self._paused), remote_addr=address
+            lambda: _Datagrams(self._received, self._failed, self._paused),
+            remote_addr=(self.parsed.place, self.parsed.number),
+            family=await _family(self.parsed),
         )
         self.channel.local_host = seen_host(
             self._transport.get_extra_info("sockname"), self._transport.get_extra_info("peername")
@@ -234,6 +260,7 @@ class UdpIn(Listener):
         self._transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
             lambda: _Datagrams(self._received, self._failed, self._paused),
             local_addr=(self.parsed.place, self.parsed.number),
+            family=await _family(self.parsed),
         )
         self._start_sweep()
 

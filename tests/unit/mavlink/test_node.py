@@ -433,6 +433,38 @@ async def test_address_that_is_not_allowed_is_refused(scheme: str, caplog: pytes
     assert sum("not one of allowed_peers" in record.getMessage() for record in caplog.records) == 1
 
 
+@pytest.mark.parametrize("scheme", ["udpout", "udpin"])
+async def test_host_with_addresses_of_both_kinds_is_used_by_its_ipv4_address(
+    monkeypatch: pytest.MonkeyPatch, scheme: str
+) -> None:
+    """As localhost of Debian is: ground stations listen on IPv4, and send to it."""
+    host, resolve = loopback(), socket.getaddrinfo
+
+    def both(name: Any, port: Any, family: int = 0, *rest: Any, **options: Any) -> Any:
+        if name != "station.test":
+            return resolve(name, port, family, *rest, **options)
+        families = {socket.AF_INET6: "::1", socket.AF_INET: host}
+        return [
+            found
+            for kind, address in families.items()
+            if family in (0, kind)
+            for found in resolve(address, port, kind, *rest, **options)
+        ]
+
+    monkeypatch.setattr(socket, "getaddrinfo", both)
+    client = await UdpClient(10).open(host)
+    port = client.port if scheme == "udpout" else udp_port(host)
+    async with bench(f"{scheme}://station.test:{port}") as d:
+        if scheme == "udpout":
+            d.node.send(BEAT, sysid=1, compid=1)
+            await client.wait("HEARTBEAT", since=0)
+        else:
+            client.peer = (host, port)
+            client.send(BEAT)
+            await d.until(lambda: bool(d.got("HEARTBEAT", 10)))
+    await client.close()
+
+
 async def test_serial_line_connected_later_is_opened(tmp_path: Path) -> None:
     device = tmp_path / "ttyUSB0"
     async with bench(f"serial://{device}:57600") as d:
