@@ -39,6 +39,9 @@ MAX_BYTES = 4 * 1024 * 1024
 MAX_ASIDE = 100
 """Unreadable files of one drone that are kept."""
 
+LARGEST = 10**18
+"""Largest whole number in settings, either way: JSON has no bound, and floats take none of more than 308 digits."""
+
 _SERIAL = re.compile(r"[A-Za-z0-9_-]{1,64}")
 """Parrot's are 18 letters and digits. It comes from the drone and becomes the name of a file."""
 
@@ -121,6 +124,8 @@ def _read_file(path: Path, serial: str) -> _Stored:
             raise ValueError(f"it is of version {content.version}, not {VERSION}")
         if content.serial != serial:
             raise ValueError("it is of another drone")
+        if not _fits(content.settings):
+            raise ValueError(f"a number in its settings is larger than {LARGEST:.0e}")
     except FileNotFoundError:
         return _Stored()
     except OSError as error:
@@ -128,6 +133,15 @@ def _read_file(path: Path, serial: str) -> _Stored:
     except (ValueError, RecursionError) as error:
         return _Stored(problem=texts.MEMORY_INVALID.fill(path=path, error=error, aside=_put_aside(path)))
     return _Stored({kind: tuple(map(_loaded, items)) for kind, items in content.plans.items()}, content.settings)
+
+
+def _fits(value: Any) -> bool:
+    """Return True if no whole number in a JSON value is too large for arithmetic with floats."""
+    if isinstance(value, dict):
+        return all(map(_fits, value.values()))
+    if isinstance(value, list):
+        return all(map(_fits, value))
+    return not isinstance(value, int) or abs(value) <= LARGEST
 
 
 def _put_aside(path: Path) -> str:

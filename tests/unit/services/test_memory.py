@@ -187,6 +187,9 @@ BAD = {
     "a place out of range": plan(16, 0, [0, 0, 0, 0], 2**31, 2, 3, 1, 0),
     "a float out of range": plan(16, 0, [1e300, 0, 0, 0], 1, 2, 3, 1, 0),
     "too many items": json.dumps({**valid(), "plans": {"1": [[16, 0, [0, 0, 0, 0], 1, 2, 3, 1, 0]] * 5001}}).encode(),
+    "a setting that no float holds": json.dumps(
+        {**valid(), "settings": {"parameters": {"a": [1, -(10**400)]}}}
+    ).encode(),
     "deep": b'{"settings":' + b"[" * 100_000,
     "large": b" " * (MAX_BYTES + 1),
 }
