@@ -158,8 +158,8 @@ class _Supervised:
         self._reported_at = -math.inf
         """Time of the last text about another aircraft at the address."""
         self._contention = Contention()
-        self._judged = drone.handshake_at
-        """The handshake whose loss was judged last."""
+        self._judged = (drone.handshake_at, self.connections)
+        """The handshake whose loss was judged last, and how many connections there were: a silent session may go on."""
         drone.subscribe(self._on_event, without=VALUES)
 
     async def run(self) -> None:
@@ -247,11 +247,12 @@ class _Supervised:
     async def _contend(self) -> None:
         """Stay away for a while if another controller has taken the drone of a lost connection."""
         drone, contention = self.drone, self._contention
-        if drone.handshake_at == self._judged or await drone.heard_again():
+        connection = (drone.handshake_at, self.connections)
+        if connection == self._judged or await drone.heard_again():
             return
-        self._judged = drone.handshake_at
+        self._judged = connection
         age = drone.last_heard - drone.handshake_at
-        if not drone.may_be_displaced or not contention.lost(age, dismissed=drone.dismissed):
+        if not contention.lost(age, displaced=drone.may_be_displaced, dismissed=drone.dismissed):
             return
         self._report(Severity.CRITICAL, texts.OTHER_CONTROLLER)
         away = contention.stay_away()

@@ -46,14 +46,17 @@ class Contention:
         if self._connected:
             self._guest = False
 
-    def lost(self, age: float, *, dismissed: bool = False) -> bool:
+    def lost(self, age: float, *, displaced: bool = True, dismissed: bool = False) -> bool:
         """Note a lost connection; return True when another controller acquired the drone.
 
-        The connection was last heard `age` s after its handshake. One short connection alone may have been bad radio,
-        unless the drone `dismissed` us, or was flown by another controller already.
+        The connection was last heard `age` s after its handshake. `displaced`: it was lost as another handshake would
+        end it. One short connection alone may have been bad radio, unless the drone `dismissed` us, or was flown by
+        another controller already. A long one ends a row of short ones, however it was lost.
         """
         if age > SHORT:
             self._short = self._yields = 0
+            return False
+        if not displaced:
             return False
         self._short += 1
         return dismissed or self._guest or self._short > 1

@@ -124,6 +124,25 @@ async def test_gateway_from_before_takeoff_yields_after_five_losses() -> None:
                 await session.close()
 
 
+async def test_bad_radio_twice_is_no_second_controller_with_a_long_connection_between() -> None:
+    """It ends when the drone closes its port, which no handshake of another controller does."""
+    async with world(speed=1.0) as w:
+        w.client.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+        for is_last in (False, True):
+            w.drone.faults.mute = True
+            await w.client.silence("HEARTBEAT", 5.0)
+            w.drone.faults.mute = False
+            await w.client.heartbeat(lambda beat: True, timeout=15.0)
+            if not is_last:
+                await asyncio.sleep(6.0)
+                session, mark = w.drone.session, now()
+                assert session is not None
+                session.end("switched off")
+                await w.drone.wait_log(lambda e: (e.kind, e.name) == ("session", "up"), 10.0, since=mark)
+                await w.client.heartbeat(lambda beat: True, timeout=10.0)
+        assert TAKEN not in [m.text for _, m in w.client.since(0, "STATUSTEXT")]
+
+
 @pytest.mark.parametrize(
     ("cause", "taken"),
     [(common.DisconnectionCause.UNKNOWN, True), (common.DisconnectionCause.OFF_BUTTON, False)],

@@ -53,6 +53,16 @@ def test_pauses_double_to_five_minutes_until_a_long_connection() -> None:
     assert guest.stay_away() == 30.0
 
 
+def test_long_connection_ends_a_row_of_short_ones_however_it_is_lost() -> None:
+    first = Contention(middle)
+    first.connected(airborne=False)
+    first.lost(1.0)
+    assert not first.lost(100.0, displaced=False)  # the drone was switched off, for example
+    assert not first.lost(1.0)
+    assert not first.lost(1.0, displaced=False)  # no other controller, and no proof of peace either
+    assert first.lost(1.0)
+
+
 @pytest.mark.parametrize(("chance", "pause"), [(0.0, 24.0), (0.5, 30.0), (1.0, 36.0)])
 def test_pauses_vary_by_a_fifth(chance: float, pause: float) -> None:
     guest = Contention(lambda: chance)
