@@ -20,13 +20,21 @@ from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.endpoint_options import EndpointConfig
 from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.access import STOPPING, WITH_SECRETS, Access, concerns_link, needed_access, needed_by_others
+from anafi_mav.mavlink.access import (
+    COMMANDS,
+    STOPPING,
+    WITH_SECRETS,
+    Access,
+    concerns_link,
+    needed_access,
+    needed_by_others,
+)
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, reason
 from anafi_mav.mavlink.channel import Channel, total
 from anafi_mav.mavlink.endpoint import EndpointFactory, make_endpoint, parse_endpoint
 from anafi_mav.mavlink.frames import Batch, Packed, ReceivedFrame, pack
 from anafi_mav.mavlink.key_ring import KeyRing
-from anafi_mav.mavlink.router import Route, Router, has_target, targets
+from anafi_mav.mavlink.router import CommandCopies, Route, Router, has_target, targets
 from anafi_mav.mavlink.signing import Signing
 from anafi_mav.mavlink.stall import StallWatch
 
@@ -54,6 +62,8 @@ class Inbound(msgspec.Struct, frozen=True):
     """False when it needs more than the access of its channel: it must have no effect."""
     is_late: bool = False
     """True for a command or mode that may have been sent while the host stalled: only a stop has an effect."""
+    first: Channel | None = None
+    """The channel over which the same command arrived a moment before; None: it is no copy."""
 
     @property
     def client(self) -> Hashable:
@@ -121,6 +131,7 @@ class Node:
         self._clock = clock or SystemClock()
         self._telemetry: set[int] = set()
         self._router: Router[Channel, Receiver] = Router()
+        self._copies: CommandCopies[Channel] = CommandCopies()
         self._delivers = True
         self._forwards = forwards
         self._flavours = flavours
@@ -293,6 +304,7 @@ class Node:
     def closed(self, channel: Channel) -> None:
         _log_change("closed", channel)
         self._router.remove(channel)
+        self._copies.forget(channel)
         self.channels = [other for other in self.channels if other is not channel]
         self._closed[channel.endpoint].update(total([channel]))
         if self.on_channel is not None:
@@ -340,7 +352,13 @@ class Node:
                 if received.id not in STOPPING:
                     continue
             message, id = received.message, received.id
-            inbound = Inbound(message, id, channel, received.sysid, received.compid, now, permitted, old)
+            first = None
+            if id in COMMANDS and permitted and not old:
+                purpose = route.hosts, channel.options
+                first = self._copies.first(channel, received, purpose, now)
+                if first is None:
+                    self._copies.note(channel, received, purpose, now)
+            inbound = Inbound(message, id, channel, received.sysid, received.compid, now, permitted, old, first)
             if id == dialect.MAVLINK_MSG_ID_SETUP_SIGNING:
                 # Before the log and the hosts: it holds a key.
                 if self._on_setup_signing is not None:

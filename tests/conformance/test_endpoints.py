@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import math
 import random
 import socket
 import sys
@@ -16,6 +17,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as stock
+from support.fault_scenarios import watched
 from support.lines import SerialClient, UdpClient, pseudo_terminal
 from support.mav import Client
 from support.world import ARMED, HOLD, HOME, loopback, world
@@ -26,7 +28,11 @@ from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 
-ACCEPTED = 0
+ACCEPTED, IN_PROGRESS, CANCELLED = (
+    mav_enums.MAV_RESULT_ACCEPTED,
+    mav_enums.MAV_RESULT_IN_PROGRESS,
+    mav_enums.MAV_RESULT_CANCELLED,
+)
 LINK_TIMEOUT = 3.0
 """s without a heartbeat after which MAVSDK calls a system lost; QGroundControl waits a little longer."""
 ARM, TAKE_OFF, REPOSITION, LAND = (
@@ -289,6 +295,29 @@ def page_request(method: str, body: bytes) -> bytes:
     """A request that the page of any web site can make a browser send, with a body of the page's choice."""
     head = f"{method} / HTTP/1.1\r\nHost: 127.0.0.1:5760\r\nOrigin: https://example.org\r\nContent-Length: {len(body)}"
     return head.encode() + b"\r\n\r\n" + body
+
+
+@pytest.mark.parametrize(
+    ("flavour", "results"), [("px4", [[ACCEPTED], [ACCEPTED]]), ("ardupilot", [[CANCELLED], [ACCEPTED]])]
+)
+async def test_command_over_two_links_of_a_router_is_carried_out_once(flavour: str, results: list[list[int]]) -> None:
+    """Over a link of another flavour it may be another command: Hold of PX4 is no mode of ArduPilot."""
+    async with world(speed=4.0, also=flavour) as w:
+        second = await w.connect(port=5761)
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        marks = [client.mark() for client in (w.client, second)]
+        frame = w.client.pack(
+            stock.MAVLink_command_long_message(1, 1, TAKE_OFF, 0, 0, 0, 0, math.nan, 0, 0, HOME[2] + 5)
+        )
+        for client in (w.client, second):
+            client.send_raw(frame)
+        await w.drone.wait_log(lambda e: e.name.endswith("moveByEnd"), 20.0)
+        await watched(2.0)
+        acks = [
+            [m.result for _, m in client.since(mark, "COMMAND_ACK") if m.result != IN_PROGRESS]
+            for client, mark in zip((w.client, second), marks, strict=True)
+        ]
+        assert acks == results
 
 
 @pytest.mark.parametrize(

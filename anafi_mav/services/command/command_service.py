@@ -266,6 +266,12 @@ class CommandService(Service):
         self._act(inbound, command)
 
     def _act(self, inbound: Inbound, command: Command) -> None:
+        if (original := self._original_of(inbound, command)) is not None:
+            if original.result == dialect.MAV_RESULT_IN_PROGRESS:
+                original.copies.append(inbound)
+            else:
+                self._acknowledge(inbound, command.id, original.result)
+            return
         now, effect, vehicle = self.host.clock.monotonic(), command.effect, self.host.vehicle
         # Before it is known whether it is a retransmission: a program that repeats its Hold is to be noticed.
         counted = effect is not Effect.HOLD or vehicle.holds.arrive(command.client, now)
@@ -292,6 +298,15 @@ class CommandService(Service):
         running = RunningAction(command.client, flies=flies, answer=(inbound, execution), group=group)
         self._spawn(self._execute(inbound, execution), running)
 
+    def _original_of(self, inbound: Inbound, command: Command) -> Execution | None:
+        """Return the action of a command that has arrived over another link of a router, too."""
+        if inbound.first is None:
+            return None
+        client = (inbound.first, inbound.sysid, inbound.compid)
+        first = replace(command, client=client, component=self.host.compid)
+        is_flight = command.group is ActionGroup.FLIGHT
+        return self._history.newest(first) if is_flight else self.host.payload_history.newest(first)
+
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:
         command = execution.command
         policy = command.progress
@@ -299,7 +314,7 @@ class CommandService(Service):
             self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)  # it waits for the climb's end
 
         def report() -> None:
-            self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)
+            self._acknowledge_all(inbound, execution, dialect.MAV_RESULT_IN_PROGRESS)
             progress.set_in(PROGRESS_EVERY)
 
         progress = Alarm(report)
@@ -330,7 +345,7 @@ class CommandService(Service):
         """Send the one final acknowledgement of an action."""
         if execution.result == dialect.MAV_RESULT_IN_PROGRESS:
             execution.result, execution.ended = result, self.host.clock.monotonic()
-            self._acknowledge(inbound, execution.command.id, result)
+            self._acknowledge_all(inbound, execution, result)
             if result == dialect.MAV_RESULT_ACCEPTED:
                 self.log.accept(result, execution.ended - inbound.now)
             else:
@@ -398,6 +413,11 @@ class CommandService(Service):
             await work
         except AnafiMavError as error:
             self._explain(error)
+
+    def _acknowledge_all(self, inbound: Inbound, execution: Execution, result: int) -> None:
+        """Acknowledge a command on each link over which it has arrived."""
+        for one in (inbound, *execution.copies):
+            self._acknowledge(one, execution.command.id, result)
 
     def _acknowledge(self, inbound: Inbound, command: int, result: int) -> None:
         self.host.send(
