@@ -10,19 +10,26 @@ drones a datagram arrives every tenth of a millisecond. While drones send that m
 `PAUSE`, and what is sent for them shares datagrams. Clients do not wait, and with few drones nothing waits.
 
 What drones have due at a time is done between looks at the sockets, a little at a time (`paced_calls`).
+
+Names are looked up in threads of their own. A name server that does not answer keeps a thread for half a minute, and
+each attempt to connect takes another one. asyncio's own threads are few, missions are translated in them, and the end
+of the program waits for them.
 """
 
 from __future__ import annotations
 
 import asyncio
 import selectors
+import socket
 import sys
 import time
 from collections import deque
 from collections.abc import Callable, Coroutine, Mapping
+from functools import partial
 from typing import Any, TypeAlias, TypeVar
 
 from anafi_mav.cli.paced_calls import PacedCall, PacedCalls
+from anafi_mav.disk_writer import DiskWriter
 from anafi_mav.receive_buffer import OpenSocket
 
 AT_ONCE = 4
@@ -43,6 +50,9 @@ WINDOW = 0.1
 
 BUSY = 60
 """Sockets with data within `WINDOW` that make a busy time: of 20 drones that send 30 times a second."""
+
+LOOKUPS = 16
+"""Names that are looked up at the same time. One that waits for its turn is forgotten when its attempt ends."""
 
 ResultT = TypeVar("ResultT")
 
@@ -189,6 +199,25 @@ class GatewayLoop(asyncio.SelectorEventLoop):
         self._paced = PacedSelector()
         super().__init__(self._paced)
         self._calls = PacedCalls(lambda: self._paced.looked, self._request_calls, self.time)
+        self._names = DiskWriter("anafi-mav-names", threads=LOOKUPS)
+
+    async def getaddrinfo(
+        self,
+        host: bytes | str | None,
+        port: bytes | str | int | None,
+        *,
+        family: int = 0,
+        type: int = 0,
+        proto: int = 0,
+        flags: int = 0,
+    ) -> Any:
+        """Look a name up in a thread that nothing else waits for."""
+        lookup = partial(socket.getaddrinfo, host, port, family, type, proto, flags)
+        return await self.run_in_executor(self._names, lookup)
+
+    def close(self) -> None:
+        self._names.shutdown()
+        super().close()
 
     def read_after_clients(self, sock: OpenSocket) -> None:
         """See `receive_buffer.read_after_clients`."""

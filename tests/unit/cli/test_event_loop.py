@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import selectors
 import socket
+import threading
 from collections.abc import Iterator
 from contextlib import ExitStack
 from functools import partial
@@ -15,10 +16,23 @@ from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.link.session import Session
 from anafi_mav.arsdk.link.transport import Role, Transport
 from anafi_mav.arsdk.messages.common import AllStates
-from anafi_mav.cli.event_loop import AT_ONCE, BUSY, MOST_OWED, PATIENCE, PAUSE, WINDOW, GatewayLoop, PacedSelector
+from anafi_mav.cli.event_loop import (
+    AT_ONCE,
+    BUSY,
+    LOOKUPS,
+    MOST_OWED,
+    PATIENCE,
+    PAUSE,
+    WINDOW,
+    GatewayLoop,
+    PacedSelector,
+)
 from anafi_mav.cli.paced_calls import LONGEST, SLICE
 from anafi_mav.mavlink import dialect, frames
 from anafi_mav.mavlink.node import Inbound, Node
+
+UNANSWERED = 30.0
+"""s until a lookup ends without an answer."""
 
 
 class Moment:
@@ -365,6 +379,37 @@ def test_client_is_read_between_paced_calls_and_after_overdue_timers() -> None:
     assert at <= most
     assert order[at + 1] == "timer"
     assert [*order[:at], *order[at + 2 :]] == [f"call {number}" for number in range(2 * most)]
+
+
+def test_names_that_are_not_resolved_delay_no_other_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As with a name server that does not answer: neither work in threads nor the end of the program waits for it."""
+    answer = threading.Event()
+
+    def resolve(*address: object) -> list[object]:
+        answer.wait(UNANSWERED)
+        return [address]
+
+    monkeypatch.setattr(socket, "getaddrinfo", resolve)
+
+    async def look() -> None:
+        loop = asyncio.get_running_loop()
+        lookups = [loop.create_task(loop.getaddrinfo(f"drone{number}.test", 44445)) for number in range(3 * LOOKUPS)]
+        await asyncio.sleep(0)
+        assert await asyncio.wait_for(asyncio.to_thread(lambda: 7), UNANSWERED / 2) == 7
+        await asyncio.wait_for(loop.shutdown_default_executor(), UNANSWERED / 2)
+        answer.set()
+        found: object = await lookups[0]
+        assert found == [("drone0.test", 44445, 0, 0, 0, 0)]
+        for lookup in lookups:
+            lookup.cancel()
+        await asyncio.wait(lookups)
+
+    loop = GatewayLoop()
+    try:
+        loop.run_until_complete(look())
+    finally:
+        answer.set()
+        loop.close()
 
 
 def _datagram() -> bytes:
