@@ -45,6 +45,11 @@ PAUSE = 0.005
 whatever is in it, and telemetry may take 20 ms."""
 
 
+HOLDS = 5.0
+"""s without an error after which a socket that was opened again counts as working. The kernel looks for a computer that
+is switched off for 3 s (Linux net.ipv4.neigh), and reports it then."""
+
+
 def _datagram_limit(url: EndpointUrl) -> int:
     return url.options.datagram_bytes if url.options.frames == "many" else ONE_FRAME
 
@@ -125,8 +130,8 @@ class UdpOut(Endpoint):
     """One channel, open from start to end, whether a peer listens there or not.
 
     The socket is connected: only that peer is heard. It is opened again on any network error but "connection
-    refused",
-    because a connected socket keeps the local address it had, and a laptop changes networks.
+    refused", because a connected socket keeps the local address it had, and a laptop changes networks. The log has an
+    error once, however often it returns while the peer's computer is off.
     """
 
     def __init__(self, url: EndpointUrl, sink: Sink, clock: Clock) -> None:
@@ -138,6 +143,10 @@ class UdpOut(Endpoint):
         self._transport: asyncio.DatagramTransport | None = None
         self._reopening: asyncio.Task[None] | None = None
         self._problem = ""
+        self._reported = ""
+        """The problem in the log; empty while it is over."""
+        self._failure: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        """Done when the present socket has failed."""
 
     async def open(self) -> None:
         self._protect(self.channel)
@@ -202,10 +211,12 @@ class UdpOut(Endpoint):
             self._reopen(error)
 
     def _reopen(self, error: Exception) -> None:
-        problem = reason(error)
-        if problem != self._problem:
-            logger.warning("%s: %s", self.url, problem)
-        self._problem = problem
+        self._problem = reason(error)
+        if self._problem != self._reported:
+            logger.warning("%s: %s", self.url, self._problem)
+        self._reported = self._problem
+        if not self._failure.done():
+            self._failure.set_result(None)
         if self._reopening is None or self._reopening.done():
             self._reopening = asyncio.get_running_loop().create_task(self._try_again())
 
@@ -215,12 +226,16 @@ class UdpOut(Endpoint):
             await asyncio.sleep(pause)
             pause = min(2 * pause, RETRY_LAST)
             self.counters["reopened"] += 1
+            self._failure = asyncio.get_running_loop().create_future()
             try:
                 await self._connect()
             except OSError as error:
                 self._problem = reason(error)
-            else:
+                continue
+            await asyncio.wait([self._failure], timeout=HOLDS)
+            if not self._failure.done():
                 logger.warning("%s: open again", self.url)
+                self._reported = ""
                 return
 
 

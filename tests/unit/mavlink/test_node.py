@@ -26,6 +26,7 @@ from anafi_mav.mavlink.channel import QUEUE_BYTES, Channel
 from anafi_mav.mavlink.frames import Parser, ReceivedFrame, frame, pack
 from anafi_mav.mavlink.node import Inbound, Node
 from anafi_mav.mavlink.router import EVERY_COMPONENT
+from anafi_mav.mavlink.udp import HOLDS, UdpOut
 
 ATTITUDE = dialect.MAVLink_attitude_message(1, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5)
 BEAT = stock.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
@@ -479,6 +480,31 @@ async def test_serial_line_connected_later_is_opened(tmp_path: Path) -> None:
             d.node.send(ATTITUDE, sysid=1, compid=1)
             await client.wait("ATTITUDE", since=0)
             await client.close()
+
+
+async def test_station_that_is_switched_off_is_in_the_log_once(caplog: pytest.LogCaptureFixture) -> None:
+    """The kernel reports it every three seconds, which loopback cannot show; another socket helps after a change."""
+    host = loopback()
+    client = await UdpClient(10).open(host)
+    async with bench(f"udpout://{host}:{client.port}") as d:
+        (endpoint,) = d.node.endpoints
+        assert isinstance(endpoint, UdpOut)
+        away = OSError(errno.EHOSTUNREACH, os.strerror(errno.EHOSTUNREACH))
+        for _ in range(5):
+            assert endpoint._transport is not None
+            protocol = endpoint._transport.get_protocol()
+            assert isinstance(protocol, asyncio.DatagramProtocol)
+            protocol.error_received(away)
+            assert endpoint.describe() == f"{endpoint.url}: {os.strerror(errno.EHOSTUNREACH)}, retrying"
+            await d.until(lambda: not endpoint._problem, 10.0)
+            await asyncio.sleep(3.0)
+            d.node.send(BEAT, sysid=1, compid=1)
+            await client.wait("HEARTBEAT")
+        await asyncio.sleep(HOLDS)
+    await client.close()
+    assert endpoint.counters["reopened"] == 5
+    said = [record.getMessage() for record in caplog.records if record.levelname == "WARNING"]
+    assert said == [f"{endpoint.url}: {os.strerror(errno.EHOSTUNREACH)}", f"{endpoint.url}: open again"]
 
 
 @pytest.mark.parametrize("is_at_start", [True, False])
