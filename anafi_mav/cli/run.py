@@ -187,14 +187,13 @@ async def _run(config: Config, sim_log: Path | None) -> list[str]:
         gateway_config, fleet = place(config, stack.enter_context(Reservations()))
         freezer = stack.enter_context(contextlib.closing(HeapFreezer()))
         gateway = Gateway(gateway_config, on_first_connection=freezer.request)
-        if not await _unless(signals.stop, _start(gateway, fleet, sim_log, stack)):
-            return []
-        signals.flying = gateway.drones_in_air
-        for line in gateway.lines():
-            say(line)
-        say("ready, Ctrl-C ends", "green")
-        manager.ready(f"{len(gateway.systems)} drones")
-        await signals.stop.wait()
+        signals.flying = gateway.drones_in_air  # it serves clients before it is ready, and a drone may fly already
+        if await _unless(signals.stop, _start(gateway, fleet, sim_log, stack)):
+            for line in gateway.lines():
+                say(line)
+            say("ready, Ctrl-C ends", "green")
+            manager.ready(f"{len(gateway.systems)} drones")
+            await signals.stop.wait()
         manager.stopping()
         for sentence in signals.unsaid():
             say(sentence, "yellow")

@@ -18,6 +18,7 @@ from typing import Any
 import msgspec
 import pytest
 from support.mav import Client
+from support.process import simulator_process
 from support.product import Product, free_udp_port, product
 from support.world import HOLD, HOME, loopback
 
@@ -27,6 +28,7 @@ from anafi_mav.cli.addresses import Reservations
 from anafi_mav.cli.run import ASKED_FOR, StopSignals, configuration, place
 from anafi_mav.cli.sim import Fleet
 from anafi_mav.config import Config, load
+from anafi_mav.drone import FlyingState, connect
 from anafi_mav.mavlink.key_ring import write_key
 from anafi_mav.sim.world.wind import WindSpec
 
@@ -315,6 +317,50 @@ async def test_ctrl_c_before_ready_ends_cleanly(tmp_path: Path) -> None:
     for writer in held:
         writer.close()
     server.close()
+
+
+@asynccontextmanager
+async def starting_in_the_air(folder: Path) -> AsyncIterator[Product]:
+    """A gateway that waits for its silent drone bravo while its clients see alpha, which flies."""
+    address, flying, silent = loopback(), loopback(), loopback()
+    accepted = asyncio.Event()
+    server = await asyncio.start_server(lambda reader, writer: accepted.set(), silent, 44445)
+    config = f"""
+        endpoints: ["tcpin://{address}:5760"]
+        drones:
+          - {{name: alpha, sysid: 1, address: {flying}}}
+          - {{name: bravo, sysid: 2, address: {silent}}}
+    """
+    async with simulator_process(flying, folder / "sim.jsonl", "--http-port", "0", "--rtsp-port", "0"):
+        async with connect(flying) as drone:
+            await drone.piloting.take_off()
+            await drone.wait_for(FlyingState.HOVERING)
+        async with product(folder, config, ready=False) as p:
+            await asyncio.wait_for(accepted.wait(), 30.0)
+            client = await Client().connect(5760, address)
+            await client.heartbeat(lambda beat: beat.base_mode & mav_enums.MAV_MODE_FLAG_SAFETY_ARMED)
+            yield p
+            await client.close()
+    server.close()
+
+
+async def test_ctrl_c_before_ready_asks_first_about_a_drone_in_the_air(tmp_path: Path) -> None:
+    async with starting_in_the_air(tmp_path) as p:
+        p.process.send_signal(signal.SIGINT)
+        await p.line(lambda line: line.startswith("Ctrl-C once more"))
+        (sentence,) = (line for line in p.lines if "in the air" in line)
+        assert sentence.startswith("alpha is in the air: it will hover and fly home ")
+        await p.line(lambda line: line.startswith("ready"))  # it goes on
+        p.process.send_signal(signal.SIGINT)
+        assert await p.end(15.0) == 0
+
+
+async def test_sigterm_before_ready_reports_a_drone_in_the_air(tmp_path: Path) -> None:
+    async with starting_in_the_air(tmp_path) as p:
+        p.process.send_signal(signal.SIGTERM)
+        assert await p.end(15.0) == 0
+        (sentence,) = (line for line in p.lines if "in the air" in line)
+        assert sentence.startswith("alpha is in the air: it will hover and fly home ")
 
 
 async def test_a_killed_gateway_leaves_no_simulator(tmp_path: Path) -> None:
