@@ -128,7 +128,8 @@ def configuration(
     config = load(path) if path is not None else Config()
     if drones:
         entries = [{"name": f"drone{sysid}", "sysid": sysid, **spot(text)} for sysid, text in enumerate(drones, 1)]
-        config = msgspec.structs.replace(config, drones=from_mapping({"drones": entries}).drones)
+        ids = {} if config.sysids is None else {"sysids": config.sysids}
+        config = msgspec.structs.replace(config, drones=from_mapping({"drones": entries, **ids}).drones)
     if endpoints:
         config = msgspec.structs.replace(config, endpoints=from_mapping({"endpoints": endpoints}).endpoints)
     return msgspec.structs.replace(config, allow_kill=True) if allow_kill else config

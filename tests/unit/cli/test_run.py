@@ -167,6 +167,16 @@ def test_run_without_configuration_flies_the_default_fleet() -> None:
     assert configuration(None, ["192.168.42.1"], None, True).drones[0].sysid == 1
 
 
+def test_drone_option_outside_the_system_ids_of_the_file_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The ids outside belong to another gateway of the same zenoh network."""
+    fleet = tmp_path / "fleet.yaml"
+    fleet.write_text("sysids: 2-5\ndrones: [{name: alpha, sysid: 2, address: 192.168.42.1}]\n")
+    assert main(["run", "-c", str(fleet), "--drone", "192.168.42.1"]) == 2
+    assert capsys.readouterr().err == "anafi-mav: --drone: expected one of sysids, 2-5, got 1\n"
+
+
 async def test_run_prints_each_drone_and_endpoint_before_ready(tmp_path: Path) -> None:
     address, first, second, absent = loopback(), loopback(), loopback(), loopback()
     port = free_udp_port(address)
