@@ -89,7 +89,7 @@ def _check(arguments: argparse.Namespace) -> int:
         config = configuration(arguments.config, arguments.drone, arguments.endpoint, arguments.allow_kill)
         if arguments.sim_log is not None and any(drone.sim is not None for drone in config.drones):
             log.check("--sim-log", arguments.sim_log)
-        findings = asyncio.run(run_check.findings(config, place))
+        findings = asyncio.run(run_check.findings(config, place, lambda error: _located(error, arguments)))
     except ConfigError as error:
         located = _located(error, arguments)
         findings = [run_check.wrong("configuration", str(located), "mend it at that key")]

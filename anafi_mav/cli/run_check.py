@@ -28,20 +28,25 @@ Place = Callable[[Config, Reservations], tuple[Config, dict[str, Any] | None]]
 """Gives simulated drones their addresses. Raises `ConfigError`."""
 
 
-async def findings(config: Config, place: Place) -> list[Finding]:
-    """Return a line for each thing that a start needs."""
+async def findings(
+    config: Config, place: Place, located: Callable[[ConfigError], ConfigError] = lambda error: error
+) -> list[Finding]:
+    """Return a line for each thing that a start needs.
+
+    `located` returns an error with the option of the command line that its key is from.
+    """
     found = [versions(), ok("configuration", f"{len(config.drones)} drones, {len(config.endpoints)} endpoints")]
     found += [ok("configuration", f"warning: {warning.text}") for warning in start_warnings.warnings_of(config)]
     with Reservations() as reservations:
         try:
             placed, _ = place(config, reservations)
         except ConfigError as error:
-            return [*found, wrong(error.key_path, error.problem, "mend it at that key")]
+            return [*found, wrong(located(error).key_path, error.problem, "mend it at that key")]
     gateway = Gateway(placed, saves=False)
     try:
         await gateway.open()
     except ConfigError as error:
-        return [*found, wrong(error.key_path, error.problem, "mend it at that key, or free what it names")]
+        return [*found, wrong(located(error).key_path, error.problem, "mend it at that key, or free what it names")]
     try:
         problems = gateway.state_problems()
         found += [wrong("state", problem, "give the gateway a folder that it can write") for problem in problems]

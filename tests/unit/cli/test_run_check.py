@@ -51,6 +51,13 @@ def test_check_names_a_busy_port(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert "endpoints[0]: WRONG: cannot open tcpin://127.0.0.1:" in out
 
 
+def test_check_names_the_option_of_an_endpoint(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status, out = check(configuration(tmp_path, 0), capsys, "--endpoint", "udpout://127.0.0.1")
+    assert status == 1
+    assert "--endpoint: WRONG: 'udpout://127.0.0.1': expected udpout://HOST:PORT" in out
+    assert "endpoints[0]" not in out
+
+
 def test_check_names_another_gateway_of_the_state_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     lock = StateLock(tmp_path / "state")
     assert lock.acquire() is None
