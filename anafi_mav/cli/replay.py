@@ -140,7 +140,10 @@ async def play(
     Raises `AnafiMavError` as `run` does.
     """
     node = Node(flavours=tuple(FLAVOURS), forwards=False)
-    await node.start(endpoints)
+    try:
+        await node.start(endpoints)
+    except ConfigError as error:
+        raise ConfigError("--endpoint", error.problem) from error
     try:
         return await _send(node, tlogs, traces, speed, start)
     finally:

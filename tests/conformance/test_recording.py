@@ -146,6 +146,14 @@ def test_replay_from_outside_the_recording_is_refused(
     assert capsys.readouterr().err == f"anafi-mav: --start: {error}\n"
 
 
+def test_replay_names_the_option_of_a_wrong_endpoint(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "gateway.0001.tlog").write_bytes(b"")
+    assert main(["replay", str(tmp_path), "--endpoint", "udpout://127.0.0.1"]) == 2
+    assert capsys.readouterr().err.startswith(
+        "anafi-mav: --endpoint: 'udpout://127.0.0.1': expected udpout://HOST:PORT"
+    )
+
+
 def test_parts_of_a_session_follow_each_other_by_number(tmp_path: Path) -> None:
     names = [f"gateway.{number:04d}.tlog" for number in (9999, 10000, 998)]
     for name in names:
