@@ -92,6 +92,7 @@ def run(arguments: argparse.Namespace) -> int:
         http_port=_port("--http-port", arguments.http_port),
         rtsp_port=_port("--rtsp-port", arguments.rtsp_port),
     )
+    options.host("ADDRESS", place.address, options.ADDRESS)
     findings, device = interrupts.run(before_handshake(place))
     held = consent.gateway_of(arguments.state, place.address, place.interface, "" if device is None else device.serial)
     if held is not None:

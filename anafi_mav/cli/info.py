@@ -15,7 +15,7 @@ import msgspec
 
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.mux.mux_link import look_either
-from anafi_mav.cli import consent, interrupts, log
+from anafi_mav.cli import consent, interrupts, log, options
 from anafi_mav.cli.addresses import spot
 from anafi_mav.cli.terminal import complain, say, say_json
 from anafi_mav.drone import Drone
@@ -43,6 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Connect, print, disconnect. Raises `LinkLost` when no drone answers."""
     log.set_up()
     place = spot(arguments.address)
+    options.host("ADDRESS", place["address"], options.ADDRESS)
     held = consent.gateway_of(arguments.state, place["address"], place.get("interface"))
     if held is None and read_holder(state_folder(arguments.state)) is not None:  # perhaps by another address
         held = consent.gateway_of(arguments.state, "", None, interrupts.run(_serial(**place)))

@@ -183,4 +183,4 @@ def _gateway_of(text: str) -> tuple[str, int]:
     port = options.integer("--gateway", tail, "HOST:PORT")
     if not host or not 0 < port <= MAX_PORT:
         raise ConfigError("--gateway", f"expected HOST:PORT, got {text!r}")
-    return host, port
+    return options.host("--gateway", host, "HOST:PORT"), port

@@ -10,6 +10,9 @@ SLOWEST, FASTEST = 0.1, 20.0
 """Simulated seconds per second that a world is let run at."""
 
 
+ADDRESS = "an IPv4 address or a host name, like 192.168.42.1"
+"""Expected address of a drone."""
+
 _UNITS = {"k": 1000, "M": 1000**2, "G": 1000**3}
 
 
@@ -30,6 +33,17 @@ def number(flag: str, text: str, wanted: str) -> float:
     if not math.isfinite(found):
         raise ConfigError(flag, f"expected {wanted}, got {text!r}")
     return found
+
+
+def host(flag: str, text: str, wanted: str) -> str:
+    """Return an address or name that a name server can be asked for. Raises `ConfigError`."""
+    try:
+        known = bool(text.encode("idna"))  # as `socket.getaddrinfo`, whose UnicodeError is no OSError
+    except UnicodeError:
+        known = False
+    if not known:
+        raise ConfigError(flag, f"expected {wanted}, got {text!r}")
+    return text
 
 
 def size(flag: str, text: str) -> int:

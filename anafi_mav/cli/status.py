@@ -20,7 +20,7 @@ import msgspec
 
 from anafi_mav import access_token
 from anafi_mav.access_token import AccessToken, read_token
-from anafi_mav.cli import interrupts, log
+from anafi_mav.cli import interrupts, log, options
 from anafi_mav.cli.terminal import TableRows, is_live, live_tables, say, say_json, say_table
 from anafi_mav.clock import SystemClock
 from anafi_mav.errors import AnafiMavError, ConfigError
@@ -34,6 +34,9 @@ EVERY = 1.0
 
 LIMIT = 5.0
 """s for an answer."""
+
+URL = "a URL like http://192.168.1.7:8088/"
+"""Expected address of another gateway."""
 
 MAX_REFUSED = 10
 """Refused commands that are shown."""
@@ -87,7 +90,8 @@ def find(state: str | None, url: str | None, token: str | None = None) -> AskedG
     if url is not None:
         host = _host_of(url)
         if not host or not url.startswith(("http://", "https://")):
-            raise ConfigError("--url", f"expected a URL like http://192.168.1.7:8088/, got {url!r}")
+            raise ConfigError("--url", f"expected {URL}, got {url!r}")
+        options.host("--url", host, f"the host of {URL}")
         url = url.rstrip("/") + "/"
         if given is None and not is_loopback(host) and (holder is None or holder.web != url):
             raise ConfigError(
@@ -103,8 +107,9 @@ def find(state: str | None, url: str | None, token: str | None = None) -> AskedG
 
 def _host_of(url: str) -> str | None:
     try:
-        return urlsplit(url).hostname
-    except ValueError:
+        parts = urlsplit(url)
+        return None if parts.port == 0 else parts.hostname
+    except ValueError:  # also of a port beyond 65535
         return None
 
 

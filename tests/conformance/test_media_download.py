@@ -340,6 +340,11 @@ async def test_download_from_a_gateway_without_the_drone_is_refused() -> None:
                 pass
 
 
+def test_media_command_with_a_wrong_host_names_the_option(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["media", "list", "--gateway", "a..b:8088"]) == 2
+    assert capsys.readouterr().err == "anafi-mav: --gateway: expected HOST:PORT, got 'a..b'\n"
+
+
 def test_media_command_without_a_gateway_names_it_alone(capsys: pytest.CaptureFixture[str]) -> None:
     """No drone is involved: the address is that of the gateway."""
     assert main(["media", "list", "--gateway", f"127.0.0.1:{free_port()}"]) == 1

@@ -48,11 +48,14 @@ async def open_connection(
 
     Raises `OSError`, of which `LinkLost` is one.
     """
-    if interface is None:
-        local = None if local_address is None else (local_address, 0)
-        reader, writer = await asyncio.open_connection(host, port, family=socket.AF_INET, local_addr=local)
-    else:
-        reader, writer = await _open_connection(host, port, local_address, interface)
+    try:
+        if interface is None:
+            local = None if local_address is None else (local_address, 0)
+            reader, writer = await asyncio.open_connection(host, port, family=socket.AF_INET, local_addr=local)
+        else:
+            reader, writer = await _open_connection(host, port, local_address, interface)
+    except UnicodeError as error:  # of a name that no computer can have: Python refuses to look it up
+        raise socket.gaierror(socket.EAI_NONAME, f"{host!r} is no host name") from error
     read_after_clients(writer.get_extra_info("socket"))
     return reader, writer
 

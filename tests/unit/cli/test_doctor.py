@@ -16,7 +16,7 @@ from support.world import loopback
 
 from anafi_mav.arsdk.link import interface
 from anafi_mav.arsdk.link.handshake import ConnectReply, DeviceInfo, format_discovery, format_reply
-from anafi_mav.cli import doctor
+from anafi_mav.cli import doctor, main
 from anafi_mav.cli.doctor import DroneAddress, Finding, before_handshake, with_handshake
 from anafi_mav.drone import Drone
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
@@ -269,6 +269,16 @@ async def test_info_without_a_terminal_or_take_is_refused() -> None:
         (line,) = held.complaints
         assert line.startswith("anafi-mav: --take: expected it, because connecting takes the drone from any controller")
         assert sessions(drone) == 0
+
+
+@pytest.mark.parametrize("address", ["", "a..b", "\u00fc" * 64])
+@pytest.mark.parametrize("name", ["info", "doctor"])
+def test_address_that_no_name_server_can_be_asked_for_is_refused(
+    name: str, address: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([name, address, "--take"]) == 2
+    expected = f"anafi-mav: ADDRESS: expected an IPv4 address or a host name, like 192.168.42.1, got {address!r}"
+    assert capsys.readouterr().err.strip() == expected
 
 
 @pytest.mark.parametrize(("name", "status"), [("info", 1), ("doctor", 0)])

@@ -60,10 +60,18 @@ def test_token_of_this_computer_goes_to_its_gateway(tmp_path: Path, own: str) ->
         lock.release()
 
 
-@pytest.mark.parametrize("url", ["192.168.1.7:8088", "http://", "ftp://127.0.0.1/", "http://[::1"])
+@pytest.mark.parametrize(
+    "url", ["192.168.1.7:8088", "http://", "ftp://127.0.0.1/", "http://[::1", "http://127.0.0.1:99999"]
+)
 def test_text_that_is_no_url_is_refused(tmp_path: Path, url: str) -> None:
     with pytest.raises(ConfigError, match="--url: expected a URL"):
         find(str(tmp_path), url)
+
+
+@pytest.mark.parametrize("host", ["a..b", "a" * 64])
+def test_host_that_no_name_server_can_be_asked_for_is_refused(tmp_path: Path, host: str) -> None:
+    with pytest.raises(ConfigError, match="--url: expected the host of a URL"):
+        find(str(tmp_path), f"http://{host}/", GIVEN)
 
 
 def test_token_with_a_line_end_is_refused(tmp_path: Path) -> None:

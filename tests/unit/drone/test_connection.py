@@ -195,6 +195,13 @@ async def test_connect_without_a_drone_raises_link_lost(real: SimulatedDrone) ->
             pytest.fail("nothing answers there")
 
 
+async def test_connect_to_what_is_no_host_name_raises_link_lost() -> None:
+    """Python's UnicodeError about such a name is no OSError."""
+    with pytest.raises(LinkLost, match=r"cannot connect to a..b:44445: 'a..b' is no host name"):
+        async with connect("a..b"):
+            pass
+
+
 async def test_expired_wait_names_the_state_and_the_time(real: SimulatedDrone) -> None:
     async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
         await drone.wait_for(FlyingState.LANDED, timeout=0.0)  # it is in that state
