@@ -186,15 +186,36 @@ def read_holder(folder: Path | None) -> Holder | None:
     if folder is None:
         return None
     try:
-        file = os.open(folder / FILE, os.O_RDWR)
+        return find_holder(folder)
     except OSError:
+        return None
+
+
+def find_holder(folder: Path) -> Holder | None:
+    """Return the gateway that holds a folder now; None where none does.
+
+    None also where the file system has no locks. Raises `OSError` where it cannot be known, as `PermissionError` for a
+    folder that this user may not read.
+    """
+    try:
+        file = _open_lock(folder / FILE)
+    except (FileNotFoundError, NotADirectoryError):
         return None
     try:
         return None if try_lock(file) else _read(file)
-    except OSError:
-        return None
+    except OSError as error:
+        if error.errno in NO_LOCKS:
+            return None
+        raise
     finally:
         os.close(file)  # which unlocks it
+
+
+def _open_lock(path: Path) -> int:
+    try:
+        return os.open(path, os.O_RDWR)
+    except PermissionError:  # another user's, as a service's: to look at it, reading is enough (flock(2))
+        return os.open(path, os.O_RDONLY)
 
 
 def _read(file: int) -> Holder:

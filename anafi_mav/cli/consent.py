@@ -12,7 +12,8 @@ import contextlib
 import sys
 from typing import NamedTuple
 
-from anafi_mav.state_lock import HeldDrone, Holder, read_holder, state_folder
+from anafi_mav.errors import ConfigError
+from anafi_mav.state_lock import HeldDrone, Holder, find_holder, state_folder
 
 WARNING = "connecting takes the drone from any controller that has it, in the air too"
 
@@ -38,9 +39,22 @@ class Held(NamedTuple):
         return f"the gateway with process id {self.holder.pid} holds it as {self.drone.name} ({doing})"
 
 
+def holder_of(state: str | None) -> Holder | None:
+    """Return the gateway that holds a state folder now; None where none does.
+
+    Raises `ConfigError` where that cannot be known.
+    """
+    folder = state_folder(state)
+    try:
+        return None if folder is None else find_holder(folder)
+    except OSError as error:
+        problem = f"expected a folder that this user can read, got {folder}: {error.strerror}"
+        raise ConfigError("--state", problem) from error
+
+
 def gateway_of(state: str | None, address: str, interface: str | None, serial: str = "") -> Held | None:
-    """Return the gateway of this host that holds the drone with this address or serial number."""
-    holder = read_holder(state_folder(state))
+    """Return the gateway of a state folder that has the drone with this address or serial."""
+    holder = holder_of(state)
     drone = None if holder is None else holder.find(address, interface, serial)
     return None if holder is None or drone is None else Held(holder, drone)
 

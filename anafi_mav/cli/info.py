@@ -21,7 +21,6 @@ from anafi_mav.cli.terminal import complain, say, say_json
 from anafi_mav.drone import Drone
 from anafi_mav.drone.element import Range
 from anafi_mav.errors import AnafiMavError, ConfigError
-from anafi_mav.state_lock import read_holder, state_folder
 
 LISTEN = 1.2
 """s to listen after the connection: values that the drone sends once a second have arrived by then."""
@@ -45,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     place = spot(arguments.address)
     options.host("ADDRESS", place["address"], options.ADDRESS)
     held = consent.gateway_of(arguments.state, place["address"], place.get("interface"))
-    if held is None and read_holder(state_folder(arguments.state)) is not None:  # perhaps by another address
+    if held is None and consent.holder_of(arguments.state) is not None:  # perhaps by another address
         held = consent.gateway_of(arguments.state, "", None, interrupts.run(_serial(**place)))
     if held is not None:
         complain(f"{arguments.address}: not connected: {held}{consent.GATEWAY_RETRIES}")

@@ -21,11 +21,12 @@ import msgspec
 from anafi_mav import access_token
 from anafi_mav.access_token import AccessToken, read_token
 from anafi_mav.cli import interrupts, log, options
+from anafi_mav.cli.consent import holder_of
 from anafi_mav.cli.terminal import TableRows, is_live, live_tables, say, say_json, say_table
 from anafi_mav.clock import SystemClock
 from anafi_mav.errors import AnafiMavError, ConfigError
 from anafi_mav.relay.uri_host import is_loopback
-from anafi_mav.state_lock import read_holder, state_folder
+from anafi_mav.state_lock import state_folder
 from anafi_mav.status_record import PATH, VERSION, ClientStatus, DroneStatus, GatewayStatus, Quantiles
 from anafi_mav.web.server import QUERY
 
@@ -86,7 +87,7 @@ def find(state: str | None, url: str | None, token: str | None = None) -> AskedG
     if token is not None and not (token.isascii() and token.isprintable()):
         raise ConfigError("--token", "expected a text of ASCII characters")
     given = AccessToken(token) if token else None
-    holder = read_holder(folder)
+    holder = holder_of(state)
     if url is not None:
         host = _host_of(url)
         if not host or not url.startswith(("http://", "https://")):

@@ -7,10 +7,14 @@ import os
 import subprocess
 import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
+from anafi_mav.cli import main
 from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import state_in_use
 from anafi_mav.state_lock import FILE, HeldDrone, Holder, StateLock, read_holder, state_folder
@@ -54,6 +58,50 @@ def test_state_lock_of_a_second_gateway_is_refused(tmp_path: Path) -> None:
     first.release()
     assert second.acquire() is None
     second.release()
+
+
+@contextmanager
+def another_user() -> Iterator[None]:
+    """Root is nobody for the length of a block. The permissions in the test bind any other user anyway."""
+    if os.geteuid() != 0:
+        yield
+        return
+    os.seteuid(65534)
+    try:
+        yield
+    finally:
+        os.seteuid(0)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
+def test_holder_is_found_by_a_user_who_may_only_read() -> None:
+    """A service's: `info` and `doctor` must not take its drones."""
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        folder.chmod(0o755)
+        lock = StateLock(folder)
+        assert lock.acquire() is None
+        lock.write([ALPHA])
+        (folder / FILE).chmod(0o444)
+        with another_user():
+            assert read_holder(folder) == Holder(1, os.getpid(), (ALPHA,))
+        lock.release()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
+@pytest.mark.parametrize("words", [["info", "127.0.0.1", "--take"], ["doctor", "127.0.0.1", "--take"], ["status"]])
+def test_state_folder_that_cannot_be_read_is_an_error_of_the_option(
+    words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        folder.chmod(0o755)
+        (folder / FILE).touch(0o000)
+        with another_user():
+            assert main([*words, "--state", name]) == 2
+            assert read_holder(folder) is None
+    expected = f"anafi-mav: --state: expected a folder that this user can read, got {folder}: Permission denied"
+    assert capsys.readouterr().err.strip() == expected
 
 
 @pytest.mark.skipif(os.name != "posix", reason="Windows deletes no open file")
