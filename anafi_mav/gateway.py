@@ -429,6 +429,7 @@ class Gateway:
                 await self.relay.close()
             await self._close_node()
             raise
+        self._write_lock()  # the web server answers already, and the simulator may need seconds yet
 
     def _start_recording(self) -> Recorder | None:
         """Begin to record, where that is configured. Raises `ConfigError`."""

@@ -13,8 +13,11 @@ from support.product import program
 
 from anafi_mav.access_token import VARIABLE, AccessToken, load_token
 from anafi_mav.cli.status import AskedGateway, fetch, find
+from anafi_mav.config import Config, DroneConfig
+from anafi_mav.config.schema import HttpConfig
 from anafi_mav.errors import AnafiMavError, ConfigError
-from anafi_mav.state_lock import StateLock
+from anafi_mav.gateway import Gateway
+from anafi_mav.state_lock import STATE_WRITER, StateLock
 from anafi_mav.web.server import HttpServer
 
 ELSEWHERE = "http://192.168.1.7:8088/"
@@ -77,6 +80,20 @@ def test_host_that_no_name_server_can_be_asked_for_is_refused(tmp_path: Path, ho
 def test_token_with_a_line_end_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="--token: expected a text of ASCII"):
         find(str(tmp_path), ELSEWHERE, "x\r\nHost: y")
+
+
+async def test_gateway_that_is_starting_is_found(tmp_path: Path) -> None:
+    """Its web server answers as soon as it is open, while the simulator still starts."""
+    drone = DroneConfig(name="alpha", sysid=1, address="127.0.0.1")
+    endpoints, http = ("udpout://127.0.0.1:9",), HttpConfig(port=0)
+    gateway = Gateway(Config(endpoints=endpoints, drones=(drone,), state=str(tmp_path), http=http, video=False))
+    await gateway.open()
+    try:
+        assert await STATE_WRITER.drain(5.0)
+        assert gateway.web is not None
+        assert find(str(tmp_path), None).url == gateway.web.describe()
+    finally:
+        await gateway.close()
 
 
 @pytest.fixture
