@@ -159,7 +159,7 @@ class GatewayStatus(msgspec.Struct, frozen=True, kw_only=True):
     loop_delay: Quantiles
     """How late timers of the event loop were within the last minute."""
     problems: tuple[str, ...]
-    """Of the state folder."""
+    """Of the state folder and the recording."""
     drones: tuple[DroneStatus, ...]
     endpoints: tuple[EndpointStatus, ...]
     video: ServerStatus | None

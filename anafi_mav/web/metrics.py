@@ -62,7 +62,7 @@ def metrics(status: GatewayStatus) -> Iterator[Metric]:
     yield _gauge("info", "Version of the gateway.", [Sample({"version": status.program}, 1)])
     yield _gauge("uptime_seconds", "Time since the start.", [Sample({}, status.uptime_s)])
     yield _gauge("loop_delay_seconds", "How late timers were in the last minute.", _quantiles({}, status.loop_delay))
-    yield _gauge("state_problems", "Problems with the state folder.", [Sample({}, len(status.problems))])
+    yield _gauge("state_problems", "Problems with state folder and recording.", [Sample({}, len(status.problems))])
     yield from _of_drones([({"drone": drone.name, "sysid": drone.sysid}, drone) for drone in status.drones])
     yield from _of_endpoints(status)
     names = tuple(f"{drone.name}." for drone in status.drones)
