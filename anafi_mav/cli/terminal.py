@@ -80,24 +80,43 @@ def has_lost_output() -> bool:
 
 
 def is_live() -> bool:
-    """True when stdout is a terminal, on which lines can be replaced."""
-    return sys.stdout.isatty()
+    """True when stdout is a terminal on which lines can be replaced.
+
+    On a dumb one rich shows nothing before its end.
+    """
+    if not sys.stdout.isatty():
+        return False
+    from rich.console import Console
+
+    return not Console(file=sys.stdout).is_dumb_terminal
 
 
 @contextlib.contextmanager
 def live_tables() -> Iterator[Callable[[Sequence[str], Sequence[TableRows]], None]]:
-    """Lines and tables below them on the terminal, replaced by each call of what it gives."""
+    """Lines and tables below them on the terminal, replaced by each call of what it gives.
+
+    What is wider than the terminal is folded. The last line tells how many lines have no room below.
+    """
     from rich.console import Console, Group
     from rich.live import Live
+    from rich.segment import SegmentLines
     from rich.text import Text
 
-    with Live(console=Console(file=sys.stdout), screen=True, auto_refresh=False) as screen:
+    console = Console(file=sys.stdout)
+    with Live(console=console, screen=True, auto_refresh=False) as screen:
 
         def show(lines: Sequence[str], tables: Sequence[TableRows]) -> None:
-            parts: list[Text | Table] = [Text(printable(line), no_wrap=True) for line in lines]
+            parts: list[Text | Table] = [Text(printable(line), overflow="fold") for line in lines]
             for table in tables:
-                parts += [Text(), _table(table.head, table.rows)]
-            screen.update(Group(*parts), refresh=True)
+                parts += [Text(), _table(table.head, table.rows, width=console.width)]
+            picture = console.render_lines(Group(*parts), pad=False)
+            room = console.height - 1
+            more = len(picture) - room
+            if more > 1:
+                last = Text(f"and {more} more lines: make the window higher, or add | cat", "bold")
+                screen.update(Group(SegmentLines(picture[:room], new_lines=True), last), refresh=True)
+            else:
+                screen.update(SegmentLines(picture, new_lines=True), refresh=True)
 
         yield show
 
@@ -124,17 +143,24 @@ def say_table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Contain
         say(line.rstrip())
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Container[int] = ()) -> Table:
+def _table(
+    head: Sequence[str], rows: Sequence[Sequence[str]], right: Container[int] = (), width: int = _UNFOLDED
+) -> Table:
+    """Return a table whose last column can be folded.
+
+    Every column can be where they are wider than `width` together.
+    """
     from rich.cells import cell_len
     from rich.table import Table
     from rich.text import Text
 
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="bold")
+    least = [max(cell_len(printable(row[place])) for row in [head, *rows]) for place in range(len(head))]
+    least[-1] = min(least[-1], _LAST_COLUMN)
+    is_wide = sum(least) + 2 * (len(least) - 1) > width
     for place, title in enumerate(head):
-        widest = max(cell_len(printable(row[place])) for row in [head, *rows])
-        least = min(widest, _LAST_COLUMN) if place == len(head) - 1 else widest
         justify: JustifyMethod = "right" if place in right else "left"
-        table.add_column(Text(title), justify=justify, min_width=least, overflow="fold")
+        table.add_column(Text(title), justify=justify, min_width=None if is_wide else least[place], overflow="fold")
     for row in rows:
         table.add_row(*(Text(printable(cell)) for cell in row))
     return table

@@ -3,20 +3,62 @@
 from __future__ import annotations
 
 import asyncio
+import io
+import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
 import aiohttp
 import msgspec
+import pytest
 from aiohttp import web
 from support.statuses import STATUS
 
 from anafi_mav.cli.status import LIMIT, find, follow, head
-from anafi_mav.cli.terminal import TableRows
+from anafi_mav.cli.terminal import TableRows, is_live, live_tables
 from anafi_mav.state_lock import StateLock
 from anafi_mav.status_record import PATH
 from anafi_mav.web.server import HttpServer
+
+
+class _Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def picture(monkeypatch: pytest.MonkeyPatch, table: TableRows, *, columns: int, lines: int) -> list[str]:
+    """What a terminal of this size shows of a table, line by line."""
+    screen = _Terminal()
+    monkeypatch.setattr("sys.stdout", screen)
+    for name, value in ("COLUMNS", str(columns)), ("LINES", str(lines)), ("TERM", "xterm"):
+        monkeypatch.setenv(name, value)
+    assert is_live()
+    with live_tables() as show:
+        show(["first"], [table])
+        return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue()).splitlines()
+
+
+def test_table_on_a_narrow_terminal_loses_no_column(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Warnings are the last column: on 80 columns they were beyond the edge."""
+    table = TableRows(("x", "y"), [("a" * 30, "w" * 40)])
+    text = "".join(picture(monkeypatch, table, columns=40, lines=25))
+    assert (text.count("a"), text.count("w")) == (30, 40)
+
+
+def test_table_on_a_low_terminal_tells_what_is_below(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = picture(monkeypatch, TableRows(("x",), [(f"row {number}",) for number in range(30)]), columns=80, lines=10)
+    assert [line.strip() for line in shown[-2:]] == [
+        "row 5",
+        "and 24 more lines: make the window higher, or add | cat",
+    ]
+
+
+def test_dumb_terminal_is_not_live(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No line can be replaced there: the status is printed once."""
+    monkeypatch.setattr("sys.stdout", _Terminal())
+    monkeypatch.setenv("TERM", "dumb")
+    assert not is_live()
 
 
 class Screen:
