@@ -16,6 +16,7 @@ INTERRUPTED = 130
 
 try:
     import atexit
+    import io
     import os
     import signal  # which imports others, and is not there yet
 except KeyboardInterrupt:
@@ -27,6 +28,7 @@ def main() -> int:
     _end_at_once_on_interrupt(INTERRUPTED)
     atexit.register(_ignore_interrupt)  # the first that is registered runs last
     _open_closed_streams()
+    _escape_what_has_no_encoding()
     gc.disable()
     from anafi_mav.cli import main as run
 
@@ -47,6 +49,16 @@ def _open_closed_streams() -> None:
         if getattr(sys, name) is None:
             os.open(os.devnull, os.O_RDWR)  # gets the lowest free number, which is this one
             setattr(sys, name, open(number, mode, closefd=False))  # noqa: SIM115
+
+
+def _escape_what_has_no_encoding() -> None:
+    """Let the standard streams replace characters that their encoding lacks by escapes.
+
+    A terminal without a degree sign is no reason to end a command, or a flight.
+    """
+    for stream in sys.stdout, sys.stderr:
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _collect_garbage() -> None:

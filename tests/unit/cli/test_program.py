@@ -8,9 +8,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
+
+MISSIONS = Path(__file__).parents[3] / "missions"
 
 PROBE = """
 import gc, sys, types
@@ -75,6 +78,26 @@ def test_program_with_closed_standard_streams_does_its_work(closed: str, tmp_pat
     assert done.returncode == (2 if is_blind else 0)  # without stdin there is no key
     assert done.stderr in (b"", b"anafi-mav: --hex: expected 64 hexadecimal digits that are not all 0\n")
     assert (tmp_path / "keys" / "field.key").exists() is not is_blind
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="it needs a terminal")
+def test_terminal_without_a_character_gets_its_escape(tmp_path: Path) -> None:
+    """Also in a table, which rich writes."""
+    plan = tmp_path / "b\u00fccher.plan"
+    plan.write_bytes((MISSIONS / "survey.plan").read_bytes())
+    parent, child = os.openpty()
+    command = (sys.executable, "-m", "anafi_mav", "plan", "show", str(plan))
+    env = {**os.environ, "PYTHONIOENCODING": "ascii", "COLUMNS": "200", "TERM": "xterm"}
+    with subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=child, stderr=child, env=env) as process:
+        os.close(child)
+        shown = b""
+        with suppress(OSError):  # Linux: the other end is closed
+            while data := os.read(parent, 4096):
+                shown += data
+        assert process.wait(60.0) == 0, shown
+    os.close(parent)
+    assert b"b\\xfccher.plan: 14 items" in shown
+    assert b"NAV_RETURN_TO_LAUNCH" in shown
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full, which only Linux has")
