@@ -73,8 +73,6 @@ def parse(text: str | bytes, source: str) -> object:
         raise ConfigError("", f"{source}: {one_line(str(error))}") from error
     except RecursionError as error:
         raise ConfigError("", f"{source}: lists or mappings inside each other without end") from error
-    except ValueError as error:  # a date like 2026-02-31
-        raise ConfigError("", f"{source}: {one_line(str(error))}") from error
 
 
 def one_line(text: str) -> str:
@@ -83,10 +81,18 @@ def one_line(text: str) -> str:
 
 
 class _Loader(yaml.SafeLoader):
-    """SafeLoader that refuses a repeated key.
+    """SafeLoader that refuses a repeated key, and knows the place of a value that is none.
 
-    YAML forbids it, PyYAML keeps the last one silently.
+    YAML forbids such a key, PyYAML keeps the last one silently.
     """
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        """Return the value of a node; a date like 2026-02-31 is none."""
+        try:
+            return super().construct_object(node, deep=deep)
+        except (ValueError, LookupError, AttributeError) as error:  # the latter two of `!!bool x`, `!!timestamp x`
+            problem = f"expected a value of type {node.tag.rpartition(':')[2]}, got {_short.repr(node.value)}"
+            raise yaml.constructor.ConstructorError(None, None, problem, node.start_mark) from error
 
     def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
         node = super().compose_mapping_node(anchor)

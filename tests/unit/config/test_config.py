@@ -285,7 +285,10 @@ MISTAKES = {
     "allow_kill: true\nallow_kill: false": "fleet.yaml, line 2, column 1: the key 'allow_kill' stands twice in one mapping",
     "a: !!python/object:os.system x": "fleet.yaml, line 1, column 4: could not determine a constructor for the tag 'tag:yaml.org,2002:python/object:os.system'",
     'pose: "\\ud800"': "fleet.yaml, line 1, column 7: half a character (surrogate)",
-    "a: 2026-02-31": "fleet.yaml: day is out of range for month",
+    "allow_kill: true\na: 2026-02-31": "fleet.yaml, line 2, column 4: expected a value of type timestamp, got '2026-02-31'",
+    "a: 0b_": "fleet.yaml, line 1, column 4: expected a value of type int, got '0b_'",
+    "a: !!bool x": "fleet.yaml, line 1, column 4: expected a value of type bool, got 'x'",
+    "a: !!timestamp x": "fleet.yaml, line 1, column 4: expected a value of type timestamp, got 'x'",
     "[" * 5000: "fleet.yaml: lists or mappings inside each other without end",
 }  # fmt: skip
 
