@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import anafi_mav
-from anafi_mav.cli.terminal import complain
+from anafi_mav.cli.terminal import complain, complain_later
 from anafi_mav.errors import AnafiMavError, ConfigError
 
 START_LIMIT = 30.0
@@ -118,6 +118,6 @@ class SimulatorProcess:
         async for line in self._process.stderr:
             text = line.decode(errors="replace").strip().removeprefix("anafi-mav: ")
             if self._ready.done():
-                complain(text)
+                complain_later(text)  # drones fly
             else:
                 self._complaints.append(text)

@@ -22,7 +22,7 @@ from functools import partial
 from pathlib import Path
 from types import TracebackType
 
-from anafi_mav.cli.terminal import complain
+from anafi_mav.cli.terminal import MAX_WAITING, STDERR_WRITER, complain, complain_later, write_stderr
 from anafi_mav.disk_writer import DiskWriter
 from anafi_mav.errors import ConfigError
 from anafi_mav.printable import printable
@@ -40,11 +40,8 @@ FILE_BYTES, OLD_FILES = 10_000_000, 5
 """Bytes of a log file before it is put aside as FILE.1, and files that are put aside: 60 MB in all, which is months of
 warnings, or some hours with -vv."""
 
-MAX_WAITING = 5000
-"""Lines that may wait for the disk: some 2 MB."""
-
 END_LIMIT = 0.5
-"""s that the end of the program waits for the disk, twice at most."""
+"""s that the end of the program waits for the disk or the terminal, twice at most."""
 
 MAX_LINES = 200
 """Different lines whose repetition is noticed."""
@@ -174,20 +171,19 @@ class BoundedLogFile:
                 older.replace(newer)
 
 
-class LogFileHandler(logging.Handler):
-    """Passes lines to a log file in a thread: a disk that hangs stops no drone.
+class LogThreadHandler(logging.Handler):
+    """Passes lines to a thread that writes them: a disk or a terminal that hangs stops no drone.
 
-    What the disk cannot take is dropped and counted; a line in the file says how many lines are lost.
+    What cannot be taken is dropped and counted; a line says how many lines are lost.
     """
 
-    def __init__(self, path: Path) -> None:
-        """Open the file for appending. Raises OSError."""
+    def __init__(self, writer: DiskWriter, write: Callable[[str], None], slow: str) -> None:
+        """`slow`: what was too slow, for that line."""
         super().__init__()
-        self._path = path
-        self._file = BoundedLogFile(path)
-        self._writer = DiskWriter("anafi-mav-log", max_waiting=MAX_WAITING)
+        self._writer = writer
+        self._write = write
+        self._slow = slow
         self._lost = 0
-        self._has_complained = False
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write a record later, or count it."""
@@ -197,11 +193,9 @@ class LogFileHandler(logging.Handler):
             self.handleError(record)
             return
         self._post_lost()
-        if self._lost or not self._writer.post(partial(self._file.write, line)):
+        if self._lost or not self._writer.post(partial(self._write, line)):
             self._lost += 1
-            if not self._has_complained:
-                self._has_complained = True
-                complain(f"--log-file: {self._path} is too slow: lines are lost")
+            self._note_loss()
 
     def end(self, timeout: float = END_LIMIT) -> None:
         """Wait until everything is written, `timeout` s at most."""
@@ -209,15 +203,33 @@ class LogFileHandler(logging.Handler):
         self._post_lost()
         self._writer.wait(timeout)
 
+    def _note_loss(self) -> None:
+        """Handle the loss of a line, beside counting it."""
+
     def _post_lost(self) -> None:
         """Write how many lines were lost, when there is room for it."""
         if not self._lost:
             return
-        record = logging.LogRecord(
-            __name__, logging.WARNING, "", 0, "%d lines lost: disk too slow", (self._lost,), None
-        )
-        if self._writer.post(partial(self._file.write, self.format(record))):
+        text, lost = "%d lines lost: %s too slow", (self._lost, self._slow)
+        record = logging.LogRecord(__name__, logging.WARNING, "", 0, text, lost, None)
+        if self._writer.post(partial(self._write, self.format(record))):
             self._lost = 0
+
+
+class LogFileHandler(LogThreadHandler):
+    """Passes lines to a log file, and reports once on stderr that lines are lost."""
+
+    def __init__(self, path: Path) -> None:
+        """Open the file for appending. Raises OSError."""
+        file = BoundedLogFile(path)
+        super().__init__(DiskWriter("anafi-mav-log", max_waiting=MAX_WAITING), file.write, "disk")
+        self._path = path
+        self._has_complained = False
+
+    def _note_loss(self) -> None:
+        if not self._has_complained:
+            self._has_complained = True
+            complain_later(f"--log-file: {self._path} is too slow: lines are lost")
 
 
 def check(option: str, path: Path) -> None:
@@ -241,14 +253,13 @@ def set_up(level: int = logging.WARNING, *, path: Path | None = None, kind: str 
 
     `kind`: of `FORMATS`. Raises `ConfigError` for a file that cannot be written.
     """
-    handlers: list[logging.Handler] = [logging.StreamHandler()]
+    handlers: list[LogThreadHandler] = [LogThreadHandler(STDERR_WRITER, write_stderr, "terminal")]
     if path is not None:
         try:
-            file = LogFileHandler(path)
+            handlers.append(LogFileHandler(path))
         except OSError as error:
             raise _unusable("--log-file", path, error) from error
-        handlers.append(file)
-        atexit.register(file.end)
     for handler in handlers:
+        atexit.register(handler.end)
         handler.setFormatter(JsonFormatter() if kind == JSON else CleanFormatter(FORMAT))
     logging.basicConfig(level=level, handlers=[LogOutputs(handlers)])

@@ -20,7 +20,7 @@ from anafi_mav.cli.addresses import Reservations, spot
 from anafi_mav.cli.child import SimulatorProcess
 from anafi_mav.cli.heap_freezer import HeapFreezer, frozen_afterwards
 from anafi_mav.cli.service_manager import ServiceManager
-from anafi_mav.cli.terminal import complain, say
+from anafi_mav.cli.terminal import complain, complain_later, say
 from anafi_mav.config import Config, from_mapping, load
 from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import Gateway, state_in_use
@@ -255,7 +255,7 @@ async def _close(gateway: Gateway) -> None:
 async def _tell_death(simulator: SimulatorProcess, names: str) -> None:
     status = await simulator.wait()
     how = f"by signal {-status}" if status < 0 else f"with status {status}"
-    complain(f"the simulator ended {how}; with it went {names}")
+    complain_later(f"the simulator ended {how}; with it went {names}")
 
 
 def place(config: Config, reservations: Reservations) -> tuple[Config, dict[str, Any] | None]:

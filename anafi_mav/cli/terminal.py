@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import functools
 import io
 import json
 import math
@@ -17,6 +18,7 @@ import sys
 from collections.abc import Callable, Container, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple, TextIO
 
+from anafi_mav.disk_writer import DiskWriter
 from anafi_mav.printable import printable
 
 if TYPE_CHECKING:  # rich is imported for a terminal or a table only
@@ -33,6 +35,12 @@ _UNFOLDED = 100_000
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """Errors of a file that takes no more: the disk, the user's part of it, or the file itself is full."""
+
+MAX_WAITING = 5000
+"""Lines that may wait for a disk or a terminal: some 2 MB."""
+
+STDERR_WRITER = DiskWriter("anafi-mav-stderr", max_waiting=MAX_WAITING)
+"""Writes to stderr for an event loop, which must not wait: a terminal is stopped (Ctrl-S), a reader reads nothing."""
 
 _losses: list[str] = []
 """Why lines of stdout are lost; empty while none is."""
@@ -168,7 +176,33 @@ def _table(
 
 def complain(line: str, style: str = "red") -> None:
     """A line on stderr, with the program's name before it."""
-    _write(sys.stderr, f"anafi-mav: {' '.join(line.split())}", style)
+    _write(sys.stderr, _complaint(line), style)
+
+
+def complain_later(line: str) -> None:
+    """Complain in a thread: for the event loop of a gateway. Dropped when too many lines wait."""
+    STDERR_WRITER.post(functools.partial(write_stderr, printable(_complaint(line))))
+
+
+def _complaint(line: str) -> str:
+    return f"anafi-mav: {' '.join(line.split())}"
+
+
+def write_stderr(line: str) -> None:
+    """Write a line that is clean to stderr, in a thread.
+
+    While it waits it holds no lock that the end of the program needs.
+    """
+    try:
+        number = sys.stderr.fileno()
+    except (OSError, ValueError):  # no file, as in a test, or closed
+        with contextlib.suppress(ValueError):
+            print(line, file=sys.stderr, flush=True)
+        return
+    data = f"{line}\n".encode(sys.stderr.encoding or "utf-8", "backslashreplace")
+    with contextlib.suppress(OSError):  # the reader is gone
+        while data:
+            data = data[os.write(number, data) :]
 
 
 @contextlib.contextmanager

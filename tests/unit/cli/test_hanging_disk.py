@@ -1,9 +1,12 @@
-"""A gateway beside a disk that hangs: its drones go on, and so does its end."""
+"""A gateway beside a disk or a terminal that hangs: its drones go on, and so does its end."""
 
 from __future__ import annotations
 
+import asyncio
 import os
 import signal
+import sys
+from contextlib import suppress
 from pathlib import Path
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -36,6 +39,47 @@ async def test_hanging_log_file_stops_neither_a_command_nor_the_end(tmp_path: Pa
             assert await p.end() == 0
     finally:
         os.close(reading)
+
+
+def full_pipe() -> tuple[int, int]:
+    """A pipe with no room, as a terminal that was stopped by Ctrl-S: its two ends."""
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(writing, bytes(65536))
+    os.set_blocking(writing, True)
+    return reading, writing
+
+
+async def test_stopped_terminal_stops_neither_a_command_nor_the_end(tmp_path: Path) -> None:
+    address = loopback()
+    path = tmp_path / "fleet.yaml"
+    path.write_text(f"""
+        endpoints: ["tcpin://{address}:5760"]
+        drones: [{{name: alpha, sysid: 1, sim: {{address: {loopback()}}}}}]
+    """)
+    reading, writing = full_pipe()
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "anafi_mav", "run", "-c", str(path), "-vv",
+        stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE, stderr=writing,
+    )  # fmt: skip
+    try:
+        assert process.stdout is not None
+        while not (await asyncio.wait_for(process.stdout.readline(), 30.0)).startswith(b"ready"):
+            pass
+        client = await Client().connect(5760, address)
+        await client.heartbeat(lambda beat: True)
+        ack = await client.command(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+        assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        await client.close()
+        process.send_signal(signal.SIGTERM)
+        assert await asyncio.wait_for(process.wait(), 15.0) == 0
+    finally:
+        if process.returncode is None:
+            process.kill()
+        os.close(reading)
+        os.close(writing)
 
 
 async def test_drones_connect_beside_a_hanging_state_folder() -> None:
