@@ -22,7 +22,7 @@ from functools import partial
 from pathlib import Path
 from types import TracebackType
 
-from anafi_mav.cli.terminal import MAX_WAITING, STDERR_WRITER, complain, complain_later, write_stderr
+from anafi_mav.cli.terminal import END_LIMIT, MAX_WAITING, STDERR_WRITER, complain, complain_later, write_stderr
 from anafi_mav.disk_writer import DiskWriter
 from anafi_mav.errors import ConfigError
 from anafi_mav.printable import printable
@@ -39,9 +39,6 @@ TEXT, JSON = FORMATS = ("text", "json")
 FILE_BYTES, OLD_FILES = 10_000_000, 5
 """Bytes of a log file before it is put aside as FILE.1, and files that are put aside: 60 MB in all, which is months of
 warnings, or some hours with -vv."""
-
-END_LIMIT = 0.5
-"""s that the end of the program waits for the disk or the terminal, twice at most."""
 
 MAX_LINES = 200
 """Different lines whose repetition is noticed."""

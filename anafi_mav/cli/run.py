@@ -20,7 +20,7 @@ from anafi_mav.cli.addresses import Reservations, spot
 from anafi_mav.cli.child import SimulatorProcess
 from anafi_mav.cli.heap_freezer import HeapFreezer, frozen_afterwards
 from anafi_mav.cli.service_manager import ServiceManager
-from anafi_mav.cli.terminal import complain, complain_later, say
+from anafi_mav.cli.terminal import END_LIMIT, STDOUT_WRITER, complain, complain_later, say, say_later
 from anafi_mav.config import Config, from_mapping, load
 from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import Gateway, state_in_use
@@ -114,7 +114,8 @@ def _serve(arguments: argparse.Namespace) -> int:
         complain(f"warning: {warning.text}", warning.style)
     problems = event_loop.run(_run(config, arguments.sim_log.absolute() if arguments.sim_log else None))
     for problem in problems:
-        complain(f"not kept: {problem}")
+        complain_later(f"not kept: {problem}")
+    STDOUT_WRITER.wait(END_LIMIT)
     return 1 if problems else 0
 
 
@@ -167,8 +168,8 @@ class StopSignals:
             return
         self._asked = asyncio.get_running_loop().time()
         for sentence in sentences:
-            say(sentence, "yellow")
-        say(f"Ctrl-C once more within {ASKED_FOR:.0f} s ends the gateway all the same", "yellow")
+            say_later(sentence, "yellow")
+        say_later(f"Ctrl-C once more within {ASKED_FOR:.0f} s ends the gateway all the same", "yellow")
 
     @property
     def _has_asked(self) -> bool:
@@ -191,13 +192,13 @@ async def _run(config: Config, sim_log: Path | None) -> list[str]:
         signals.flying = gateway.drones_in_air  # it serves clients before it is ready, and a drone may fly already
         if await _unless(signals.stop, _start(gateway, fleet, sim_log, stack)):
             for line in gateway.lines():
-                say(line)
-            say("ready, Ctrl-C ends", "green")
+                say_later(line)
+            say_later("ready, Ctrl-C ends", "green")
             manager.ready(f"{len(gateway.systems)} drones")
             await signals.stop.wait()
         manager.stopping()
         for sentence in signals.unsaid():
-            say(sentence, "yellow")
+            say_later(sentence, "yellow")
         problems = gateway.state_problems()  # while its drones are there
     # What is last written is written while the gateway closes.
     return [*problems, *(problem for problem in gateway.state_problems() if problem not in problems)]
@@ -249,7 +250,7 @@ async def _close(gateway: Gateway) -> None:
     try:
         await asyncio.wait_for(gateway.close(), CLOSE_LIMIT)
     except asyncio.TimeoutError:
-        complain(f"the gateway did not close within {CLOSE_LIMIT:g} s, leaving it")
+        complain_later(f"the gateway did not close within {CLOSE_LIMIT:g} s, leaving it")
 
 
 async def _tell_death(simulator: SimulatorProcess, names: str) -> None:

@@ -39,8 +39,12 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 MAX_WAITING = 5000
 """Lines that may wait for a disk or a terminal: some 2 MB."""
 
+STDOUT_WRITER = DiskWriter("anafi-mav-stdout", max_waiting=MAX_WAITING)
 STDERR_WRITER = DiskWriter("anafi-mav-stderr", max_waiting=MAX_WAITING)
-"""Writes to stderr for an event loop, which must not wait: a terminal is stopped (Ctrl-S), a reader reads nothing."""
+"""Write for an event loop, which must not wait: a terminal is stopped (Ctrl-S), a reader reads nothing."""
+
+END_LIMIT = 0.5
+"""s that the end of the program waits for a disk or a terminal, twice at most."""
 
 _losses: list[str] = []
 """Why lines of stdout are lost; empty while none is."""
@@ -179,30 +183,72 @@ def complain(line: str, style: str = "red") -> None:
     _write(sys.stderr, _complaint(line), style)
 
 
-def complain_later(line: str) -> None:
+def say_later(line: str, style: str = "") -> None:
+    """Say in a thread: for the event loop of a gateway. Dropped when too many lines wait."""
+    STDOUT_WRITER.post(functools.partial(_write_stdout, _rendered(sys.stdout, line, style)))
+
+
+def complain_later(line: str, style: str = "red") -> None:
     """Complain in a thread: for the event loop of a gateway. Dropped when too many lines wait."""
-    STDERR_WRITER.post(functools.partial(write_stderr, printable(_complaint(line))))
+    STDERR_WRITER.post(functools.partial(write_stderr, _rendered(sys.stderr, _complaint(line), style)))
 
 
 def _complaint(line: str) -> str:
     return f"anafi-mav: {' '.join(line.split())}"
 
 
-def write_stderr(line: str) -> None:
-    """Write a line that is clean to stderr, in a thread.
+def _rendered(stream: TextIO, line: str, style: str) -> str:
+    """Return a line as the stream shows it: on a terminal with its colour."""
+    line = printable(line)
+    if not stream.isatty():
+        return line
+    from rich.console import Console
+    from rich.text import Text
 
-    While it waits it holds no lock that the end of the program needs.
+    console = Console(file=stream)
+    with console.capture() as captured:
+        console.print(Text(line, style), soft_wrap=True)
+    return captured.get().rstrip("\n")
+
+
+def write_stderr(line: str) -> None:
+    """Write a line that is clean to stderr, in a thread."""
+    with contextlib.suppress(OSError, ValueError):  # the reader is gone, or it is closed
+        _write_line(sys.stderr, line)
+
+
+def _write_stdout(line: str) -> None:
+    try:
+        _write_line(sys.stdout, line)
+    except OSError as error:
+        if _is_loss(error):
+            complain_later(_losses[0])
+    except ValueError:  # it is closed
+        return
+
+
+def _write_line(stream: TextIO, line: str) -> None:
+    """Write a line, in a thread.
+
+    While it waits it holds no lock that the end of the program needs. Raises `OSError`, and `ValueError` for a closed
+    stream.
     """
     try:
-        number = sys.stderr.fileno()
-    except (OSError, ValueError):  # no file, as in a test, or closed
-        with contextlib.suppress(ValueError):
-            print(line, file=sys.stderr, flush=True)
+        number = stream.fileno()
+    except io.UnsupportedOperation:  # no file, as in a test
+        print(line, file=stream, flush=True)
         return
-    data = f"{line}\n".encode(sys.stderr.encoding or "utf-8", "backslashreplace")
-    with contextlib.suppress(OSError):  # the reader is gone
-        while data:
-            data = data[os.write(number, data) :]
+    data = f"{line}\n".encode(stream.encoding or "utf-8", "backslashreplace")
+    while data:
+        data = data[os.write(number, data) :]
+
+
+def _is_loss(error: OSError) -> bool:
+    """Record that stdout is full; return True the first time."""
+    if error.errno not in _FULL or _losses:
+        return False
+    _losses.append(f"stdout cannot be written: {error.strerror}")
+    return True
 
 
 @contextlib.contextmanager
@@ -240,8 +286,7 @@ def _write(stream: TextIO, line: str, style: str) -> None:
             print(line.encode(encoding, "backslashreplace").decode(encoding), file=stream, flush=True)
     except OSError as error:  # the reader may be gone (`anafi-mav | head`): no reason to end a flight
         _discard(stream)
-        if stream is sys.stdout and error.errno in _FULL and not _losses:
-            _losses.append(f"stdout cannot be written: {error.strerror}")
+        if stream is sys.stdout and _is_loss(error):
             complain(_losses[0])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import os
 import signal
 import sys
@@ -41,15 +42,13 @@ async def test_hanging_log_file_stops_neither_a_command_nor_the_end(tmp_path: Pa
         os.close(reading)
 
 
-def full_pipe() -> tuple[int, int]:
-    """A pipe with no room, as a terminal that was stopped by Ctrl-S: its two ends."""
-    reading, writing = os.pipe()
-    os.set_blocking(writing, False)
+def fill(pipe: int) -> None:
+    """Leave no room in a pipe, as in a terminal that was stopped by Ctrl-S."""
+    os.set_blocking(pipe, False)
     with suppress(BlockingIOError):
         while True:
-            os.write(writing, bytes(65536))
-    os.set_blocking(writing, True)
-    return reading, writing
+            os.write(pipe, b"x" * 4096)
+    os.set_blocking(pipe, True)
 
 
 async def test_stopped_terminal_stops_neither_a_command_nor_the_end(tmp_path: Path) -> None:
@@ -59,7 +58,8 @@ async def test_stopped_terminal_stops_neither_a_command_nor_the_end(tmp_path: Pa
         endpoints: ["tcpin://{address}:5760"]
         drones: [{{name: alpha, sysid: 1, sim: {{address: {loopback()}}}}}]
     """)
-    reading, writing = full_pipe()
+    reading, writing = os.pipe()
+    fill(writing)
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-m", "anafi_mav", "run", "-c", str(path), "-vv",
         stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE, stderr=writing,
@@ -80,6 +80,39 @@ async def test_stopped_terminal_stops_neither_a_command_nor_the_end(tmp_path: Pa
             process.kill()
         os.close(reading)
         os.close(writing)
+
+
+async def test_sigterm_beside_a_stopped_terminal_hovers_a_drone_in_the_air(tmp_path: Path) -> None:
+    """The sentence about the drone has no room on stdout."""
+    address = loopback()
+    path, log = tmp_path / "fleet.yaml", tmp_path / "sim.jsonl"
+    path.write_text(f"""
+        endpoints: ["tcpin://{address}:5760"]
+        drones: [{{name: alpha, sysid: 1, sim: {{address: {loopback()}}}}}]
+    """)
+    reading, writing = os.pipe()
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "anafi_mav", "run", "-c", str(path), "--sim-log", str(log),
+        stdin=asyncio.subprocess.DEVNULL, stdout=writing,
+    )  # fmt: skip
+    try:
+        shown = b""
+        while b"ready" not in shown:
+            shown += await asyncio.wait_for(asyncio.to_thread(os.read, reading, 4096), 30.0)
+        client = await Client().connect(5760, address)
+        assert (await client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == 0
+        assert (await client.command(dialect.MAV_CMD_NAV_TAKEOFF, x=0.0, y=0.0, z=5.0)).result == 0
+        fill(writing)
+        process.send_signal(signal.SIGTERM)
+        assert await asyncio.wait_for(process.wait(), 15.0) == 0
+        await client.close()
+    finally:
+        if process.returncode is None:
+            process.kill()
+        os.close(reading)
+        os.close(writing)
+    entries = [json.loads(line) for line in log.read_text().splitlines()]
+    assert [entry["name"] for entry in entries if entry["kind"] == "session"] == ["up", "lost"]
 
 
 async def test_drones_connect_beside_a_hanging_state_folder() -> None:

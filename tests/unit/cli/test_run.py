@@ -27,6 +27,7 @@ from anafi_mav.cli import main
 from anafi_mav.cli.addresses import Reservations
 from anafi_mav.cli.run import ASKED_FOR, StopSignals, configuration, place
 from anafi_mav.cli.sim import Fleet
+from anafi_mav.cli.terminal import STDOUT_WRITER
 from anafi_mav.config import Config, load
 from anafi_mav.drone import FlyingState, connect
 from anafi_mav.mavlink.key_ring import write_key
@@ -257,6 +258,7 @@ async def test_ctrl_c_in_the_air_asks_again_after_a_while(capsys: pytest.Capture
     await asyncio.sleep(ASKED_FOR)
     signals.receive(signal.SIGINT)
     assert not signals.stop.is_set()
+    assert await STDOUT_WRITER.drain(5.0)
     assert capsys.readouterr().out.count("alpha is in the air") == 2
     await asyncio.sleep(ASKED_FOR - 1.0)
     assert signals.unsaid() == []
