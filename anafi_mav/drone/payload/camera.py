@@ -572,6 +572,7 @@ class Camera(Commanding[CamerasState]):
                 answer.expire_after(next, command.NAME)
             return judge(update)
 
+        require_number(next)  # before the command: later it would end the wait for what the camera has begun
         answer = self._commander.expect(events, listen)
         self._commander.dispatch(answer, command, first)
         return await answer.wait()

@@ -29,7 +29,7 @@ from anafi_mav.arsdk.messages.gimbal import (
     Model,
 )
 from anafi_mav.drone.element import Range, Reducer, members, with_item
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, require_number
 from anafi_mav.drone.settings import Commanding
 from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError, CommandRejected, LocalProtocolError, NotSupported
@@ -390,6 +390,7 @@ class Gimbal(Commanding[Gimbals]):
 
         Raises `CommandRejected` when it failed.
         """
+        require_number(timeout)
         self._require(self[id].calibration, gimbal.Calibrate.NAME)
 
         def judge(message: gimbal.CalibrationResult | gimbal.CalibrationState) -> bool | AnafiMavError | None:

@@ -583,3 +583,14 @@ async def test_in_the_simulator(model: str) -> None:
         assert await camera.set_autorecord(True) is True
         assert await camera.set_antiflicker(Antiflicker.HZ_50) is Antiflicker.HZ_50
         assert await camera.set_zoom_may_degrade(True) is True
+
+
+async def test_timeout_of_nan_raises_before_the_camera_or_gimbal_begins() -> None:
+    """Found at the first report, it cancelled the task of the caller, and the photo was taken."""
+    async with connected("4k") as (drone, real):
+        await drone.camera.set_mode(CameraMode.PHOTO)
+        before = list(real.log.find("command"))
+        for call in drone.camera.take_photo(timeout=NAN), drone.gimbal.calibrate(timeout=NAN):
+            with pytest.raises(LocalProtocolError, match="timeout"):
+                await call
+        assert list(real.log.find("command")) == before
