@@ -562,7 +562,6 @@ class Camera(Commanding[CamerasState]):
 
         `first` is the timeout, s; each report restarts it with `next` s, unless that is None.
         """
-        require_number(next)
 
         def listen(message: Any) -> Any:
             update = read(message)
