@@ -108,11 +108,9 @@ class Expectation(Generic[T]):
 
         Raises `LocalProtocolError` for NaN, and stops listening.
         """
-        try:
-            require_number(seconds)
-        except LocalProtocolError:
+        if math.isnan(seconds):
             self.close()
-            raise
+            require_number(seconds)
         if self._timer is not None:
             self._timer.cancel()
         self._timer = self.future.get_loop().call_later(seconds, self._expire, what, seconds)

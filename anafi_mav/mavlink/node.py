@@ -240,7 +240,8 @@ class Node:
         `give_way`: a full channel drops this before an answer, because the next one of its kind replaces it. Raises
         `LocalProtocolError` for a field that does not fit; nothing is then sent.
         """
-        self._router.own((sysid, compid))
+        if (sysid, compid) not in self._router.own_sources:
+            self._router.own((sysid, compid))
         packed = pack(message)
         if packed.id == dialect.MAVLINK_MSG_ID_HEARTBEAT and compid != dialect.MAV_COMP_ID_AUTOPILOT1:
             self._heartbeats[sysid, compid] = packed
@@ -254,7 +255,8 @@ class Node:
 
     def send_batch(self, batch: Batch, to: Iterable[Channel]) -> None:
         """Send messages of streams of one of our components to some channels."""
-        self._router.own(batch.sender)
+        if batch.sender not in self._router.own_sources:
+            self._router.own(batch.sender)
         for channel in to:
             channel.send_batch(batch)
 
@@ -353,11 +355,8 @@ class Node:
                     continue
             message, id = received.message, received.id
             first = None
-            if id in COMMANDS and permitted and not old:
-                purpose = route.hosts, channel.options
-                first = self._copies.first(channel, received, purpose, now)
-                if first is None:
-                    self._copies.note(channel, received, purpose, now)
+            if id in COMMANDS and permitted and not old and len(self.channels) > 1:
+                first = self._copies.first(channel, received, (route.hosts, channel.options), now)
             inbound = Inbound(message, id, channel, received.sysid, received.compid, now, permitted, old, first)
             if id == dialect.MAVLINK_MSG_ID_SETUP_SIGNING:
                 # Before the log and the hosts: it holds a key.

@@ -101,14 +101,13 @@ class Router(Generic[KeyT, HostT]):
         return tuple([host for host in found if host is not None])
 
     def own(self, source: tuple[int, int]) -> None:
-        """Note that frames leave in this name.
+        """Note that frames leave in this name from now on.
 
-        Another sender that had it before is no destination any longer: its answers are dropped from now on.
+        Another sender that had it before is no destination any longer: its answers are dropped.
         """
-        if source not in self.own_sources:
-            self.own_sources.add(source)
-            for sources in self._channels.values():
-                sources.discard(source)
+        self.own_sources.add(source)
+        for sources in self._channels.values():
+            sources.discard(source)
 
     def is_ours(self, sysid: int) -> bool:
         """Return True for a system that has a host of ours, also one that is not there at present."""
@@ -215,18 +214,17 @@ class CommandCopies(Generic[KeyT]):
     def first(self, channel: KeyT, received: ReceivedFrame, purpose: Hashable, now: float) -> KeyT | None:
         """Return the other channel over which a command arrived a moment ago.
 
-        None: it is no copy.
+        None: it is no copy, and is noted.
         """
-        first = self._delivered.get((received.identity, purpose))
-        return None if first is None or first[0] == channel or now - first[1] >= RING_WINDOW else first[0]
-
-    def note(self, channel: KeyT, received: ReceivedFrame, purpose: Hashable, now: float) -> None:
-        """Note a command that is delivered and no copy."""
         key = (received.identity, purpose)
-        self._delivered.pop(key, None)
+        first = self._delivered.pop(key, None)
+        if first is not None and first[0] != channel and now - first[1] < RING_WINDOW:
+            self._delivered[key] = first
+            return first[0]
         self._delivered[key] = channel, now
         if len(self._delivered) > RING_FRAMES:
             self._delivered.popitem(last=False)
+        return None
 
     def forget(self, channel: KeyT) -> None:
         """Forget the commands of a closed channel."""

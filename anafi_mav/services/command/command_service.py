@@ -266,7 +266,7 @@ class CommandService(Service):
         self._act(inbound, command)
 
     def _act(self, inbound: Inbound, command: Command) -> None:
-        if (original := self._original_of(inbound, command)) is not None:
+        if inbound.first is not None and (original := self._original_of(inbound, command)) is not None:
             if original.result == dialect.MAV_RESULT_IN_PROGRESS:
                 original.copies.append(inbound)
             else:
@@ -300,8 +300,6 @@ class CommandService(Service):
 
     def _original_of(self, inbound: Inbound, command: Command) -> Execution | None:
         """Return the action of a command that has arrived over another link of a router, too."""
-        if inbound.first is None:
-            return None
         client = (inbound.first, inbound.sysid, inbound.compid)
         first = replace(command, client=client, component=self.host.compid)
         is_flight = command.group is ActionGroup.FLIGHT
@@ -314,7 +312,8 @@ class CommandService(Service):
             self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)  # it waits for the climb's end
 
         def report() -> None:
-            self._acknowledge_all(inbound, execution, dialect.MAV_RESULT_IN_PROGRESS)
+            for one in (inbound, *execution.copies):
+                self._acknowledge(one, command.id, dialect.MAV_RESULT_IN_PROGRESS)
             progress.set_in(PROGRESS_EVERY)
 
         progress = Alarm(report)
@@ -345,7 +344,8 @@ class CommandService(Service):
         """Send the one final acknowledgement of an action."""
         if execution.result == dialect.MAV_RESULT_IN_PROGRESS:
             execution.result, execution.ended = result, self.host.clock.monotonic()
-            self._acknowledge_all(inbound, execution, result)
+            for one in (inbound, *execution.copies):
+                self._acknowledge(one, execution.command.id, result)
             if result == dialect.MAV_RESULT_ACCEPTED:
                 self.log.accept(result, execution.ended - inbound.now)
             else:
@@ -413,11 +413,6 @@ class CommandService(Service):
             await work
         except AnafiMavError as error:
             self._explain(error)
-
-    def _acknowledge_all(self, inbound: Inbound, execution: Execution, result: int) -> None:
-        """Acknowledge a command on each link over which it has arrived."""
-        for one in (inbound, *execution.copies):
-            self._acknowledge(one, execution.command.id, result)
 
     def _acknowledge(self, inbound: Inbound, command: int, result: int) -> None:
         self.host.send(
