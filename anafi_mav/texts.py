@@ -340,6 +340,7 @@ CLIMB_ENDED = Template("Climb to {height:g} m ended at {reached:.1f} m", height=
 CLIMB_ABORTED = Template("Climb to {height:g} m aborted: {error}", height=99.5, error=BELOW)
 DISARMED = OperatorText("Disarmed: no takeoff")
 MODE_MAY_RISE = Template("{mode}: takeoff possible, to 1 m", mode="Position")
+CANCEL_MAY_RISE = OperatorText("Cancelled: takeoff possible, to 1 m")
 SETPOINT_TAKEOFF_SOON = Template("Takeoff by setpoints of system {system} in 1 s", system=255)
 SETPOINT_TAKEOFF_NO_CLIMB = OperatorText("Takeoff by setpoints cancelled: no climb")
 SETPOINT_TAKEOFF_CANCELLED = OperatorText("Takeoff by setpoints cancelled")

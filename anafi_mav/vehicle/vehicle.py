@@ -437,12 +437,17 @@ class Vehicle(Aircraft):
         pauses = pause or (self.control.paused and mode is self.mode)
         hover = Hover(mode, client_of(by) if chosen else None, self._paused_task if pauses else None)
         task = self.manual if mode is FlightMode.POSITION else hover
-        rising = self.drone.piloting.about_to_fly
-        starts = self.flying_state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF)
+        rising, may_rise = self.drone.piloting.about_to_fly, self.may_rise
         async with self.control.acquire(task, by=by, pauses=pauses) as grant:
             grant.begin(pauses=pauses and (rising or not self.on_ground))
-        if rising or starts:
+        if may_rise:
             self.text(Severity.WARNING, texts.MODE_MAY_RISE.fill(mode=mode.value))
+
+    @property
+    def may_rise(self) -> bool:
+        """True while a drone that has not left the ground may take off, whatever is cancelled now."""
+        starts = self.flying_state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF)
+        return starts or self.drone.piloting.about_to_fly
 
     def end_inputs_of_others(self) -> None:
         """End flight by setpoints or sticks of a station that is not the operator.
@@ -464,15 +469,15 @@ class Vehicle(Aircraft):
         control, active, by = self.control, self.control.active, Source.SWITCH
         is_pending = control.state in (State.RELEASING, State.ACQUIRING)
         is_flown = active is not None and active.rules.is_flight
-        may_rise = self.drone.piloting.about_to_fly
+        rising = self.drone.piloting.about_to_fly
         moves = self.drone.controller.taken and not self.on_ground
         if is_flown:
             control.lose(texts.PILOT_SWITCH)
         if self.descends and (not is_pending or control.next in (None, LAND, self.return_end)):
             return
-        if not (is_pending or is_flown or may_rise or moves):
+        if not (is_pending or is_flown or rising or moves):
             return
-        if may_rise or self.flying_state in (FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF):
+        if self.may_rise:
             await self.takeoff.abort(by)
             return
         start = Preparation.AS_IT_IS if self.descends else Preparation.END_DESCENT

@@ -158,6 +158,24 @@ async def test_start_of_another_client_that_waits_for_a_cancelled_one_is_flown()
         await w.drone.wait_log(lambda e: e.name == "plan" and e.args["state"] == "playing")
 
 
+async def test_mission_start_that_is_cancelled_on_the_ground_warns_of_the_takeoff() -> None:
+    """The drone has received it, and pauses once it hovers: as after a Hold."""
+    async with world(speed=1.0, web=True) as w:
+        await put(w, [way(40.0, 0.0, 6.0), way(40.0, 30.0, 6.0)])
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        muted = now_mute(w, "common.Mavlink.Start", 0.3)
+        mark = w.client.mark()
+        w.client.send_command(START)
+        await muted
+        call_off(w.client, START)
+        assert await until(w.client, mark, 1) == [(START, CANCELLED)]
+        text = "Cancelled: takeoff possible, to 1 m"
+        await w.client.wait("STATUSTEXT", lambda m: m.text == text, since=mark)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 10.0)
+        await watched(2.0)
+        assert w.drone.pose.up < 1.5
+
+
 async def test_goto_is_cancelled_by_another_client() -> None:
     async with world(speed=1.0) as w:
         other = await w.connect(sysid=250)

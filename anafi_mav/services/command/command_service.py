@@ -396,6 +396,8 @@ class CommandService(Service):
         for task, running in own or alike:
             if running.answer is not None and running.answer[1].command.is_revocable:
                 task.cancel()
+                if running.flies and self.host.vehicle.may_rise:  # the drone may have received it
+                    self.host.warn_throttled(texts.CANCEL_MAY_RISE)
 
     def _explain(self, error: AnafiMavError) -> int:
         """Send the reason of a refusal as a text; return its MAV_RESULT."""
