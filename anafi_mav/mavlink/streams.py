@@ -150,7 +150,10 @@ class Streams(Generic[ChannelT]):
             self._forget(id)
 
     def is_off(self, channel: ChannelT, id: int) -> bool:
-        """Return True if a client has ended this message on its channel; False if it is not streamed by default."""
+        """Return True if a client has ended this message on its channel.
+
+        One that is not streamed by default is not off.
+        """
         stream = self._channels.get(channel, {}).get(id)
         return stream is not None and stream is not _OFF and stream.interval is None
 

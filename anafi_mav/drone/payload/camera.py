@@ -75,7 +75,10 @@ Ask: TypeAlias = tuple[Message, type[Message]]
 
 
 def _has(settings: SettingsT | None, wish: SettingsT) -> bool:
-    """Return True if the settings have each value of the wish; a number to three digits, as the drone may round it."""
+    """Return True if the settings have each value of the wish.
+
+    A number has it to three digits: the drone may round.
+    """
     for field in wish.__struct_fields__:
         wanted, value = getattr(wish, field), getattr(settings, field, None)
         if isinstance(wanted, float) and value is not None:

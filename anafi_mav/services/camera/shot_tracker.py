@@ -276,7 +276,9 @@ class ShotTracker:
         return lost + capture.report_all(is_saved=True)
 
     def _save_before(self, update: CaptureUpdate, now: float) -> list[CapturedShot]:
-        """Return pictures of the capture before that are reported after its end; none if they have been reported.
+        """Return pictures of the capture before that are reported after its end.
+
+        None of those that have been reported.
 
         The report of their shutter has begun another capture then, with a count that belongs to the one before.
         """

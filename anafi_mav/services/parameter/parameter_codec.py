@@ -55,7 +55,10 @@ class ParamType(enum.Enum):
         return self._struct.pack(round(value) if self.whole else value)
 
     def is_same(self, one: float, other: float) -> bool:
-        """Return True for two values that are equal on the wire: 0.45 is another number in single precision."""
+        """Return True for two values that are equal on the wire.
+
+        0.45 is another number in single precision.
+        """
         return one == other if self.whole else self.to_bytes(one) == self.to_bytes(other)
 
     def from_bytes(self, data: bytes) -> float:
