@@ -81,8 +81,11 @@ class FabricGround:
             for option in url.options.changed():
                 if option not in allowed:
                     raise ConfigError(key, f"{url.text}: expected no {option}: the gateway's endpoint has it")
-        self.endpoints = [make_endpoint(url, self, clock) for url in stations]
-        """For stations."""
+        try:
+            self.endpoints = [make_endpoint(url, self, clock) for url in stations]
+            """For stations."""
+        except ConfigError as error:
+            raise ConfigError("--endpoint", error.problem) from error
         self._open: list[Endpoint] = []
         self._stalls = StallWatch(self._stalled)
         self._stations: dict[Channel, _FabricStation] = {}

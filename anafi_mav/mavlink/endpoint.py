@@ -216,5 +216,5 @@ def make_endpoint(
     """
     factory = SCHEMES[url.scheme].factory or (factories or {}).get(url.scheme)
     if factory is None:
-        raise ConfigError("", f"{url.text}: expected another scheme: {url.scheme}:// is for run and ground only")
+        raise ConfigError("", f"{url.text}: expected another scheme: {url.scheme}:// is for run, and --zenoh of ground")
     return factory(url, sink, clock)

@@ -15,3 +15,10 @@ def test_endpoint_for_stations_beyond_loopback_warns_at_start(capsys: pytest.Cap
     warning, error = capsys.readouterr().err.splitlines()
     assert warning.startswith("anafi-mav: warning: --endpoint: tcpin://192.0.2.1:5760 is open to the network: ")
     assert error.startswith("anafi-mav: --endpoint: cannot open tcpin://192.0.2.1:5760: ")
+
+
+def test_fabric_as_endpoint_for_stations_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    url = "zenoh://127.0.0.1:7447"
+    assert main(["ground", "--zenoh", url, "--endpoint", url]) == 2
+    expected = f"anafi-mav: --endpoint: {url}: expected another scheme: zenoh:// is for run, and --zenoh of ground"
+    assert capsys.readouterr().err.strip() == expected

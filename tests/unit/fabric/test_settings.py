@@ -87,7 +87,7 @@ def test_option_that_makes_no_sense_is_refused(query: str, key: str) -> None:
 
 def test_program_without_a_fabric_refuses_the_scheme() -> None:
     url = parse_endpoint("zenoh://127.0.0.1:7447")
-    with pytest.raises(ConfigError, match="for run and ground only"):
+    with pytest.raises(ConfigError, match="for run, and --zenoh of ground"):
         make_endpoint(url, None, SystemClock())  # type: ignore[arg-type]  # not reached
 
 
