@@ -10,7 +10,7 @@ import asyncio
 
 from anafi_mav.cli import interrupts, log
 from anafi_mav.cli.start_warnings import warnings_of_ground
-from anafi_mav.cli.terminal import complain, say
+from anafi_mav.cli.terminal import END_LIMIT, STDOUT_WRITER, complain, say_later
 from anafi_mav.clock import SystemClock
 from anafi_mav.errors import ConfigError
 from anafi_mav.fabric.ground import FabricGround
@@ -39,6 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
     for warning in warnings_of_ground(fabric, stations):
         complain(f"warning: {warning.text}", warning.style)
     interrupts.run(_serve(fabric, stations))
+    STDOUT_WRITER.wait(END_LIMIT)
     return 0
 
 
@@ -56,12 +57,12 @@ async def _serve(fabric: EndpointUrl, stations: list[EndpointUrl]) -> None:
     await ground.start()
     try:
         for line in ground.lines():
-            say(line)
-        say("ready, Ctrl-C ends", "green")
+            say_later(line)
+        say_later("ready, Ctrl-C ends", "green")
         await stop.wait()
     finally:
         await ground.close()
 
 
 def _say_systems(sysids: list[int]) -> None:
-    say(f"systems on the fabric: {', '.join(map(str, sysids)) or 'none'}")
+    say_later(f"systems on the fabric: {', '.join(map(str, sysids)) or 'none'}")

@@ -10,6 +10,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.hanging_disk import hanging, hanging_file
 from support.mav import Client
@@ -113,6 +114,27 @@ async def test_sigterm_beside_a_stopped_terminal_hovers_a_drone_in_the_air(tmp_p
         os.close(writing)
     entries = [json.loads(line) for line in log.read_text().splitlines()]
     assert [entry["name"] for entry in entries if entry["kind"] == "session"] == ["up", "lost"]
+
+
+async def test_stopped_terminal_stops_no_ground_process() -> None:
+    """It carries sticks and setpoints of stations, too."""
+    pytest.importorskip("zenoh")
+    url, reading, writing = f"zenoh://{loopback()}:7447", *os.pipe()
+    fill(writing)
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "anafi_mav", "ground", "--zenoh", url, "--endpoint", f"udpin://{loopback()}:0"),
+        stdin=asyncio.subprocess.DEVNULL, stdout=writing, stderr=asyncio.subprocess.PIPE,
+    )  # fmt: skip
+    try:
+        assert process.stderr is not None
+        assert url.encode() in await asyncio.wait_for(process.stderr.readline(), 30.0)  # no router: its loop runs
+        process.send_signal(signal.SIGTERM)
+        assert await asyncio.wait_for(process.wait(), 15.0) == 0
+    finally:
+        if process.returncode is None:
+            process.kill()
+        os.close(reading)
+        os.close(writing)
 
 
 async def test_drones_connect_beside_a_hanging_state_folder() -> None:
