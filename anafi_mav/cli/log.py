@@ -22,7 +22,7 @@ from functools import partial
 from pathlib import Path
 from types import TracebackType
 
-from anafi_mav.cli.terminal import END_LIMIT, MAX_WAITING, STDERR_WRITER, complain, complain_later, write_stderr
+from anafi_mav.cli.terminal import END_LIMIT, MAX_WAITING, STDERR_WRITER, complain_later, write_stderr
 from anafi_mav.disk_writer import DiskWriter
 from anafi_mav.errors import ConfigError
 from anafi_mav.printable import printable
@@ -153,7 +153,7 @@ class BoundedLogFile:
         except OSError as error:
             if not self._has_failed:
                 self._has_failed = True
-                complain(f"--log-file: {self._path} cannot be written: {error}")
+                complain_later(f"--log-file: {self._path} cannot be written: {error}")
 
     def _open(self) -> io.FileIO:
         file = io.FileIO(self._path, "ab")
