@@ -216,7 +216,7 @@ LATE_STATES = {kind.NAME: 0.7 for kind in (camera_messages.PhotoState, camera_me
 @pytest.mark.parametrize(
     ("mode", "start", "stop"), [(PHOTO, (START_PHOTO, 0, 2, 0), STOP_PHOTO), (VIDEO, (START_VIDEO, 0), STOP_VIDEO)]
 )
-async def test_conf_087_stop_just_after_a_start_ends_it(
+async def test_conf_087_stop_just_after_a_start_and_start_just_after_a_stop(
     model: str, mode: int, start: tuple[int, ...], stop: int
 ) -> None:
     async with world(model=model, speed=1.0, web=True) as w:
@@ -225,6 +225,8 @@ async def test_conf_087_stop_just_after_a_start_ends_it(
         assert await command(w.client, *start) == ACCEPTED
         assert await command(w.client, stop, 0) == ACCEPTED
         assert not w.drone.firmware.payload.cameras.busy
+        assert await command(w.client, *start) == ACCEPTED
+        assert w.drone.firmware.payload.cameras.busy
 
 
 async def test_conf_087_one_picture_of_a_series_is_one_although_its_begin_is_reported_late() -> None:

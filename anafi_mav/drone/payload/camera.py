@@ -47,8 +47,8 @@ MAIN = 0
 """Id of the camera that every model has."""
 
 STATE_TIMEOUT = 2.0
-"""s after the report that a photo or recording has begun in which the camera's state has it, too. Parrot promises no
-order between the two events."""
+"""s after the report that a photo or recording has begun or ended in which the camera's state has it, too. Parrot
+promises no order between the two events."""
 KEPT_AFTER = 0.5
 """s after a report with the old value at which the drone counts as keeping it: the drone may have sent that report
 before it received the change."""
@@ -185,7 +185,7 @@ class Camera(Commanding[CamerasState]):
             id, speech.take_photo(id), speech.photo_events, speech.photo_news, judge, ANSWER_TIMEOUT, timeout
         )
         if series:
-            await self._until_state(id, "taking")
+            await self._until_state(id, "taking", True)
         return result if isinstance(result, str) else None
 
     async def stop_photo(self, id: int = MAIN, timeout: float = SAVE_TIMEOUT) -> str | None:
@@ -210,6 +210,7 @@ class Camera(Commanding[CamerasState]):
         await self._capture(
             id, speech.stop_photo(id), speech.photo_events, speech.photo_news, judge, ANSWER_TIMEOUT, timeout
         )
+        await self._until_state(id, "taking", False)
         return saved
 
     # -- films
@@ -237,7 +238,7 @@ class Camera(Commanding[CamerasState]):
 
         command = speech.start_recording(id)
         await self._capture(id, command, speech.recording_events, speech.recording_news, judge, ANSWER_TIMEOUT, None)
-        await self._until_state(id, "recording_now")
+        await self._until_state(id, "recording_now", True)
 
     async def stop_recording(self, id: int = MAIN, timeout: float = 2 * ANSWER_TIMEOUT) -> str:
         """Stop recording; return the media id once the video is stored."""
@@ -252,9 +253,9 @@ class Camera(Commanding[CamerasState]):
             return CommandRejected(f"recording: {update.reason}") if update.progress is CaptureProgress.FAILED else None
 
         command = speech.stop_recording(id)
-        return str(
-            await self._capture(id, command, speech.recording_events, speech.recording_news, judge, timeout, None)
-        )
+        media = await self._capture(id, command, speech.recording_events, speech.recording_news, judge, timeout, None)
+        await self._until_state(id, "recording_now", False)
+        return str(media)
 
     async def set_storage_policy(self, policy: StoragePolicy, id: int = MAIN) -> StoragePolicy | None:
         """Choose the storage that pictures and videos are written to. Ai only."""
@@ -579,14 +580,14 @@ class Camera(Commanding[CamerasState]):
         self._commander.dispatch(answer, command, first)
         return await answer.wait()
 
-    async def _until_state(self, id: int, field: str) -> None:
-        """Wait until the state has what has begun, so that a command to stop finds it."""
+    async def _until_state(self, id: int, field: str, value: bool) -> None:
+        """Wait until the state has what was reported to have begun or ended: the next command goes by it."""
 
         def judge(message: Any) -> bool | None:
-            return None if getattr(self[id], field) is False else True
+            return True if getattr(self[id], field) is value else None
 
         speech, now = self._known(id)
-        if getattr(now, field) is False:
+        if getattr(now, field) not in (value, None):
             answer = self._commander.expect(speech.state_events, judge)
             answer.expire_after(STATE_TIMEOUT, field)
             with contextlib.suppress(CommandTimeout):
