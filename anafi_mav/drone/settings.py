@@ -2,7 +2,8 @@
 
 A drone answers a setting with an event that carries the value it now has: the one asked for, one clamped to its range,
 or the old one when it did not want the new. There is no other answer, so that the event's value is the result of the
-verb. A setting that the drone did not report when it connected does not exist: `NotSupported`.
+verb. Another value than the one asked for is the result if no event with that one follows. A setting that the drone did
+not report when it connected does not exist: `NotSupported`.
 """
 
 from __future__ import annotations
@@ -16,12 +17,16 @@ from typing import Any, TypeAlias, TypeVar
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.drone.element import Element, StateT
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation
-from anafi_mav.errors import AnafiMavError, CommandRejected, LocalProtocolError, NotSupported
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
 
 T = TypeVar("T")
 
 Question: TypeAlias = tuple[Message, type[Message], Callable[[Any], bool | None]]
 """Something to ask after connecting: the question, the kind of event that answers it, and its judge."""
+
+KEPT_AFTER = 0.5
+"""s after an answer with another value than the wanted one until it counts: the drone may have sent that event before
+it received the change."""
 
 REPEAT = 0.5
 """s after which an unacknowledged target is sent again while no event shows its effect.
@@ -67,13 +72,54 @@ class Commanding(Element[StateT]):
         timeout: float = ANSWER_TIMEOUT,
         *,
         stops: bool = False,
+        wanted: T | None = None,
     ) -> T:
         """Send a setting and return what the judge makes of its answer.
 
-        `stops`: it ends something that goes on.
+        `stops`: it ends something that goes on. `wanted`: another result counts if this one does not follow.
         """
         async with self._setting_lock(answer):
-            return await self._commander.confirm(command, (answer,), judge, timeout, stops=stops, is_setting=not stops)
+            return await self._answered(
+                command,
+                answer,
+                judge,
+                lambda result: wanted in (None, result),
+                timeout,
+                stops=stops,
+                is_setting=not stops,
+            )
+
+    async def _answered(
+        self,
+        command: Message,
+        answer: type[Message],
+        judge: Callable[[Any], T | AnafiMavError | None],
+        is_done: Callable[[T], bool],
+        timeout: float = ANSWER_TIMEOUT,
+        *,
+        stops: bool = False,
+        is_setting: bool = False,
+    ) -> T:
+        """Send a change and return the judge's result; one that is not done counts if no other follows."""
+        kept: list[T] = []
+
+        def listen(message: Any) -> T | AnafiMavError | None:
+            result = judge(message)
+            if result is None or isinstance(result, AnafiMavError) or is_done(result):
+                return result
+            if not kept:
+                expectation.expire_after(KEPT_AFTER, command.NAME)
+            kept[:] = [result]
+            return None
+
+        expectation = self._commander.expect((answer,), listen)
+        self._commander.dispatch(expectation, command, timeout, stops=stops, is_setting=is_setting)
+        try:
+            return await expectation.wait()
+        except CommandTimeout:
+            if not kept:
+                raise
+            return kept[0]
 
     def _setting_lock(self, answer: type[Message]) -> asyncio.Lock:
         """Return the lock that allows one change at a time.
@@ -112,6 +158,11 @@ class Commanding(Element[StateT]):
         (value,) = (getattr(command, name) for name in command.__struct_fields__)
         number(value, command.NAME)
         self._require(reported, command.NAME)
-        return await self._change(
-            command, answer, lambda message: float(message.current) if math.isfinite(message.current) else None
-        )
+        async with self._setting_lock(answer):
+            return await self._answered(
+                command,
+                answer,
+                lambda message: float(message.current) if math.isfinite(message.current) else None,
+                lambda result: math.isclose(result, value, rel_tol=1e-3),
+                is_setting=True,
+            )

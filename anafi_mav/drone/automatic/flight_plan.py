@@ -321,6 +321,7 @@ class FlightPlan(Commanding[FlightPlanState]):
             common.ReturnHomeOnDisconnect(int(on)),
             common.ReturnHomeOnDisconnectChanged,
             lambda message: bool(message.state),
+            wanted=on,
         )
 
     def _available(self) -> None:

@@ -49,9 +49,6 @@ MAIN = 0
 STATE_TIMEOUT = 2.0
 """s after the report that a photo or recording has begun or ended in which the camera's state has it, too. Parrot
 promises no order between the two events."""
-KEPT_AFTER = 0.5
-"""s after a report with the old value at which the drone counts as keeping it: the drone may have sent that report
-before it received the change."""
 SAVE_TIMEOUT = 30.0
 """s between two signs of life of a photo: a burst or a full resolution DNG takes a while to be stored."""
 ZOOM_TIMEOUT = 60.0
@@ -528,29 +525,12 @@ class Camera(Commanding[CamerasState]):
             if isinstance(command, camera2.Configure) and command.config == camera2.Config():
                 raise LocalProtocolError("nothing to change")
 
-            is_answered = False
-
             def judge(message: Any) -> CameraState | None:
-                nonlocal is_answered
                 # A state of camera2 can be about something else, such as the end of a photo.
                 is_other = isinstance(command, camera2.Configure) and message.config is None
-                if is_other or speech.camera_of(message) != id:
-                    return None
-                if is_done(self[id]):
-                    return self[id]
-                if not is_answered:
-                    is_answered = True
-                    expectation.expire_after(KEPT_AFTER, command.NAME)
-                return None
+                return None if is_other or speech.camera_of(message) != id else self[id]
 
-            expectation = self._commander.expect((answer,), judge)
-            self._commander.dispatch(expectation, command, ANSWER_TIMEOUT)
-            try:
-                return await expectation.wait()
-            except CommandTimeout:
-                if not is_answered:
-                    raise
-                return self[id]
+            return await self._answered(command, answer, judge, is_done)
 
     async def _capture(
         self,

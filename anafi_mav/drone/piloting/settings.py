@@ -45,6 +45,7 @@ class PilotingSettings(Commanding[PilotingState]):
             ardrone3.NoFlyOverMaxDistance(int(on)),
             ardrone3.NoFlyOverMaxDistanceChanged,
             lambda message: bool(message.shouldNotFlyOver),
+            wanted=on,
         )
 
     async def set_max_vertical_speed(self, metres_per_second: float) -> float:
@@ -78,14 +79,17 @@ class PilotingSettings(Commanding[PilotingState]):
         """Switch banked turns, in which the drone leans into a turn."""
         self._require(self.state.banked_turn, ardrone3.BankedTurn.NAME)
         return await self._change(
-            ardrone3.BankedTurn(int(on)), ardrone3.BankedTurnChanged, lambda message: bool(message.state)
+            ardrone3.BankedTurn(int(on)), ardrone3.BankedTurnChanged, lambda message: bool(message.state), wanted=on
         )
 
     async def set_style(self, style: PilotingStyleStyle) -> PilotingStyleStyle:
         """Set the frame of the sticks: the drone or the direction of the camera."""
         self._require(self.state.style, piloting_style.SetStyle.NAME)
         return await self._change(
-            piloting_style.SetStyle(style), piloting_style.Style, lambda message: PilotingStyleStyle(message.style)
+            piloting_style.SetStyle(style),
+            piloting_style.Style,
+            lambda message: PilotingStyleStyle(message.style),
+            wanted=style,
         )
 
     async def set_obstacle_avoidance(self, on: bool) -> bool:
@@ -95,4 +99,5 @@ class PilotingSettings(Commanding[PilotingState]):
             obstacle_avoidance.SetMode(AvoidanceMode.STANDARD if on else AvoidanceMode.DISABLED),
             obstacle_avoidance.Status,
             lambda message: message.mode == AvoidanceMode.STANDARD,
+            wanted=on,
         )

@@ -183,6 +183,7 @@ class Home(Commanding[HomeState]):
             rth.SetEndingBehavior(ending),
             rth.EndingBehavior,
             lambda message: RthEndingBehavior(message.ending_behavior),
+            wanted=ending,
         )
 
     async def set_ending_altitude(self, metres: float) -> float:
@@ -194,7 +195,7 @@ class Home(Commanding[HomeState]):
     async def set_delay(self, seconds: int) -> int:
         """Set the time between the loss of the link and the return, s."""
         self._require(self.state.delay_s, rth.SetDelay.NAME)
-        return await self._change(rth.SetDelay(seconds), rth.Delay, lambda message: int(message.delay))
+        return await self._change(rth.SetDelay(seconds), rth.Delay, lambda message: int(message.delay), wanted=seconds)
 
     async def set_by_itself(self, allowed: bool) -> bool:
         """Allow or forbid the drone's own return at low battery."""
@@ -203,6 +204,7 @@ class Home(Commanding[HomeState]):
             rth.SetAutoTriggerMode(RthAutoTriggerMode.ON if allowed else RthAutoTriggerMode.OFF),
             rth.AutoTriggerMode,
             lambda message: message.mode == RthAutoTriggerMode.ON,
+            wanted=allowed,
         )
 
     async def cancel_auto_trigger(self, timeout: float = ANSWER_TIMEOUT) -> None:
@@ -225,7 +227,10 @@ class Home(Commanding[HomeState]):
         if self.state.types is not None and kind not in self.state.types:
             raise NotSupported(f"home of type {kind.name.lower()}")
         return await self._change(
-            rth.SetPreferredHomeType(kind), rth.PreferredHomeType, lambda message: RthHomeType(message.type)
+            rth.SetPreferredHomeType(kind),
+            rth.PreferredHomeType,
+            lambda message: RthHomeType(message.type),
+            wanted=kind,
         )
 
     async def set_custom_location(
@@ -273,4 +278,5 @@ class Home(Commanding[HomeState]):
             precise_home.SetMode(PreciseHomeMode.STANDARD if on else PreciseHomeMode.DISABLED),
             precise_home.Mode,
             lambda message: message.mode == PreciseHomeMode.STANDARD,
+            wanted=on,
         )

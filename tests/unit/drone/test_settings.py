@@ -134,6 +134,35 @@ async def test_setting_returns_the_confirmed_value(
     assert device.got(type(command)) == [command]
 
 
+@pytest.mark.parametrize(
+    ("call", "command", "before", "after"),
+    [
+        (
+            lambda drone: drone.piloting.set_max_horizontal_speed(3.0),
+            ardrone3.MaxHorizontalSpeed,
+            ardrone3.MaxHorizontalSpeedChanged(5.0, 0.1, 15.0),
+            ardrone3.MaxHorizontalSpeedChanged(3.0, 0.1, 15.0),
+        ),
+        (
+            lambda drone: drone.piloting.set_geofence(True),
+            ardrone3.NoFlyOverMaxDistance,
+            ardrone3.NoFlyOverMaxDistanceChanged(0),
+            ardrone3.NoFlyOverMaxDistanceChanged(1),
+        ),
+    ],
+)
+async def test_report_of_before_a_change_is_not_its_answer(
+    device: ScriptedDevice,
+    drone: Drone,
+    call: Callable[[Drone], Awaitable[float]],
+    command: type[Message],
+    before: Message,
+    after: Message,
+) -> None:
+    device.script[command] = lambda message: [before, after]
+    assert await call(drone) in (3.0, True)
+
+
 async def test_unreported_setting_is_unsupported(device: ScriptedDevice) -> None:
     device.script[common.AllSettings] = lambda _: [*SETTINGS, common.AllSettingsChanged()]
     drone = device.drone()
