@@ -21,7 +21,7 @@ from anafi_mav.arsdk.codec.value_events import MAX_LAYOUTS, Received, ValueLayou
 from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.link.controller import ControllerSession
 from anafi_mav.arsdk.link.handshake import DISCOVERY_PORT, DeviceInfo
-from anafi_mav.arsdk.messages import ardrone3, common, drone_manager, rth, skyctrl
+from anafi_mav.arsdk.messages import animation, ardrone3, common, drone_manager, follow_me, rth, skyctrl
 from anafi_mav.arsdk.messages import flight_plan as modern_plan
 from anafi_mav.arsdk.messages.animation import Type as AnimationType
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState, PoiStatus
@@ -163,7 +163,7 @@ class Drone:
         self.piloting = Piloting(self._commander, self.home, self.takeoff_blockers)
         self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over, self._stand_by)
         self.piloting.pilot_has_source = lambda: self.controller.pilot_has_source
-        self.piloting.plan_ended = self._plan_ended
+        self.piloting.end_unreported = self._end_unreported
         self.flight_plan.model = lambda: self._model
         self.piloting.is_modern = lambda: self._model.protobuf
         self._commander.gate = self._allows
@@ -548,6 +548,17 @@ class Drone:
         plan = self.flight_plan.state
         kind = MavlinkType.FLIGHT_PLAN if plan.type is None else plan.type
         self._handle(common.MavlinkFilePlayingStateChanged(state, plan.uid or "", kind), loop_time())
+
+    def _end_unreported(self, kind: type[Message]) -> None:
+        """Handle an end that the drone does not report, of a plan, an animation or a following."""
+        if kind is follow_me.State:
+            self._handle(
+                follow_me.State(FollowMeMode.NONE, follow_me.Behavior.IDLE, follow_me.Animation.NONE, 0), loop_time()
+            )
+        elif kind is animation.State:
+            self._handle(animation.State(AnimationType.NONE, 0), loop_time())
+        else:
+            self._plan_ended(PlayingState.PAUSED)
 
     def _plan_says(self, message: common.MavlinkFilePlayingStateChanged, now: float) -> None:
         self.piloting.on_plan(message)

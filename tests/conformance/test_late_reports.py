@@ -30,6 +30,7 @@ from support.fault_scenarios import (
     until,
     watched,
 )
+from support.mav import CAMERA
 from support.missions import ACTIVE, on_the_way, put, start, state, takeoff, way
 from support.missions import LAND as LAND_ITEM
 from support.params import write
@@ -37,7 +38,7 @@ from support.setpoints import POSITION_ONLY, VELOCITY_ONLY, local, streaming
 from support.world import ARMED, HOLD, HOME, World, world
 
 from anafi_mav import geo
-from anafi_mav.arsdk.messages import ardrone3, common, rth
+from anafi_mav.arsdk.messages import animation, ardrone3, common, follow_me, rth
 from anafi_mav.arsdk.messages.common import PlayingState
 from anafi_mav.drone.piloting.moves import MoveEnd
 from anafi_mav.sim import SimulatedDrone
@@ -255,6 +256,27 @@ async def test_hold_of_a_mission_whose_pause_is_not_reported_is_what_the_drone_t
         if answer is not PlayingState.PLAYING:
             await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
             assert await goto(w, 40.0, 8.0) == ACCEPTED  # it has the drone again
+
+
+@pytest.mark.parametrize("flown", ["a panorama", "a following"])
+async def test_hold_is_accepted_of_what_the_drone_never_reports_as_ended(flown: str) -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off(15.0)
+        if flown == "a panorama":
+            ack = await w.client.command(dialect.MAV_CMD_PANORAMA_CREATE, 360, 60, 10, 10, target=(1, CAMERA))
+            assert ack.result == ACCEPTED
+        else:
+            another_controller(w, follow_me.TargetFramingPosition(50, 50))
+            another_controller(w, follow_me.Start(follow_me.Mode.LOOK_AT))
+            await w.drone.wait_log(
+                lambda e: e.name == follow_me.State.NAME and e.args["mode"] != follow_me.Mode.NONE, 5.0
+            )
+        await watched(1.0)
+        w.drone.faults.unreported = frozenset({follow_me.State.NAME, animation.State.NAME})
+        assert (await w.client.command(SET_MODE, *PX4_HOLD, timeout=10.0)).result == ACCEPTED
+        began = now()
+        assert await goto(w, 20.0, 15.0) == ACCEPTED
+        assert now() - began < 0.5
 
 
 async def test_mission_that_landed_without_a_report_of_its_end_has_ended() -> None:

@@ -57,8 +57,8 @@ class Piloting(PilotingSettings):
         self._moves = Moves(home)
         self.pilot_has_source: Callable[[], bool] = lambda: False
         """True while the pilot at a Skycontroller has the piloting source; set by `Drone`."""
-        self.plan_ended: Callable[[PlayingState], None] = lambda state: None
-        """Called when a flight plan is in this state, and the drone has not reported that; set by `Drone`."""
+        self.end_unreported: Callable[[type[Message]], None] = lambda kind: None
+        """Called when a plan, animation or following has ended, and its event was not sent; set by `Drone`."""
         self._sticks = StickStream(commander, self, home, lambda: self.pilot_has_source())
         self._motors = Motors(commander, self, self._sticks, takeoff_blockers)
         self._guided = GuidedMoves(commander, self, home, self._sticks, self._moves)
@@ -374,25 +374,27 @@ class Piloting(PilotingSettings):
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """Hover, and return when the drone has confirmed the end of everything that was running.
 
-        The report of an end may be missing. A hover that lasts confirms that of a moveTo, too. That of a flight plan is
-        confirmed by a hover after the drone was asked for its states and has not named it as playing.
+        The report of an end may be missing. A hover that lasts confirms that of a moveTo, too. That of a flight plan,
+        an animation or a following is confirmed by a hover after the drone was asked for its states and has not named
+        it as under way.
         """
         require_number(timeout)
-        answers, move_to, plan = [], None, None
+        answers, move_to, kinds = [], None, list[type[Message]]()
         if (self._moves.to is not None and self._moves.to.running) or self.state.move_to == MoveToStatus.RUNNING:
             move_to = self._commander.expect((ardrone3.MoveToChanged,), _ends_move_to)
             answers.append(move_to)
         if self._moves.by:
             answers.append(self._commander.expect((ardrone3.MoveByEnd,), lambda message: True))
         if self.state.plan == PlayingState.PLAYING:
-            plan = self._commander.expect((common.MavlinkFilePlayingStateChanged,), _ends_playing)
-            answers.append(plan)
+            kinds.append(common.MavlinkFilePlayingStateChanged)
         if self._moves.returning is not None and self._moves.returning.running:
             answers.append(self._commander.expect((rth.State,), self._returns.ends_ours))
         if self.state.following not in (None, FollowMeMode.NONE):
-            answers.append(self._commander.expect((follow_me.State,), _ends_following))
+            kinds.append(follow_me.State)
         if self.state.animation not in (None, animation.Type.NONE):
-            answers.append(self._commander.expect((animation.State,), _ends_animation))
+            kinds.append(animation.State)
+        ends = {kind: self._commander.expect((kind,), _ENDS[kind]) for kind in kinds}
+        answers += ends.values()
         began = loop_time()
         try:
             self.hover()
@@ -401,9 +403,9 @@ class Piloting(PilotingSettings):
             if move_to is not None:
                 await self._commander.stops_delivered("hover", timeout)
                 await self._wait_for_hover(move_to)
-            if plan is not None:
+            if ends:
                 await self._commander.stops_delivered("hover", timeout)
-                await self._wait_for_end(plan)
+                await self._wait_for_ends(ends)
             for answer in answers:
                 await answer.wait()
             # Of what was given up before it was confirmed no event may speak; but the order to stop has to arrive.
@@ -435,24 +437,27 @@ class Piloting(PilotingSettings):
             hover.close()
         return not end.future.done() and self.state.flying == FlyingState.HOVERING
 
-    async def _wait_for_end(self, plan: Expectation[bool]) -> None:
-        """Wait for the end of a flight plan for which the drone has received a Pause.
+    async def _wait_for_ends(self, ends: Mapping[type[Message], Expectation[bool]]) -> None:
+        """Wait for reports of ends that the drone has received the commands for.
 
-        A drone that reports none is asked for its states. The plan has ended when it does not name it as playing and
-        then hovers: a hover alone may be one at a way point.
+        A drone that owes one is asked for its states. What these do not name as under way has ended when the drone then
+        hovers: a hover alone may be one at a way point, or of a target that stands still.
         """
-        plays = self._commander.expect((common.MavlinkFilePlayingStateChanged,), lambda message: True)
+        named = {kind: self._commander.expect((kind,), lambda message: True) for kind in ends}
         states = self._commander.expect((common.AllStatesChanged,), lambda message: True)
         try:
-            await asyncio.wait({plan.future}, timeout=QUIET)
-            if not plan.future.done():
+            await asyncio.wait({end.future for end in ends.values()}, timeout=QUIET)
+            owed = {kind: end for kind, end in ends.items() if not end.future.done()}
+            if owed:
                 self._home.request_states()
-                await asyncio.wait({plan.future, states.future}, return_when=asyncio.FIRST_COMPLETED)
-            if not plan.future.done() and await self._hovers_without(plan) and not plays.future.done():
-                self.plan_ended(PlayingState.PAUSED)
+                last = next(iter(owed.values())).future  # all of them expire with this one
+                await asyncio.wait({last, states.future}, return_when=asyncio.FIRST_COMPLETED)
+            for kind, end in owed.items():
+                if not end.future.done() and await self._hovers_without(end) and not named[kind].future.done():
+                    self.end_unreported(kind)
         finally:
-            plays.close()
-            states.close()
+            for answer in (*named.values(), states):
+                answer.close()
 
     def _stop_following(self, state: PilotingState) -> None:
         if state.following not in (None, FollowMeMode.NONE):
@@ -493,3 +498,11 @@ def _ends_animation(message: animation.State) -> bool | None:
 
 def _ends_playing(message: common.MavlinkFilePlayingStateChanged) -> bool | None:
     return True if message.state != PlayingState.PLAYING else None
+
+
+_ENDS: Mapping[type[Message], Callable[[Any], bool | None]] = {
+    common.MavlinkFilePlayingStateChanged: _ends_playing,
+    follow_me.State: _ends_following,
+    animation.State: _ends_animation,
+}
+"""Whether an event is the end of what the drone flies by itself, by its kind."""
