@@ -35,7 +35,7 @@ from support.missions import ACTIVE, on_the_way, put, start, state, takeoff, way
 from support.missions import LAND as LAND_ITEM
 from support.params import write
 from support.setpoints import POSITION_ONLY, VELOCITY_ONLY, local, streaming
-from support.world import ARMED, HOLD, HOME, World, world
+from support.world import ARMED, HOLD, HOME, OFFBOARD, World, world
 
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import animation, ardrone3, common, follow_me, rth
@@ -256,6 +256,18 @@ async def test_hold_of_a_mission_whose_pause_is_not_reported_is_what_the_drone_t
         if answer is not PlayingState.PLAYING:
             await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
             assert await goto(w, 40.0, 8.0) == ACCEPTED  # it has the drone again
+
+
+async def test_setpoints_fly_a_drone_that_reports_no_pause_of_its_plan() -> None:
+    """Offboard is accepted once its setpoints move the drone, which takes none while its plan plays."""
+    async with world(speed=1.0, web=True) as w:
+        await on_the_way(w, 2)
+        w.drone.faults.unreported = frozenset({PLAYING})
+        async with streaming(w.client, local(VELOCITY_ONLY, v=(0.0, 2.0, 0.0))):
+            assert (await w.client.command(SET_MODE, *PX4_OFFBOARD, timeout=10.0)).result == ACCEPTED
+            east = w.drone.pose.east
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["east"] > east + 4.0, 10.0)
+            await w.client.heartbeat(lambda beat: beat.custom_mode == OFFBOARD)
 
 
 @pytest.mark.parametrize("flown", ["a panorama", "a following"])

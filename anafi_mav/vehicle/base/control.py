@@ -25,6 +25,7 @@ from msgspec.structs import replace
 
 from anafi_mav import texts
 from anafi_mav.drone import Drone
+from anafi_mav.drone.events import PlayingState
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.control_machine import (
@@ -288,7 +289,8 @@ class Control:
             if has_waited:  # else no event was received since the first check
                 found = check()
             stands = end is not None and self._aircraft.on_ground and not piloting.about_to_fly
-            preparing = begin(rules.start, stands=stands, cancels_return=Needs.NO_DESCENT in rules.needs)
+            plays = piloting.state.plan == PlayingState.PLAYING
+            preparing = begin(rules.start, stands=stands, cancels_return=Needs.NO_DESCENT in rules.needs, plays=plays)
             while preparing.left:
                 has_ended = await self._prepare(preparing.left[0], end)
                 if has_ended:

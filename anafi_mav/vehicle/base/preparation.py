@@ -92,15 +92,16 @@ class Preparing:
         return replace(self, left=tuple(left))
 
 
-def begin(start: Preparation, *, stands: bool, cancels_return: bool) -> Preparing:
+def begin(start: Preparation, *, stands: bool, cancels_return: bool, plays: bool = False) -> Preparing:
     """Return the first state of a preparation.
 
     `stands`: the drone is on the ground, and nothing of ours is about to lift it. `cancels_return`: the task may not
-    fly during a return.
+    fly during a return. `plays`: the drone reports that it flies a plan, during which it takes no sticks.
     """
     if stands and start is Preparation.END_DESCENT:
         return Preparing(start, ())
     keeps_return = not cancels_return and start is not Preparation.END_DESCENT
-    return Preparing(
-        start, tuple(one for one in _STEPS[start] if one is not PreparationStep.CANCEL_RETURN or not keeps_return)
-    )
+    steps = tuple(one for one in _STEPS[start] if one is not PreparationStep.CANCEL_RETURN or not keeps_return)
+    if plays and cancels_return and PreparationStep.STOP not in steps:
+        steps = (PreparationStep.STOP, *steps)
+    return Preparing(start, steps)
