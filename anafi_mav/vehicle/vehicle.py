@@ -408,6 +408,7 @@ class Vehicle(Aircraft):
         """Fly home by the drone's own return. A landing goes on unless `by` may end it."""
         if self.return_end.shown:
             return  # it waits above home or lands there, and would climb and fly home once more
+        await self.drone.piloting.settle_return()  # one that has ended would be accepted as under way
         async with self.control.acquire(self.return_end, by=by, condition=self._require_return):
             self._initiators.return_commanded(self._clock.monotonic())
             attempt = self.return_end.command()

@@ -321,6 +321,24 @@ async def test_hold_is_accepted_at_once_after_a_return_whose_end_on_the_ground_w
         assert now() - began < 0.5
 
 
+async def test_return_is_flown_although_the_end_of_the_one_before_was_never_reported() -> None:
+    """Another controller has ended it; the drone hovers, and reports its states when it is asked."""
+    async with world(speed=1.0) as w:
+        await w.take_off(22.0)
+        assert await goto(w, 60.0, 22.0) == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 55.0, 60.0)
+        assert (await w.client.command(RTL)).result == ACCEPTED
+        began = now()
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] < 50.0, 60.0, since=began)
+        w.drone.faults.unreported = frozenset({rth.State.NAME, ardrone3.NavigateHomeStateChanged.NAME})
+        another_controller(w, rth.Abort())
+        await w.drone.wait_log(lambda e: e.name == FLYING and e.args["state"].name == "HOVERING", 10.0, since=now())
+        w.drone.faults.unreported = frozenset()
+        began = now()
+        assert (await w.client.command(RTL)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] < 10.0, 60.0, since=began)
+
+
 async def test_landing_that_is_reported_late_is_not_ended_by_an_older_stream() -> None:
     async with world(speed=1.0, flavour="ardupilot") as w:
         companion = await w.connect(sysid=240)

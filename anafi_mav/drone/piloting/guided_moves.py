@@ -291,6 +291,18 @@ class ReturnHome:
         # After a timeout it stays ours: should the drone begin to return all the same, hover has to stop it.
         return move
 
+    async def settle_return(self, timeout: float) -> bool:
+        if not self._home.state.returning or self._flight.state.flying != FlyingState.HOVERING:
+            return self._home.state.returning
+        states = self._commander.expect((common.AllStatesChanged,), lambda message: True)
+        try:
+            states.expire_after(timeout, common.AllStates.NAME)
+            self._home.request_states()
+            await states.wait()
+        finally:
+            states.close()
+        return self._home.state.returning
+
     async def _has_taken_off(self, move: Move) -> bool:
         """Wait until the drone hovers or flies; return False when the return is answered before."""
         hover = self._commander.expect((FlyingStateChanged,), lambda message: True if message.state in _FLIES else None)

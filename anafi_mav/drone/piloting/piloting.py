@@ -286,6 +286,13 @@ class Piloting(PilotingSettings):
         """
         return await self._returns.return_home(timeout)
 
+    async def settle_return(self, timeout: float = ANSWER_TIMEOUT) -> bool:
+        """Return True when the drone returns.
+
+        One that hovers is asked for its states: it may have ended its return without a report.
+        """
+        return await self._returns.settle_return(timeout)
+
     async def cancel_return_home(self, timeout: float = ANSWER_TIMEOUT, *, even_its_own: bool = False) -> bool:
         """Stop a return that a user commanded, also one not begun yet; return False without one.
 
