@@ -100,7 +100,10 @@ class Commanding(Element[StateT]):
         stops: bool = False,
         is_setting: bool = False,
     ) -> T:
-        """Send a change and return the judge's result; one that is not done counts if no other follows."""
+        """Send a change and return the judge's result.
+
+        One that is not done counts if no other follows.
+        """
         kept: list[T] = []
 
         def listen(message: Any) -> T | AnafiMavError | None:

@@ -561,7 +561,10 @@ class Camera(Commanding[CamerasState]):
         return await answer.wait()
 
     async def _until_state(self, id: int, field: str, value: bool) -> None:
-        """Wait until the state has what was reported to have begun or ended: the next command goes by it."""
+        """Wait until the state has what was reported to have begun or ended.
+
+        The next command goes by it.
+        """
 
         def judge(message: Any) -> bool | None:
             return True if getattr(self[id], field) is value else None
