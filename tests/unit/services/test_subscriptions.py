@@ -41,7 +41,7 @@ def test_handlers_of_several_tables_keep_table_order() -> None:
     [
         (
             events.FlyingStateChanged,
-            "Vehicle MessageService EventService FenceService RollSignService OffboardFlight "
+            "Vehicle MessageService EventService FenceService RallyService RollSignService OffboardFlight "
             "WarningService TakeoffPointService DownloadService",
         ),
         (events.MavlinkFilePlayingStateChanged, "MessageService MissionFlight System"),
