@@ -145,8 +145,8 @@ class UdpOut(Endpoint):
         self._problem = ""
         self._reported = ""
         """The problem in the log; empty while it is over."""
-        self._failure: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        """Done when the present socket has failed."""
+        self._broken = asyncio.Event()
+        """Set when the present socket has failed."""
 
     async def open(self) -> None:
         self._protect(self.channel)
@@ -215,8 +215,7 @@ class UdpOut(Endpoint):
         if self._problem != self._reported:
             logger.warning("%s: %s", self.url, self._problem)
         self._reported = self._problem
-        if not self._failure.done():
-            self._failure.set_result(None)
+        self._broken.set()
         if self._reopening is None or self._reopening.done():
             self._reopening = asyncio.get_running_loop().create_task(self._try_again())
 
@@ -226,14 +225,15 @@ class UdpOut(Endpoint):
             await asyncio.sleep(pause)
             pause = min(2 * pause, RETRY_LAST)
             self.counters["reopened"] += 1
-            self._failure = asyncio.get_running_loop().create_future()
+            self._broken.clear()
             try:
                 await self._connect()
             except OSError as error:
                 self._problem = reason(error)
                 continue
-            await asyncio.wait([self._failure], timeout=HOLDS)
-            if not self._failure.done():
+            try:
+                await asyncio.wait_for(self._broken.wait(), HOLDS)
+            except asyncio.TimeoutError:
                 logger.warning("%s: open again", self.url)
                 self._reported = ""
                 return

@@ -59,6 +59,7 @@ except SystemExit as end:
 print(Finder.seen, "imports")
 for one in wrong:
     print("wrong:", *one)
+sys.stdout.flush()
 os._exit(bool(wrong))
 """
 
