@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fabric import FabricStation, free_port, router
 from support.hanging_disk import hanging, hanging_file
 from support.mav import Client
 from support.product import product
@@ -81,6 +82,34 @@ async def test_stopped_terminal_stops_neither_a_command_nor_the_end(tmp_path: Pa
             process.kill()
         os.close(reading)
         os.close(writing)
+
+
+async def test_stopped_terminal_of_a_ground_process_keeps_no_station_from_its_drone() -> None:
+    """The line about the systems on the fabric has no room on stdout."""
+    port = free_port()
+    reading, writing = os.pipe()
+    async with router() as node:
+        process = await asyncio.create_subprocess_exec(
+            sys.executable, "-m", "anafi_mav", "ground", "--zenoh", node.url, "--endpoint", f"tcpin://127.0.0.1:{port}",
+            stdin=asyncio.subprocess.DEVNULL, stdout=writing,
+        )  # fmt: skip
+        try:
+            shown = b""
+            while b"ready" not in shown:
+                shown += await asyncio.wait_for(asyncio.to_thread(os.read, reading, 4096), 30.0)
+            fill(writing)
+            async with world(endpoints=(node.url,), speed=1.0):
+                station = await FabricStation().join(port, tcp=True)
+                ack = await station.command(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+                assert ack.result == dialect.MAV_RESULT_ACCEPTED
+                await station.close()
+            process.send_signal(signal.SIGTERM)
+            assert await asyncio.wait_for(process.wait(), 15.0) == 0
+        finally:
+            if process.returncode is None:
+                process.kill()
+            os.close(reading)
+            os.close(writing)
 
 
 async def test_sigterm_beside_a_stopped_terminal_hovers_a_drone_in_the_air(tmp_path: Path) -> None:
