@@ -240,6 +240,26 @@ async def test_conf_087_one_picture_of_a_series_is_one_although_its_begin_is_rep
         assert texts(w.client, mark) == []
 
 
+async def test_conf_087_series_is_not_ended_by_the_count_of_the_one_before() -> None:
+    """The first shutter of this one is reported before its begin."""
+    async with world(speed=1.0, web=True) as w:
+        await enter(w.client, PHOTO)
+        assert await command(w.client, START_PHOTO, 0, 1, 3) == ACCEPTED
+        await w.drone.wait_log(lambda e: bool(photos(w)) and not w.drone.firmware.payload.cameras.busy, 20.0)
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", lambda image: image.image_index == 2, since=0)
+        w.drone.faults.unreported = frozenset({camera_messages.PhotoProgress.NAME})
+        w.drone.faults.late = {camera_messages.PhotoState.NAME: 0.5}
+
+        stops = len(w.commands("camera.stop_photo"))
+        started = asyncio.ensure_future(command(w.client, START_PHOTO, 0, 1, 2))
+        await w.drone.wait_log(lambda e: len(w.commands("camera.take_photo")) == 2, 10.0)
+        w.drone.faults.unreported = frozenset()
+        w.drone.inject(camera_messages.PhotoProgress(0, camera_messages.PhotoResult.PHOTO_TAKEN, 1, ""))
+        assert await started == ACCEPTED
+        await watched(1.0)
+        assert len(w.commands("camera.stop_photo")) == stops
+
+
 async def photo_mode_shown(client: Client, mode: float, since: int) -> None:
     """Wait until a change of CAM_PHOTOMODE to this mode is sent."""
     shown = "PARAM_EXT_VALUE"

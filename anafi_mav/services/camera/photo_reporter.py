@@ -78,7 +78,7 @@ class PhotoReporter:
 
     @property
     def taken(self) -> int:
-        """Pictures of the photo, burst or series under way, or of the last one."""
+        """Pictures of the photo, burst or series under way; 0 without one."""
         return self._shots.taken
 
     @property
@@ -107,8 +107,8 @@ class PhotoReporter:
         self._shots, self._poses = ShotTracker(before.capture), {}
         id = drone.camera.active_id
         if drone.camera[id].taking:
-            known = before.taken if before.is_open else 0
-            self._shots.join(id, max(known, drone.camera[id].photo_count or 0), self.host.clock.monotonic())
+            known = max(before.taken, drone.camera[id].photo_count or 0)
+            self._shots.join(id, known, self.host.clock.monotonic())
         self._turn = asyncio.Lock()
         self._undo = drone.video.subscribe(lambda frame: add_frame(self._track, frame))
 

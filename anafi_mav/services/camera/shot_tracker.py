@@ -170,8 +170,8 @@ class ShotTracker:
 
     @property
     def taken(self) -> int:
-        """Pictures of the capture under way, or of the last one."""
-        return self._now.taken
+        """Pictures of the capture under way; 0 without one."""
+        return self._now.taken if self._now.is_open else 0
 
     def capture_of(self, media: str) -> int:
         """Return the number of the capture that is stored as this media; 0: not known."""
