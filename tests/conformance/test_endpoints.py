@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as stock
-from support.fault_scenarios import watched
+from support.fault_scenarios import PX4_HOLD, watched
 from support.lines import SerialClient, UdpClient, pseudo_terminal
 from support.mav import Client
 from support.world import ARMED, HOLD, HOME, loopback, world
@@ -318,6 +318,51 @@ async def test_command_over_two_links_of_a_router_is_carried_out_once(flavour: s
             for client, mark in zip((w.client, second), marks, strict=True)
         ]
         assert acks == results
+
+
+async def test_retransmissions_over_two_links_of_a_router_have_one_final_answer_on_each() -> None:
+    async with world(speed=4.0, also="px4") as w:
+        second = await w.connect(port=5761)
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        marks = [client.mark() for client in (w.client, second)]
+        for confirmation in range(3):
+            frame = w.client.pack(
+                stock.MAVLink_command_long_message(1, 1, TAKE_OFF, confirmation, 0, 0, 0, math.nan, 0, 0, HOME[2] + 5)
+            )
+            for client in (w.client, second):
+                client.send_raw(frame)
+        await w.drone.wait_log(lambda e: e.name.endswith("moveByEnd"), 20.0)
+        await watched(2.0)
+        for client, mark in zip((w.client, second), marks, strict=True):
+            results = [m.result for _, m in client.since(mark, "COMMAND_ACK")]
+            assert [result for result in results if result != IN_PROGRESS] == [ACCEPTED]
+
+
+async def test_hold_is_not_undone_by_the_copy_of_an_older_command_over_a_slow_link() -> None:
+    """A router's second link brings a goto when its sender has held the drone already."""
+    async with world(speed=1.0, also="px4") as w:
+        second = await w.connect(port=5761)
+        await w.take_off(10.0)
+        place = geo.destination(*HOME[:2], 60.0, 0.0)
+        x, y = (round(degrees * 1e7) for degrees in place)
+        frames = [
+            w.client.pack(stock.MAVLink_command_int_message(1, 1, 6, REPOSITION, 0, 0, -1, 1, 0, math.nan, x, y, 10)),
+            w.client.pack(
+                stock.MAVLink_command_long_message(1, 1, mav_enums.MAV_CMD_DO_SET_MODE, 0, *PX4_HOLD, 0, 0, 0, 0)
+            ),
+        ]
+        mark = w.client.mark()
+        for frame in frames:
+            w.client.send_raw(frame)
+        await w.client.wait(
+            "COMMAND_ACK",
+            lambda ack: (ack.command, ack.result) == (mav_enums.MAV_CMD_DO_SET_MODE, ACCEPTED),
+            since=mark,
+        )
+        for frame in frames:
+            second.send_raw(frame)
+        await watched(6.0)
+        assert abs(w.drone.pose.north) < 3.0
 
 
 @pytest.mark.parametrize(

@@ -266,11 +266,7 @@ class CommandService(Service):
         self._act(inbound, command)
 
     def _act(self, inbound: Inbound, command: Command) -> None:
-        if inbound.first is not None and (original := self._original_of(inbound, command)) is not None:
-            if original.result == dialect.MAV_RESULT_IN_PROGRESS:
-                original.copies.append(inbound)
-            else:
-                self._acknowledge(inbound, command.id, original.result)
+        if inbound.first is not None and self._answer_copy(inbound, command):
             return
         now, effect, vehicle = self.host.clock.monotonic(), command.effect, self.host.vehicle
         # Before it is known whether it is a retransmission: a program that repeats its Hold is to be noticed.
@@ -298,12 +294,23 @@ class CommandService(Service):
         running = RunningAction(command.client, flies=flies, answer=(inbound, execution), group=group)
         self._spawn(self._execute(inbound, execution), running)
 
-    def _original_of(self, inbound: Inbound, command: Command) -> Execution | None:
-        """Return the action of a command that has arrived over another link of a router, too."""
+    def _answer_copy(self, inbound: Inbound, command: Command) -> bool:
+        """Answer a command that has arrived over another link of a router, too, as the first one.
+
+        Without an answer if its sender has commanded another flight since: over a slow link a goto would then replace
+        the Hold after it, whose own copy ends nothing. False for one of the payload then: it is carried out.
+        """
         client = (inbound.first, inbound.sysid, inbound.compid)
         first = replace(command, client=client, component=self.host.compid)
         is_flight = command.group is ActionGroup.FLIGHT
-        return self._history.newest(first) if is_flight else self.host.payload_history.newest(first)
+        original = self._history.newest(first) if is_flight else self.host.payload_history.newest(first)
+        if original is None:
+            return is_flight
+        if original.result != dialect.MAV_RESULT_IN_PROGRESS:
+            self._acknowledge(inbound, command.id, original.result)
+        elif all(copy.client != inbound.client for copy in original.copies):  # else of a retransmission
+            original.copies.append(inbound)
+        return True
 
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:
         command = execution.command
