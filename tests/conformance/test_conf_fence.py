@@ -811,6 +811,22 @@ async def test_conf_077_home_type_written_while_a_rally_point_becomes_home_follo
         assert preferred(w)[-1] == RthHomeType.TAKEOFF
 
 
+async def test_conf_077_home_type_written_while_a_rally_point_is_home_holds_after_a_lost_link() -> None:
+    async with world(speed=1.0) as w:
+        await put(w, "RTL_TYPE", 1)
+        assert (await upload(w.client, [rally(around(PLACE, (-30.0, 0.0))[0], 20.0)], RALLY)).type == TAKEN
+        await w.take_off()
+        await said(w.client, "Returns end at rally point 0", timeout=10.0)
+        await write(w.client, "ANF_HOME_TYPE", RthHomeType.TAKEOFF, dialect.MAV_PARAM_TYPE_INT32)
+        await looked(w)
+        w.drone.faults.mute = True
+        await watched(6.0)
+        w.drone.faults.mute, mark = False, w.client.mark()
+        await w.client.wait("GLOBAL_POSITION_INT", since=mark, timeout=30.0)
+        await looked(w)
+        assert preferred(w) == [RthHomeType.CUSTOM, RthHomeType.TAKEOFF]
+
+
 async def test_conf_077_home_type_written_while_a_rally_point_is_home_holds_until_the_landing() -> None:
     """The rally point that is the closest from then on does not become home; in the next flight it does."""
     async with world() as w:

@@ -49,8 +49,11 @@ class RallyService(Service):
 
         A different place is another controller's choice since.
         """
-        self._preferred: RthHomeType | None = None
-        """Kind of home that was chosen in this flight instead of a rally point."""
+        self._preferred: tuple[RthHomeType | None, int] | None = None
+        """Kind of home that was chosen in this flight instead of a rally point, also on an earlier connection.
+
+        With the memory's generation: which drone flies.
+        """
         self._rejected: dict[RallyPoint, float] = {}
         """Until when they are not proposed again."""
 
@@ -61,9 +64,11 @@ class RallyService(Service):
     def link_up(self) -> None:
         self._chosen, self._given = None, self.host.drone.home.state.custom_location
         self._rally.is_home = self._before() is not None
+        if self.host.vehicle.on_ground:
+            self._preferred = None
 
     def link_down(self) -> None:
-        self._task = self._chosen = self._given = self._preferred = None
+        self._task = self._chosen = self._given = None
         self._rejected.clear()
         self._looked = -math.inf
 
@@ -117,10 +122,15 @@ class RallyService(Service):
         if state.preferred_type is None or state.types is None or RthHomeType.CUSTOM not in state.types:
             return False
         is_custom = state.preferred_type == RthHomeType.CUSTOM and self._before() is None
-        if is_custom or state.preferred_type == self._preferred:
+        if is_custom or self._preference == self._preferred:
             self.host.warn_throttled(texts.RALLY_HOME_SET)
             return False
         return True
+
+    @property
+    def _preference(self) -> tuple[RthHomeType | None, int]:
+        """The kind of home that this drone prefers."""
+        return self.host.drone.home.state.preferred_type, self.host.memory.generation
 
     def _taken_over(self) -> bool:
         """Return True if a client or another controller has chosen a home since we did."""
@@ -174,7 +184,7 @@ class RallyService(Service):
         taken_over = self._taken_over()
         self._chosen = None
         if taken_over:
-            self._preferred = home.state.preferred_type
+            self._preferred = self._preference
         try:
             if home.state.preferred_type == RthHomeType.CUSTOM and not taken_over:
                 await home.set_preferred_type(before)
