@@ -44,7 +44,8 @@ STDERR_WRITER = DiskWriter("anafi-mav-stderr", max_waiting=MAX_WAITING)
 """Write for an event loop, which must not wait: a terminal is stopped (Ctrl-S), a reader reads nothing."""
 
 END_LIMIT = 0.5
-"""s that the end of the program waits for a disk or a terminal, twice at most."""
+"""s that the end of the program waits for a disk or a terminal, twice at most; a complaint waits as long for the lines
+before it."""
 
 _losses: list[str] = []
 """Why lines of stdout are lost; empty while none is."""
@@ -179,7 +180,8 @@ def _table(
 
 
 def complain(line: str, style: str = "red") -> None:
-    """A line on stderr, with the program's name before it."""
+    """A line on stderr, with the program's name before it, behind lines of the log that wait."""
+    STDERR_WRITER.wait(END_LIMIT)
     _write(sys.stderr, _complaint(line), style)
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import logging
 import os
+import time
 from pathlib import Path
 
 import pytest
 from support.hanging_disk import PATIENCE, hanging_file
 
 from anafi_mav.cli import log
+from anafi_mav.cli.terminal import STDERR_WRITER, complain, write_stderr
 from anafi_mav.errors import ConfigError
 from anafi_mav.subject import DRONE
 
@@ -68,6 +70,14 @@ def test_full_disk_is_reported_once(capsys: pytest.CaptureFixture[str]) -> None:
     for _ in range(3):
         file.write("line")
     assert capsys.readouterr().err.count("/dev/full cannot be written: [Errno 28]") == 1
+
+
+def test_complaint_follows_the_lines_of_the_log_before_it(capfd: pytest.CaptureFixture[str]) -> None:
+    """A thread writes those."""
+    STDERR_WRITER.post(lambda: time.sleep(0.1))
+    log.LogThreadHandler(STDERR_WRITER, write_stderr, "terminal").emit(logging.makeLogRecord({"msg": "line"}))
+    complain("no gateway")
+    assert capfd.readouterr().err.splitlines() == ["line", "anafi-mav: no gateway"]
 
 
 def test_log_file_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
