@@ -368,6 +368,25 @@ async def test_conf_087_series_whose_end_was_lost_with_the_link_is_ended_after_i
         await w.drone.wait_log(lambda e: e.kind == "command" and e.name == "camera.stop_photo", 10.0)
 
 
+async def test_conf_087_series_whose_state_was_not_reported_before_the_link_was_lost_ends_as_commanded() -> None:
+    """Its begin was: it is under way."""
+    async with world(speed=1.0, web=True) as w:
+        await enter(w.client, PHOTO)
+        before = sim_value(w.drone, "CAM_PHOTOMODE")
+        w.drone.faults.late = {camera_messages.PhotoState.NAME: 1.5}
+        answer = asyncio.ensure_future(command(w.client, START_PHOTO, 0, 2, 5))
+        await w.drone.wait_log(lambda e: e.kind == "command" and e.name == "camera.take_photo", 10.0)
+        await watched(0.3)
+        session = w.drone.session
+        assert session is not None
+        session.end("restart")
+        assert await answer == ACCEPTED
+        w.drone.faults.late = {}
+        await w.drone.wait_log(lambda e: bool(photos(w)) and not w.drone.firmware.payload.cameras.busy, 30.0)
+        assert len(photos(w)[0].resources) <= 6
+        await w.drone.wait_log(lambda e: sim_value(w.drone, "CAM_PHOTOMODE") == before, 5.0)
+
+
 async def test_conf_087_long_series_is_listed_when_it_has_grown(monkeypatch: pytest.MonkeyPatch) -> None:
     """A list names all pictures of the series: with each of them it would take the radio of the flight."""
     count = 30

@@ -40,7 +40,7 @@ MAX_REQUEST = 1 << 18
 
 def main() -> None:
     os.setsid()
-    sys.path[0] = os.getcwd()  # as -m does
+    sys.path[0] = str(Path.cwd())  # as -m does
     with socket.socket(fileno=os.dup(0)) as channel:
         for name in MODULES:
             importlib.import_module(name)

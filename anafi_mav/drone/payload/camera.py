@@ -40,7 +40,14 @@ from anafi_mav.drone.payload.camera_state import (
     RecordingSettings,
 )
 from anafi_mav.drone.settings import Commanding, Question, number
-from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
+from anafi_mav.errors import (
+    AnafiMavError,
+    CommandRejected,
+    CommandTimeout,
+    LinkLost,
+    LocalProtocolError,
+    NotSupported,
+)
 from anafi_mav.units import clip
 
 MAIN = 0
@@ -563,7 +570,7 @@ class Camera(Commanding[CamerasState]):
     async def _until_state(self, id: int, field: str, value: bool) -> None:
         """Wait until the state has what was reported to have begun or ended.
 
-        The next command goes by it.
+        The next command goes by it. It has begun, or ended, also without a link.
         """
 
         def judge(message: Any) -> bool | None:
@@ -571,7 +578,7 @@ class Camera(Commanding[CamerasState]):
 
         speech, now = self._known(id)
         if getattr(now, field) not in (value, None):
-            answer = self._commander.expect(speech.state_events, judge)
-            answer.expire_after(STATE_TIMEOUT, field)
-            with contextlib.suppress(CommandTimeout):
+            with contextlib.suppress(CommandTimeout, LinkLost):
+                answer = self._commander.expect(speech.state_events, judge)
+                answer.expire_after(STATE_TIMEOUT, field)
                 await answer.wait()
