@@ -20,7 +20,9 @@ from pymavlink.dialects.v20 import ardupilotmega as stock
 from support.fault_scenarios import PX4_HOLD, watched
 from support.lines import SerialClient, UdpClient, pseudo_terminal
 from support.mav import Client
-from support.world import ARMED, HOLD, HOME, loopback, world
+from support.missions import put, way
+from support.setpoints import COPTER_BRAKE, COPTER_GUIDED
+from support.world import ARMED, HOLD, HOME, World, loopback, world
 
 from anafi_mav import geo, mav_enums
 from anafi_mav.arsdk.link.frame import FrameType, encode_frame
@@ -35,12 +37,16 @@ ACCEPTED, IN_PROGRESS, CANCELLED = (
 )
 LINK_TIMEOUT = 3.0
 """s without a heartbeat after which MAVSDK calls a system lost; QGroundControl waits a little longer."""
-ARM, TAKE_OFF, REPOSITION, LAND = (
+ARM, TAKE_OFF, REPOSITION, LAND, DO_SET_MODE, WAYPOINT = (
     mav_enums.MAV_CMD_COMPONENT_ARM_DISARM,
     mav_enums.MAV_CMD_NAV_TAKEOFF,
     mav_enums.MAV_CMD_DO_REPOSITION,
     mav_enums.MAV_CMD_NAV_LAND,
+    mav_enums.MAV_CMD_DO_SET_MODE,
+    mav_enums.MAV_CMD_NAV_WAYPOINT,
 )
+COPTER_AUTO = 3
+"""Mode of ArduPilot."""
 
 
 @asynccontextmanager
@@ -338,31 +344,55 @@ async def test_retransmissions_over_two_links_of_a_router_have_one_final_answer_
             assert [result for result in results if result != IN_PROGRESS] == [ACCEPTED]
 
 
+async def held_over_two_links(w: World, second: Client, start: Any, hold: Any) -> None:
+    """Send what flies the drone and then a stop over both links; the second one is slow."""
+    frames, mark = [w.client.pack(message) for message in (start, hold)], w.client.mark()
+    for frame in frames:
+        w.client.send_raw(frame)
+    await w.client.wait("COMMAND_ACK", lambda ack: (ack.command, ack.result) == (hold.command, ACCEPTED), since=mark)
+    for frame in frames:
+        second.send_raw(frame)
+    await watched(6.0)
+    assert abs(w.drone.pose.north) < 3.0
+
+
 async def test_hold_is_not_undone_by_the_copy_of_an_older_command_over_a_slow_link() -> None:
     """A router's second link brings a goto when its sender has held the drone already."""
     async with world(speed=1.0, also="px4") as w:
         second = await w.connect(port=5761)
         await w.take_off(10.0)
-        place = geo.destination(*HOME[:2], 60.0, 0.0)
-        x, y = (round(degrees * 1e7) for degrees in place)
-        frames = [
-            w.client.pack(stock.MAVLink_command_int_message(1, 1, 6, REPOSITION, 0, 0, -1, 1, 0, math.nan, x, y, 10)),
-            w.client.pack(
-                stock.MAVLink_command_long_message(1, 1, mav_enums.MAV_CMD_DO_SET_MODE, 0, *PX4_HOLD, 0, 0, 0, 0)
-            ),
-        ]
-        mark = w.client.mark()
-        for frame in frames:
-            w.client.send_raw(frame)
-        await w.client.wait(
-            "COMMAND_ACK",
-            lambda ack: (ack.command, ack.result) == (mav_enums.MAV_CMD_DO_SET_MODE, ACCEPTED),
-            since=mark,
-        )
-        for frame in frames:
-            second.send_raw(frame)
-        await watched(6.0)
-        assert abs(w.drone.pose.north) < 3.0
+        x, y = degrees_e7(60.0)
+        goto = stock.MAVLink_command_int_message(1, 1, 6, REPOSITION, 0, 0, -1, 1, 0, math.nan, x, y, 10)
+        hold = stock.MAVLink_command_long_message(1, 1, DO_SET_MODE, 0, *PX4_HOLD, 0, 0, 0, 0)
+        await held_over_two_links(w, second, goto, hold)
+
+
+async def test_brake_is_not_undone_by_the_copy_of_an_older_target_over_a_slow_link() -> None:
+    """Mission Planner sends it as a mission item, which is no command."""
+    async with world(speed=1.0, flavour="ardupilot", also="ardupilot") as w:
+        second = await w.connect(port=5761)
+        await w.take_off(10.0)
+        assert (await w.client.command(DO_SET_MODE, 1, COPTER_GUIDED)).result == ACCEPTED
+        x, y = degrees_e7(60.0)
+        goto = stock.MAVLink_mission_item_int_message(1, 1, 0, 6, WAYPOINT, 2, 1, 0, 0, 0, 0, x, y, 10)
+        brake = stock.MAVLink_command_long_message(1, 1, DO_SET_MODE, 0, 1, COPTER_BRAKE, 0, 0, 0, 0, 0)
+        await held_over_two_links(w, second, goto, brake)
+
+
+async def test_hold_is_not_undone_by_the_copy_of_an_older_mode_over_a_slow_link() -> None:
+    async with world(speed=1.0, flavour="ardupilot", also="ardupilot", web=True) as w:
+        second = await w.connect(port=5761)
+        await w.take_off(10.0)
+        await put(w, [way(60.0, 0.0, 10.0)])
+        auto = stock.MAVLink_set_mode_message(1, 1, COPTER_AUTO)
+        brake = stock.MAVLink_command_long_message(1, 1, DO_SET_MODE, 0, 1, COPTER_BRAKE, 0, 0, 0, 0, 0)
+        await held_over_two_links(w, second, auto, brake)
+
+
+def degrees_e7(north: float) -> tuple[int, int]:
+    """Return a place north of home, degE7."""
+    latitude, longitude = geo.destination(*HOME[:2], north, 0.0)
+    return round(latitude * 1e7), round(longitude * 1e7)
 
 
 @pytest.mark.parametrize(
