@@ -21,6 +21,7 @@ from anafi_mav.endpoint_options import EndpointConfig
 from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.access import (
+    FLYING,
     STOPPING,
     WITH_SECRETS,
     Access,
@@ -62,7 +63,7 @@ class Inbound(msgspec.Struct, frozen=True):
     is_late: bool = False
     """True for a command or mode that may have been sent while the host stalled: only a stop has an effect."""
     first: Channel | None = None
-    """The channel over which the same command or mode arrived a moment before; None: it is no copy."""
+    """The channel over which the same message of `FLYING` arrived a moment before; None: it is no copy."""
 
     @property
     def client(self) -> Hashable:
@@ -354,7 +355,7 @@ class Node:
                     continue
             message, id = received.message, received.id
             first = None
-            if id in STOPPING and permitted and not old and len(self.channels) > 1:
+            if id in FLYING and permitted and not old and len(self.channels) > 1:
                 first = self._copies.first(channel, received, (route.hosts, channel.options), now)
             inbound = Inbound(message, id, channel, received.sysid, received.compid, now, permitted, old, first)
             if id == dialect.MAVLINK_MSG_ID_SETUP_SIGNING:

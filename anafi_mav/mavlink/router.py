@@ -203,8 +203,8 @@ class CommandCopies(Generic[KeyT]):
 
     A router with two links to us sends a station's command over both. The copy must not be carried out as another
     client's: it would replace the first one, and the station would read CANCELLED of what is flown. SET_MODE is such a
-    command, too. The `purpose` of a command is what it is delivered for: its hosts, and all that distinguishes one link
-    from another. With another purpose it is no copy.
+    command, too, and so is an item to fly to at once. The `purpose` of a command is what it is delivered for: its
+    hosts, and all that distinguishes one link from another. With another purpose it is no copy.
     """
 
     def __init__(self) -> None:

@@ -375,7 +375,7 @@ async def test_brake_is_not_undone_by_the_copy_of_an_older_target_over_a_slow_li
         assert (await w.client.command(DO_SET_MODE, 1, COPTER_GUIDED)).result == ACCEPTED
         x, y = degrees_e7(60.0)
         goto = stock.MAVLink_mission_item_int_message(1, 1, 0, 6, WAYPOINT, 2, 1, 0, 0, 0, 0, x, y, 10)
-        brake = stock.MAVLink_command_long_message(1, 1, DO_SET_MODE, 0, 1, COPTER_BRAKE, 0, 0, 0, 0, 0)
+        brake = stock.MAVLink_command_long_message(1, 1, mav_enums.MAV_CMD_DO_PAUSE_CONTINUE, 0, 0, 0, 0, 0, 0, 0, 0)
         await held_over_two_links(w, second, goto, brake)
 
 
