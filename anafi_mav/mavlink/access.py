@@ -153,9 +153,6 @@ COMMANDS = (dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_
 STOPPING = (*COMMANDS, dialect.MAVLINK_MSG_ID_SET_MODE)
 """Messages that can stop a flight."""
 
-FLYING = (*STOPPING, dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT)
-"""Messages that can begin or stop a flight by themselves: an item may be a place to fly to at once."""
-
 _FTP_OPCODE = 3
 """Byte of the payload of FILE_TRANSFER_PROTOCOL that holds the opcode (MAVLink ftp.md)."""
 

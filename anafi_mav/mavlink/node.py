@@ -20,21 +20,13 @@ from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.endpoint_options import EndpointConfig
 from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.access import (
-    FLYING,
-    STOPPING,
-    WITH_SECRETS,
-    Access,
-    concerns_link,
-    needed_access,
-    needed_by_others,
-)
+from anafi_mav.mavlink.access import STOPPING, WITH_SECRETS, Access, concerns_link, needed_access, needed_by_others
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, reason
 from anafi_mav.mavlink.channel import Channel, total
 from anafi_mav.mavlink.endpoint import EndpointFactory, make_endpoint, parse_endpoint
 from anafi_mav.mavlink.frames import Batch, Packed, ReceivedFrame, pack
 from anafi_mav.mavlink.key_ring import KeyRing
-from anafi_mav.mavlink.router import CommandCopies, Route, Router, has_target, targets
+from anafi_mav.mavlink.router import Route, Router, has_target, targets
 from anafi_mav.mavlink.signing import Signing
 from anafi_mav.mavlink.stall import StallWatch
 
@@ -62,8 +54,6 @@ class Inbound(msgspec.Struct, frozen=True):
     """False when it needs more than the access of its channel: it must have no effect."""
     is_late: bool = False
     """True for a command or mode that may have been sent while the host stalled: only a stop has an effect."""
-    first: Channel | None = None
-    """The channel over which the same message of `FLYING` arrived a moment before; None: it is no copy."""
 
     @property
     def client(self) -> Hashable:
@@ -131,7 +121,6 @@ class Node:
         self._clock = clock or SystemClock()
         self._telemetry: set[int] = set()
         self._router: Router[Channel, Receiver] = Router()
-        self._copies: CommandCopies[Channel] = CommandCopies()
         self._delivers = True
         self._forwards = forwards
         self._flavours = flavours
@@ -306,7 +295,6 @@ class Node:
     def closed(self, channel: Channel) -> None:
         _log_change("closed", channel)
         self._router.remove(channel)
-        self._copies.forget(channel)
         self.channels = [other for other in self.channels if other is not channel]
         self._closed[channel.endpoint].update(total([channel]))
         if self.on_channel is not None:
@@ -354,10 +342,7 @@ class Node:
                 if received.id not in STOPPING:
                     continue
             message, id = received.message, received.id
-            first = None
-            if id in FLYING and permitted and not old and len(self.channels) > 1:
-                first = self._copies.first(channel, received, (route.hosts, channel.options), now)
-            inbound = Inbound(message, id, channel, received.sysid, received.compid, now, permitted, old, first)
+            inbound = Inbound(message, id, channel, received.sysid, received.compid, now, permitted, old)
             if id == dialect.MAVLINK_MSG_ID_SETUP_SIGNING:
                 # Before the log and the hosts: it holds a key.
                 if self._on_setup_signing is not None:

@@ -2,8 +2,7 @@
 
 A host is a component of ours, looked up by system and component. Our hosts are on every channel; other systems are
 learned from the messages that they send. Rules beyond routing.md: a frame that comes back to us is not forwarded
-again, for endpoints are easily wired into a ring, a command that arrives over two channels is carried out once, and
-SETUP_SIGNING, which carries a key, is never forwarded.
+again, for endpoints are easily wired into a ring, and SETUP_SIGNING, which carries a key, never is.
 """
 
 from __future__ import annotations
@@ -196,39 +195,6 @@ class Router(Generic[KeyT, HostT]):
         if len(self._recent) > RING_FRAMES:
             self._recent.popitem(last=False)
         return False
-
-
-class CommandCopies(Generic[KeyT]):
-    """Commands that were delivered a moment ago.
-
-    A router with two links to us sends a station's command over both. The copy must not be carried out as another
-    client's: it would replace the first one, and the station would read CANCELLED of what is flown. SET_MODE is such a
-    command, too, and so is an item to fly to at once. The `purpose` of a command is what it is delivered for: its
-    hosts, and all that distinguishes one link from another. With another purpose it is no copy.
-    """
-
-    def __init__(self) -> None:
-        self._delivered: OrderedDict[tuple[bytes, Hashable], tuple[KeyT, float]] = OrderedDict()
-        """Channel and time by `ReceivedFrame.identity` and purpose."""
-
-    def first(self, channel: KeyT, received: ReceivedFrame, purpose: Hashable, now: float) -> KeyT | None:
-        """Return the other channel over which a command arrived a moment ago.
-
-        None: it is no copy, and is noted.
-        """
-        key = (received.identity, purpose)
-        first = self._delivered.pop(key, None)
-        if first is not None and first[0] != channel and now - first[1] < RING_WINDOW:
-            self._delivered[key] = first
-            return first[0]
-        self._delivered[key] = channel, now
-        if len(self._delivered) > RING_FRAMES:
-            self._delivered.popitem(last=False)
-        return None
-
-    def forget(self, channel: KeyT) -> None:
-        """Forget the commands of a closed channel."""
-        self._delivered = OrderedDict((key, first) for key, first in self._delivered.items() if first[0] != channel)
 
 
 def has_target(message: object) -> bool:

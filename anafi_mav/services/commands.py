@@ -11,11 +11,10 @@ import math
 from collections.abc import Awaitable, Callable, Hashable
 from dataclasses import dataclass
 
-from msgspec import Struct, field
+from msgspec import Struct
 
 from anafi_mav import texts
 from anafi_mav.mavlink import dialect
-from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.flavours import PX4, Flavour
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import height_in_frame
@@ -365,8 +364,6 @@ class Execution(Struct, eq=False):
     """Another client's action has replaced it since."""
     overtaken: bool = False
     """Another action of its group has begun since. Only `PayloadHistory` notes it."""
-    copies: list[Inbound] = field(default_factory=list)
-    """The same command over other links of a router, which get the same answers."""
 
     @property
     def succeeded(self) -> bool:
@@ -428,11 +425,6 @@ class CommandHistory:
             return dialect.MAV_RESULT_CANCELLED
         ended = effect is Effect.LAPSING and mode is not None and mode is not command.mode
         return None if effect is Effect.RETURN or ended or not newest.still_holds else newest.result
-
-    def newest(self, command: Command) -> Execution | None:
-        """Return the newest action of the command's client if it is this one."""
-        newest = self._newest.get(command.client)
-        return newest if newest is not None and newest.command.same_as(command) else None
 
     def was_cancelled(self, client: Hashable, id: int, now: float) -> bool:
         """Return True when this command, the client's newest, has just ended with CANCELLED."""

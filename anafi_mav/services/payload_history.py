@@ -58,11 +58,6 @@ class PayloadHistory:
             newest.ended = now  # the client may not receive this answer either: Mission Planner repeats for 6 s
         return newest.result
 
-    def newest(self, command: Command) -> Execution | None:
-        """Return the newest action of the command's client, component and MAV_CMD if it is this one."""
-        newest = self._newest.get(_key(command))
-        return newest if newest is not None and newest.command.same_as(command) else None
-
     def begin(self, command: Command) -> Execution:
         """Note that an action begins; it overtakes all others of its group."""
         for other in self._newest.values():

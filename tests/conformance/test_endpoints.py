@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-import math
 import random
 import socket
 import sys
@@ -17,12 +16,9 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as stock
-from support.fault_scenarios import PX4_HOLD, watched
 from support.lines import SerialClient, UdpClient, pseudo_terminal
 from support.mav import Client
-from support.missions import put, way
-from support.setpoints import COPTER_BRAKE, COPTER_GUIDED
-from support.world import ARMED, HOLD, HOME, World, loopback, world
+from support.world import ARMED, HOLD, HOME, loopback, world
 
 from anafi_mav import geo, mav_enums
 from anafi_mav.arsdk.link.frame import FrameType, encode_frame
@@ -30,23 +26,15 @@ from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 
-ACCEPTED, IN_PROGRESS, CANCELLED = (
-    mav_enums.MAV_RESULT_ACCEPTED,
-    mav_enums.MAV_RESULT_IN_PROGRESS,
-    mav_enums.MAV_RESULT_CANCELLED,
-)
+ACCEPTED = 0
 LINK_TIMEOUT = 3.0
 """s without a heartbeat after which MAVSDK calls a system lost; QGroundControl waits a little longer."""
-ARM, TAKE_OFF, REPOSITION, LAND, DO_SET_MODE, WAYPOINT = (
+ARM, TAKE_OFF, REPOSITION, LAND = (
     mav_enums.MAV_CMD_COMPONENT_ARM_DISARM,
     mav_enums.MAV_CMD_NAV_TAKEOFF,
     mav_enums.MAV_CMD_DO_REPOSITION,
     mav_enums.MAV_CMD_NAV_LAND,
-    mav_enums.MAV_CMD_DO_SET_MODE,
-    mav_enums.MAV_CMD_NAV_WAYPOINT,
 )
-COPTER_AUTO = 3
-"""Mode of ArduPilot."""
 
 
 @asynccontextmanager
@@ -301,98 +289,6 @@ def page_request(method: str, body: bytes) -> bytes:
     """A request that the page of any web site can make a browser send, with a body of the page's choice."""
     head = f"{method} / HTTP/1.1\r\nHost: 127.0.0.1:5760\r\nOrigin: https://example.org\r\nContent-Length: {len(body)}"
     return head.encode() + b"\r\n\r\n" + body
-
-
-@pytest.mark.parametrize(
-    ("flavour", "results"), [("px4", [[ACCEPTED], [ACCEPTED]]), ("ardupilot", [[CANCELLED], [ACCEPTED]])]
-)
-async def test_command_over_two_links_of_a_router_is_carried_out_once(flavour: str, results: list[list[int]]) -> None:
-    """Over a link of another flavour it may be another command: Hold of PX4 is no mode of ArduPilot."""
-    async with world(speed=4.0, also=flavour) as w:
-        second = await w.connect(port=5761)
-        assert (await w.client.command(ARM, 1)).result == ACCEPTED
-        marks = [client.mark() for client in (w.client, second)]
-        frame = w.client.pack(
-            stock.MAVLink_command_long_message(1, 1, TAKE_OFF, 0, 0, 0, 0, math.nan, 0, 0, HOME[2] + 5)
-        )
-        for client in (w.client, second):
-            client.send_raw(frame)
-        await w.drone.wait_log(lambda e: e.name.endswith("moveByEnd"), 20.0)
-        await watched(2.0)
-        acks = [
-            [m.result for _, m in client.since(mark, "COMMAND_ACK") if m.result != IN_PROGRESS]
-            for client, mark in zip((w.client, second), marks, strict=True)
-        ]
-        assert acks == results
-
-
-async def test_retransmissions_over_two_links_of_a_router_have_one_final_answer_on_each() -> None:
-    async with world(speed=4.0, also="px4") as w:
-        second = await w.connect(port=5761)
-        assert (await w.client.command(ARM, 1)).result == ACCEPTED
-        marks = [client.mark() for client in (w.client, second)]
-        for confirmation in range(3):
-            frame = w.client.pack(
-                stock.MAVLink_command_long_message(1, 1, TAKE_OFF, confirmation, 0, 0, 0, math.nan, 0, 0, HOME[2] + 5)
-            )
-            for client in (w.client, second):
-                client.send_raw(frame)
-        await w.drone.wait_log(lambda e: e.name.endswith("moveByEnd"), 20.0)
-        await watched(2.0)
-        for client, mark in zip((w.client, second), marks, strict=True):
-            results = [m.result for _, m in client.since(mark, "COMMAND_ACK")]
-            assert [result for result in results if result != IN_PROGRESS] == [ACCEPTED]
-
-
-async def held_over_two_links(w: World, second: Client, start: Any, hold: Any) -> None:
-    """Send what flies the drone and then a stop over both links; the second one is slow."""
-    frames, mark = [w.client.pack(message) for message in (start, hold)], w.client.mark()
-    for frame in frames:
-        w.client.send_raw(frame)
-    await w.client.wait("COMMAND_ACK", lambda ack: (ack.command, ack.result) == (hold.command, ACCEPTED), since=mark)
-    for frame in frames:
-        second.send_raw(frame)
-    await watched(6.0)
-    assert abs(w.drone.pose.north) < 3.0
-
-
-async def test_hold_is_not_undone_by_the_copy_of_an_older_command_over_a_slow_link() -> None:
-    """A router's second link brings a goto when its sender has held the drone already."""
-    async with world(speed=1.0, also="px4") as w:
-        second = await w.connect(port=5761)
-        await w.take_off(10.0)
-        x, y = degrees_e7(60.0)
-        goto = stock.MAVLink_command_int_message(1, 1, 6, REPOSITION, 0, 0, -1, 1, 0, math.nan, x, y, 10)
-        hold = stock.MAVLink_command_long_message(1, 1, DO_SET_MODE, 0, *PX4_HOLD, 0, 0, 0, 0)
-        await held_over_two_links(w, second, goto, hold)
-
-
-async def test_brake_is_not_undone_by_the_copy_of_an_older_target_over_a_slow_link() -> None:
-    """Mission Planner sends it as a mission item, which is no command."""
-    async with world(speed=1.0, flavour="ardupilot", also="ardupilot") as w:
-        second = await w.connect(port=5761)
-        await w.take_off(10.0)
-        assert (await w.client.command(DO_SET_MODE, 1, COPTER_GUIDED)).result == ACCEPTED
-        x, y = degrees_e7(60.0)
-        goto = stock.MAVLink_mission_item_int_message(1, 1, 0, 6, WAYPOINT, 2, 1, 0, 0, 0, 0, x, y, 10)
-        brake = stock.MAVLink_command_long_message(1, 1, mav_enums.MAV_CMD_DO_PAUSE_CONTINUE, 0, 0, 0, 0, 0, 0, 0, 0)
-        await held_over_two_links(w, second, goto, brake)
-
-
-async def test_hold_is_not_undone_by_the_copy_of_an_older_mode_over_a_slow_link() -> None:
-    async with world(speed=1.0, flavour="ardupilot", also="ardupilot", web=True) as w:
-        second = await w.connect(port=5761)
-        await w.take_off(10.0)
-        await put(w, [way(60.0, 0.0, 10.0)])
-        auto = stock.MAVLink_set_mode_message(1, 1, COPTER_AUTO)
-        brake = stock.MAVLink_command_long_message(1, 1, DO_SET_MODE, 0, 1, COPTER_BRAKE, 0, 0, 0, 0, 0)
-        await held_over_two_links(w, second, auto, brake)
-
-
-def degrees_e7(north: float) -> tuple[int, int]:
-    """Return a place north of home, degE7."""
-    latitude, longitude = geo.destination(*HOME[:2], north, 0.0)
-    return round(latitude * 1e7), round(longitude * 1e7)
 
 
 @pytest.mark.parametrize(

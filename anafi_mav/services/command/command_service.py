@@ -266,8 +266,6 @@ class CommandService(Service):
         self._act(inbound, command)
 
     def _act(self, inbound: Inbound, command: Command) -> None:
-        if inbound.first is not None and self._answer_copy(inbound, command):
-            return
         now, effect, vehicle = self.host.clock.monotonic(), command.effect, self.host.vehicle
         # Before it is known whether it is a retransmission: a program that repeats its Hold is to be noticed.
         counted = effect is not Effect.HOLD or vehicle.holds.arrive(command.client, now)
@@ -294,24 +292,6 @@ class CommandService(Service):
         running = RunningAction(command.client, flies=flies, answer=(inbound, execution), group=group)
         self._spawn(self._execute(inbound, execution), running)
 
-    def _answer_copy(self, inbound: Inbound, command: Command) -> bool:
-        """Answer a command that has arrived over another link of a router, too, as the first one.
-
-        Without an answer if its sender has commanded another flight since: over a slow link a goto would then replace
-        the Hold after it, whose own copy ends nothing. False for one of the payload then: it is carried out.
-        """
-        client = (inbound.first, inbound.sysid, inbound.compid)
-        first = replace(command, client=client, component=self.host.compid)
-        is_flight = command.group is ActionGroup.FLIGHT
-        original = self._history.newest(first) if is_flight else self.host.payload_history.newest(first)
-        if original is None:
-            return is_flight
-        if original.result != dialect.MAV_RESULT_IN_PROGRESS:
-            self._acknowledge(inbound, command.id, original.result)
-        elif all(copy.client != inbound.client for copy in original.copies):  # else of a retransmission
-            original.copies.append(inbound)
-        return True
-
     async def _execute(self, inbound: Inbound, execution: Execution) -> None:
         command = execution.command
         policy = command.progress
@@ -319,8 +299,7 @@ class CommandService(Service):
             self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)  # it waits for the climb's end
 
         def report() -> None:
-            for one in (inbound, *execution.copies):
-                self._acknowledge(one, command.id, dialect.MAV_RESULT_IN_PROGRESS)
+            self._acknowledge(inbound, command.id, dialect.MAV_RESULT_IN_PROGRESS)
             progress.set_in(PROGRESS_EVERY)
 
         progress = Alarm(report)
@@ -351,8 +330,7 @@ class CommandService(Service):
         """Send the one final acknowledgement of an action."""
         if execution.result == dialect.MAV_RESULT_IN_PROGRESS:
             execution.result, execution.ended = result, self.host.clock.monotonic()
-            for one in (inbound, *execution.copies):
-                self._acknowledge(one, execution.command.id, result)
+            self._acknowledge(inbound, execution.command.id, result)
             if result == dialect.MAV_RESULT_ACCEPTED:
                 self.log.accept(result, execution.ended - inbound.now)
             else:

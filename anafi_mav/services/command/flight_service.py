@@ -155,12 +155,7 @@ class FlightService(Service):
         await self.host.vehicle.terminate(command.right)
 
     def _set_mode(self, inbound: Inbound) -> None:
-        """SET_MODE has no acknowledgement: the heartbeat shows the mode, a text the refusal.
-
-        A copy over another link of a router has no effect: its sender may have commanded something else since.
-        """
-        if inbound.first is not None:
-            return
+        """SET_MODE has no acknowledgement: the heartbeat shows the mode, a text the refusal."""
         mode: FlightMode | None = flavour_of(inbound.channel).mode_of_number(inbound.message.custom_mode)
         client, vehicle, now = inbound.client, self.host.vehicle, self.host.clock.monotonic()
         is_hold = mode is not None and EFFECT_OF_MODE[mode] is Effect.HOLD

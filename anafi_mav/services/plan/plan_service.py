@@ -174,8 +174,7 @@ class PlanService(Service):
     def _receive(self, inbound: Inbound) -> None:
         message = inbound.message
         if inbound.id in _ITEMS and (handler := self._item_commands.get(message.current)) is not None:
-            if inbound.first is None:  # else its sender may have commanded something else since the first one
-                handler(inbound)
+            handler(inbound)
             return
         self._perform(self._protocol.receive(message, self._peer(inbound), inbound.now))
 

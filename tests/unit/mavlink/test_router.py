@@ -8,7 +8,7 @@ import pytest
 
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.frames import MAX_SOURCES, Parser, ReceivedFrame, frame, pack
-from anafi_mav.mavlink.router import EVERY_COMPONENT, RING_FRAMES, RING_WINDOW, CommandCopies, Router, targets
+from anafi_mav.mavlink.router import EVERY_COMPONENT, RING_FRAMES, RING_WINDOW, Router, targets
 
 GCS, OTHER_GCS, OURS, FOREIGN = (255, 190), (254, 190), 1, 42
 
@@ -201,35 +201,6 @@ def test_frame_received_twice_is_forwarded_once(router: Router[str, str]) -> Non
     # Another sequence number is another frame, and so is the same one much later.
     assert router.route("a", heartbeat(seq=10), 10.2).forward == ("b", "c")
     assert router.route("a", frame, 10.0 + RING_WINDOW).forward == ("b", "c")
-
-
-def test_command_over_another_channel_a_moment_later_is_a_copy() -> None:
-    copies, hosts = CommandCopies[str](), ("autopilot",)
-    takeoff = command(OURS, 1, seq=9)
-    assert copies.first("a", takeoff, hosts, 10.0) is None
-    assert copies.first("b", takeoff, hosts, 10.1) == "a"
-    assert copies.first("c", takeoff, hosts, 10.2) == "a"
-    # Some senders do not count: over its own channel each is a command.
-    assert copies.first("a", takeoff, hosts, 10.3) is None
-    assert copies.first("b", takeoff, hosts, 10.3 + RING_WINDOW) is None
-    assert copies.first("a", takeoff, ("camera",), 10.4) is None
-    for other in (command(OURS, 1, seq=10), command(OURS, 100, seq=9), command(OURS, 1, seq=9, source=OTHER_GCS)):
-        assert copies.first("b", other, hosts, 10.4) is None
-
-
-def test_command_of_a_closed_channel_has_no_copies() -> None:
-    copies = CommandCopies[str]()
-    assert copies.first("a", command(OURS, 1, seq=9), (), 10.0) is None
-    copies.forget("a")
-    assert copies.first("b", command(OURS, 1, seq=9), (), 10.1) is None
-
-
-def test_remembered_commands_are_bounded() -> None:
-    copies = CommandCopies[str]()
-    for number in range(RING_FRAMES + 1):
-        assert copies.first("a", command(OURS, number % 256, seq=number // 256), (), 10.0) is None
-    assert copies.first("b", command(OURS, 1, seq=0), (), 10.0) == "a"
-    assert copies.first("b", command(OURS, 0, seq=0), (), 10.0) is None
 
 
 def test_frame_that_may_not_be_forwarded_takes_no_place(router: Router[str, str]) -> None:
