@@ -10,13 +10,14 @@ from pathlib import Path
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import GOTO, goto
+from support.fault_scenarios import GOTO, goto, watched
 from support.mav import Client
 from support.world import World, loopback, world
 
 from anafi_mav.arsdk.link import controller
 from anafi_mav.arsdk.messages import common
 from anafi_mav.config import Config, DroneConfig
+from anafi_mav.drone.contention import SHORT
 from anafi_mav.errors import LinkLost
 from anafi_mav.gateway import Gateway
 
@@ -134,7 +135,7 @@ async def test_bad_radio_twice_is_no_second_controller_with_a_long_connection_be
             w.drone.faults.mute = False
             await w.client.heartbeat(lambda beat: True, timeout=15.0)
             if not is_last:
-                await asyncio.sleep(6.0)
+                await watched(SHORT + 1.0)
                 session, mark = w.drone.session, now()
                 assert session is not None
                 session.end("switched off")

@@ -62,7 +62,7 @@ def test_state_lock_of_a_second_gateway_is_refused(tmp_path: Path) -> None:
 
 @contextmanager
 def another_user() -> Iterator[None]:
-    """Root is nobody for the length of a block. The permissions in the test bind any other user anyway."""
+    """Root is another user for the length of a block. The permissions in the test bind any other user anyway."""
     if os.geteuid() != 0:
         yield
         return

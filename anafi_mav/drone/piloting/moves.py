@@ -63,7 +63,7 @@ and another limit is given."""
 _FASTEST_CLIMB, _FASTEST_TURN = 6.0, 3.5
 """m/s and rad/s that no ANAFI exceeds: a moveBy takes longer than its offset at these."""
 _ON_ITS_WAY = 1.0
-"""s after a moveBy was given up here in which the drone may still complete it: what ends it there is on its way."""
+"""s after a moveBy was cancelled here in which the drone may still complete it: what ends it there is on its way."""
 
 
 class MoveEnd(enum.Enum):

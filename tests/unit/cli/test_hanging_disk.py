@@ -7,7 +7,8 @@ import json
 import os
 import signal
 import sys
-from contextlib import suppress
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -53,117 +54,114 @@ def fill(pipe: int) -> None:
     os.set_blocking(pipe, True)
 
 
-async def test_stopped_terminal_stops_neither_a_command_nor_the_end(tmp_path: Path) -> None:
-    address = loopback()
-    path = tmp_path / "fleet.yaml"
+@asynccontextmanager
+async def started(*words: str, **streams: int) -> AsyncIterator[asyncio.subprocess.Process]:
+    """`anafi-mav` for the length of a block."""
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "anafi_mav", *words, stdin=asyncio.subprocess.DEVNULL, **streams
+    )
+    try:
+        yield process
+    finally:
+        if process.returncode is None:
+            process.kill()
+            await process.wait()
+
+
+@contextmanager
+def open_pipe() -> Iterator[tuple[int, int]]:
+    """The two ends of a pipe, the reading one first, for the length of a block."""
+    ends = os.pipe()
+    try:
+        yield ends
+    finally:
+        for end in ends:
+            os.close(end)
+
+
+async def ready(pipe: int) -> None:
+    """Read a pipe until the program at its other end is ready."""
+    shown = b""
+    while b"ready" not in shown:
+        shown += await asyncio.wait_for(asyncio.to_thread(os.read, pipe, 4096), 30.0)
+
+
+async def end(process: asyncio.subprocess.Process) -> int:
+    """The status with which a program ends at SIGTERM."""
+    process.send_signal(signal.SIGTERM)
+    return await asyncio.wait_for(process.wait(), 15.0)
+
+
+def fleet(folder: Path, address: str) -> str:
+    """The path of a configuration with one simulated drone."""
+    path = folder / "fleet.yaml"
     path.write_text(f"""
         endpoints: ["tcpin://{address}:5760"]
         drones: [{{name: alpha, sysid: 1, sim: {{address: {loopback()}}}}}]
     """)
-    reading, writing = os.pipe()
-    fill(writing)
-    process = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "anafi_mav", "run", "-c", str(path), "-vv",
-        stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE, stderr=writing,
-    )  # fmt: skip
-    try:
-        assert process.stdout is not None
-        while not (await asyncio.wait_for(process.stdout.readline(), 30.0)).startswith(b"ready"):
-            pass
-        client = await Client().connect(5760, address)
-        await client.heartbeat(lambda beat: True)
-        ack = await client.command(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
-        assert ack.result == dialect.MAV_RESULT_ACCEPTED
-        await client.close()
-        process.send_signal(signal.SIGTERM)
-        assert await asyncio.wait_for(process.wait(), 15.0) == 0
-    finally:
-        if process.returncode is None:
-            process.kill()
-        os.close(reading)
-        os.close(writing)
+    return str(path)
+
+
+async def test_stopped_terminal_stops_neither_a_command_nor_the_end(tmp_path: Path) -> None:
+    address = loopback()
+    with open_pipe() as (reading, shown), open_pipe() as (_, stopped):
+        fill(stopped)
+        async with started("run", "-c", fleet(tmp_path, address), "-vv", stdout=shown, stderr=stopped) as process:
+            await ready(reading)
+            client = await Client().connect(5760, address)
+            await client.heartbeat(lambda beat: True)
+            ack = await client.command(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+            assert ack.result == dialect.MAV_RESULT_ACCEPTED
+            await client.close()
+            assert await end(process) == 0
 
 
 async def test_stopped_terminal_of_a_ground_process_keeps_no_station_from_its_drone() -> None:
     """The line about the systems on the fabric has no room on stdout."""
     port = free_port()
-    reading, writing = os.pipe()
     async with router() as node:
-        process = await asyncio.create_subprocess_exec(
-            sys.executable, "-m", "anafi_mav", "ground", "--zenoh", node.url, "--endpoint", f"tcpin://127.0.0.1:{port}",
-            stdin=asyncio.subprocess.DEVNULL, stdout=writing,
-        )  # fmt: skip
-        try:
-            shown = b""
-            while b"ready" not in shown:
-                shown += await asyncio.wait_for(asyncio.to_thread(os.read, reading, 4096), 30.0)
-            fill(writing)
-            async with world(endpoints=(node.url,), speed=1.0):
-                station = await FabricStation().join(port, tcp=True)
-                ack = await station.command(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
-                assert ack.result == dialect.MAV_RESULT_ACCEPTED
-                await station.close()
-            process.send_signal(signal.SIGTERM)
-            assert await asyncio.wait_for(process.wait(), 15.0) == 0
-        finally:
-            if process.returncode is None:
-                process.kill()
-            os.close(reading)
-            os.close(writing)
+        words = ("ground", "--zenoh", node.url, "--endpoint", f"tcpin://127.0.0.1:{port}")
+        with open_pipe() as (reading, shown):
+            async with started(*words, stdout=shown) as process:
+                await ready(reading)
+                fill(shown)
+                async with world(endpoints=(node.url,), speed=1.0):
+                    station = await FabricStation().join(port, tcp=True)
+                    version = dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION
+                    ack = await station.command(dialect.MAV_CMD_REQUEST_MESSAGE, version)
+                    assert ack.result == dialect.MAV_RESULT_ACCEPTED
+                    await station.close()
+                assert await end(process) == 0
 
 
 async def test_sigterm_beside_a_stopped_terminal_hovers_a_drone_in_the_air(tmp_path: Path) -> None:
     """The sentence about the drone has no room on stdout."""
-    address = loopback()
-    path, log = tmp_path / "fleet.yaml", tmp_path / "sim.jsonl"
-    path.write_text(f"""
-        endpoints: ["tcpin://{address}:5760"]
-        drones: [{{name: alpha, sysid: 1, sim: {{address: {loopback()}}}}}]
-    """)
-    reading, writing = os.pipe()
-    process = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "anafi_mav", "run", "-c", str(path), "--sim-log", str(log),
-        stdin=asyncio.subprocess.DEVNULL, stdout=writing,
-    )  # fmt: skip
-    try:
-        shown = b""
-        while b"ready" not in shown:
-            shown += await asyncio.wait_for(asyncio.to_thread(os.read, reading, 4096), 30.0)
-        client = await Client().connect(5760, address)
-        assert (await client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == 0
-        assert (await client.command(dialect.MAV_CMD_NAV_TAKEOFF, x=0.0, y=0.0, z=5.0)).result == 0
-        fill(writing)
-        process.send_signal(signal.SIGTERM)
-        assert await asyncio.wait_for(process.wait(), 15.0) == 0
-        await client.close()
-    finally:
-        if process.returncode is None:
-            process.kill()
-        os.close(reading)
-        os.close(writing)
+    address, log = loopback(), tmp_path / "sim.jsonl"
+    words = ("run", "-c", fleet(tmp_path, address), "--sim-log", str(log))
+    with open_pipe() as (reading, shown):
+        async with started(*words, stdout=shown) as process:
+            await ready(reading)
+            client = await Client().connect(5760, address)
+            assert (await client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)).result == 0
+            assert (await client.command(dialect.MAV_CMD_NAV_TAKEOFF, x=0.0, y=0.0, z=5.0)).result == 0
+            fill(shown)
+            assert await end(process) == 0
+            await client.close()
     entries = [json.loads(line) for line in log.read_text().splitlines()]
     assert [entry["name"] for entry in entries if entry["kind"] == "session"] == ["up", "lost"]
 
 
 async def test_stopped_terminal_stops_no_ground_process() -> None:
     """It carries sticks and setpoints of stations, too."""
-    pytest.importorskip("zenoh")
-    url, reading, writing = f"zenoh://{loopback()}:7447", *os.pipe()
-    fill(writing)
-    process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "anafi_mav", "ground", "--zenoh", url, "--endpoint", f"udpin://{loopback()}:0"),
-        stdin=asyncio.subprocess.DEVNULL, stdout=writing, stderr=asyncio.subprocess.PIPE,
-    )  # fmt: skip
-    try:
-        assert process.stderr is not None
-        assert url.encode() in await asyncio.wait_for(process.stderr.readline(), 30.0)  # no router: its loop runs
-        process.send_signal(signal.SIGTERM)
-        assert await asyncio.wait_for(process.wait(), 15.0) == 0
-    finally:
-        if process.returncode is None:
-            process.kill()
-        os.close(reading)
-        os.close(writing)
+    pytest.importorskip("zenoh", reason="the extra `fabric` is not installed")
+    url = f"zenoh://{loopback()}:7447"
+    with open_pipe() as (_, stopped):
+        fill(stopped)
+        words = ("ground", "--zenoh", url, "--endpoint", f"udpin://{loopback()}:0")
+        async with started(*words, stdout=stopped, stderr=asyncio.subprocess.PIPE) as process:
+            assert process.stderr is not None
+            assert url.encode() in await asyncio.wait_for(process.stderr.readline(), 30.0)  # no router: its loop runs
+            assert await end(process) == 0
 
 
 async def test_drones_connect_beside_a_hanging_state_folder() -> None:

@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as stock
 from support import clock
+from support.fault_scenarios import watched
 from support.lines import SerialClient, UdpClient, pseudo_terminal
 from support.mav import Client
 from support.world import loopback
@@ -497,10 +498,10 @@ async def test_station_that_is_switched_off_is_in_the_log_once(caplog: pytest.Lo
             protocol.error_received(away)
             assert endpoint.describe() == f"{endpoint.url}: {os.strerror(errno.EHOSTUNREACH)}, retrying"
             await d.until(lambda: not endpoint._problem, 10.0)
-            await asyncio.sleep(3.0)
+            await watched(3.0)  # "open again" may not be in the log
             d.node.send(BEAT, sysid=1, compid=1)
             await client.wait("HEARTBEAT")
-        await asyncio.sleep(HOLDS)
+        await d.until(lambda: f"{endpoint.url}: open again" in caplog.messages, 2 * HOLDS)
     await client.close()
     assert endpoint.counters["reopened"] == 5
     said = [record.getMessage() for record in caplog.records if record.levelname == "WARNING"]
