@@ -73,7 +73,7 @@ def another_user() -> Iterator[None]:
         os.seteuid(0)
 
 
-@pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
+@pytest.mark.skipif(os.name != "posix", reason="another user and permissions of a file exist on POSIX alone")
 def test_holder_is_found_by_a_user_who_may_only_read() -> None:
     """A service's: `info` and `doctor` must not take its drones."""
     with TemporaryDirectory() as name:
@@ -88,7 +88,7 @@ def test_holder_is_found_by_a_user_who_may_only_read() -> None:
         lock.release()
 
 
-@pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
+@pytest.mark.skipif(os.name != "posix", reason="another user and permissions of a file exist on POSIX alone")
 @pytest.mark.parametrize("words", [["info", "127.0.0.1", "--take"], ["doctor", "127.0.0.1", "--take"], ["status"]])
 def test_state_folder_that_cannot_be_read_is_an_error_of_the_option(
     words: list[str], capsys: pytest.CaptureFixture[str]

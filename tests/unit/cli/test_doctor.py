@@ -309,7 +309,7 @@ async def test_drone_of_a_gateway_is_left_alone_with_take(name: str, status: int
     lock.release()
 
 
-@pytest.mark.skipif(not hasattr(os, "openpty"), reason="it needs a terminal")
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="opens a terminal by os.openpty, which Windows does not have")
 @pytest.mark.parametrize(("answer", "connects"), [(b"y\n", True), (b"n\n", False), (b"\n", False), (b"\x04", False)])
 async def test_info_at_a_terminal_confirms_before_connecting(answer: bytes, connects: bool) -> None:
     async with simulated() as drone:

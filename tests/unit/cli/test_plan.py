@@ -264,7 +264,7 @@ def test_convert_replaces_a_file_only_with_force(flight: Path, capsys: pytest.Ca
     assert "OUT: expected the name of a file, got" in capsys.readouterr().err
 
 
-@pytest.mark.skipif(not hasattr(os, "openpty"), reason="it needs a terminal")
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="opens a terminal by os.openpty, which Windows does not have")
 @pytest.mark.parametrize(("answer", "status"), [(b"y\n", 0), (b"no\n", 2)])
 def test_convert_at_a_terminal_asks(flight: Path, answer: bytes, status: int) -> None:
     out = flight.with_suffix(".waypoints")

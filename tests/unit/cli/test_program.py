@@ -80,7 +80,7 @@ def test_program_with_closed_standard_streams_does_its_work(closed: str, tmp_pat
     assert (tmp_path / "keys" / "field.key").exists() is not is_blind
 
 
-@pytest.mark.skipif(not hasattr(os, "openpty"), reason="it needs a terminal")
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="opens a terminal by os.openpty, which Windows does not have")
 def test_terminal_without_a_character_gets_its_escape(tmp_path: Path) -> None:
     """Also in a table, which rich writes."""
     plan = tmp_path / "b\u00fccher.plan"

@@ -12,7 +12,9 @@ import pytest
 from support import clock
 from support.programs import PROGRAM
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="programs are forked on Linux alone")
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux", reason="support.programs needs PR_SET_CHILD_SUBREAPER, which only Linux has"
+)
 
 FORKED, STARTED = PROGRAM, [sys.executable, "-s", "-m", "anafi_mav"]
 """Another option of Python is the server's cue to leave the start to `subprocess`."""
