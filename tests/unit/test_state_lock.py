@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import subprocess
@@ -62,7 +63,12 @@ def test_state_lock_of_a_second_gateway_is_refused(tmp_path: Path) -> None:
 
 @contextmanager
 def another_user() -> Iterator[None]:
-    """Root is another user for the length of a block. The permissions in the test bind any other user anyway."""
+    """Root is another user for the length of a block. The permissions in the test bind any other user anyway.
+
+    What the commands import is imported before: another user may not be able to read it.
+    """
+    for name in ("encodings.idna", *(f"anafi_mav.cli.{command}" for command in ("doctor", "info", "status"))):
+        importlib.import_module(name)
     if os.geteuid() != 0:
         yield
         return
