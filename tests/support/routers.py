@@ -29,7 +29,7 @@ def words(router: str, program: str, gateways: Sequence[str], stations: str) -> 
         return [sys.executable, "-u", program, *quiet, "--default-modules=", *masters, f"--out=udpin:{stations}"]
     if router == "mavlink-router":
         # A file of the machine's own must not add endpoints.
-        own = ["-c", "/dev/null", "-d", "/nonexistent", "-t", "0"]
+        own = ["-c", "/nonexistent/main.conf", "-d", "/nonexistent", "-t", "0"]
         return [program, *own, *(word for place in gateways for word in ("-p", place)), stations]
     silent = ["--hb-disable", "--streamreq-disable"]
     return [program, *silent, *(f"tcpc:{place}" for place in gateways), f"udps:{stations}"]
