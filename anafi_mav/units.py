@@ -15,6 +15,11 @@ LARGEST = 1e30
 """Size of a number that is a measure: sums of several fit a float of 32 bits, which MAVLink's fields are."""
 
 
+def counted(number: int, what: str) -> str:
+    """So many of them, in words: "1 item", "2 items"."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
 def wrap_pi(angle: float) -> float:
     """The same angle (rad) in [-pi, pi)."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi

@@ -26,13 +26,13 @@ from anafi_mav.plans.plan import (
     Item,
     Plan,
     Point,
-    counted,
     shifted,
     with_heading,
     without_zero_heading,
 )
 from anafi_mav.services.memory import NOT_KEPT
 from anafi_mav.services.plan.item_messages import from_wire, item_int, item_of, to_wire
+from anafi_mav.units import counted
 from anafi_mav.vehicle.fence.plan_items import PlanFault, PlanItem
 
 MISSION, FENCE, RALLY = (

@@ -25,6 +25,7 @@ from anafi_mav.config import Config, from_mapping, load
 from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import Gateway, state_in_use
 from anafi_mav.state_lock import read_holder, state_folder
+from anafi_mav.units import counted
 
 READY_LIMIT = 15.0
 """s after which "ready" is said though a drone has not answered: its connection takes 3 s at most, its settings and
@@ -194,7 +195,7 @@ async def _run(config: Config, sim_log: Path | None) -> list[str]:
             for line in gateway.lines():
                 say_later(line)
             say_later("ready, Ctrl-C ends", "green")
-            manager.ready(f"{len(gateway.systems)} drones")
+            manager.ready(counted(len(gateway.systems), "drone"))
             await signals.stop.wait()
         manager.stopping()
         for sentence in signals.unsaid():

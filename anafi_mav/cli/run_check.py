@@ -21,6 +21,7 @@ from anafi_mav.config import Config
 from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import Gateway, download_folder
 from anafi_mav.state_lock import check_folder
+from anafi_mav.units import counted
 
 __all__ = ["findings", "wrong"]
 
@@ -35,7 +36,8 @@ async def findings(
 
     `located` returns an error with the option of the command line that its key is from.
     """
-    found = [versions(), ok("configuration", f"{len(config.drones)} drones, {len(config.endpoints)} endpoints")]
+    drones, endpoints = counted(len(config.drones), "drone"), counted(len(config.endpoints), "endpoint")
+    found = [versions(), ok("configuration", f"{drones}, {endpoints}")]
     found += [ok("configuration", f"warning: {warning.text}") for warning in start_warnings.warnings_of(config)]
     with Reservations() as reservations:
         try:

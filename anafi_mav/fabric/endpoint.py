@@ -34,6 +34,7 @@ from anafi_mav.mavlink.frames import ReceivedFrame
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.mavlink.peer_table import REPLACEABLE
 from anafi_mav.mavlink.router import targets
+from anafi_mav.units import counted
 
 logger = logging.getLogger(__name__)
 
@@ -172,7 +173,7 @@ class FabricEndpoint(Endpoint):
         )
         lost = sum(station.input.lost for station in self._stations.values())
         lost_on_the_way = f", {lost} of their samples lost" if lost else ""
-        return f"{self.url}: connected, {count} station{'' if count == 1 else 's'}{lost_on_the_way}{kept_off}"
+        return f"{self.url}: connected, {counted(count, 'station')}{lost_on_the_way}{kept_off}"
 
     async def problems(self) -> list[str]:
         listed = asyncio.ensure_future(self._listed.wait())

@@ -12,6 +12,7 @@ from anafi_mav.clock import Clock
 from anafi_mav.mavlink.base import EndpointUrl, Reopening, Sink, StreamPeer, close_peers
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.listener import Listener
+from anafi_mav.units import counted
 
 logger = logging.getLogger(__name__)
 
@@ -115,7 +116,7 @@ class TcpIn(Listener):
 
     def describe(self) -> str:
         count = len(self._table)
-        return f"{self.shown_url}: {count} client{'' if count == 1 else 's'}"
+        return f"{self.shown_url}: {counted(count, 'client')}"
 
     def admit(self, transport: asyncio.BaseTransport) -> TcpPeer | None:
         """The peer for a new connection; None if it may not connect, or comes while we close."""

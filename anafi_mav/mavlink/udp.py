@@ -32,6 +32,7 @@ from anafi_mav.mavlink.frames import ReceivedFrame, Verdict
 from anafi_mav.mavlink.listener import Listener
 from anafi_mav.mavlink.router import targets
 from anafi_mav.receive_buffer import limit_reads, read_waiting
+from anafi_mav.units import counted
 
 logger = logging.getLogger(__name__)
 
@@ -288,7 +289,7 @@ class UdpIn(Listener):
 
     def describe(self) -> str:
         count = len(self._peers)
-        return f"{self.shown_url}: {count} peer{'' if count == 1 else 's'}"
+        return f"{self.shown_url}: {counted(count, 'peer')}"
 
     def _received(self, data: bytes, address: Any) -> None:
         now = self._clock.monotonic()

@@ -175,8 +175,3 @@ def without_zero_heading(item: Item) -> Item:
     if item.command not in HEADED or heading not in (0.0, NORTH):
         return item
     return with_heading(item, None if heading == 0.0 else 0.0)
-
-
-def counted(number: int, what: str) -> str:
-    """So many of them, in words: "1 item", "2 items"."""
-    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -16,8 +16,9 @@ from anafi_mav import geo, mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans import path
 from anafi_mav.plans.path import Stop
-from anafi_mav.plans.plan import FenceCircle, Plan, counted
+from anafi_mav.plans.plan import FenceCircle, Plan
 from anafi_mav.plans.shots import ShotKind, shots
+from anafi_mav.units import counted
 
 Point2 = tuple[float, float]
 """East and north in m on the map; way and height in m in the profile."""

@@ -18,8 +18,8 @@ from anafi_mav.plans.plan import (
     TERRAIN_INT,
     Item,
     Plan,
-    counted,
 )
+from anafi_mav.units import counted
 
 _FRAMES = {RELATIVE: "", RELATIVE_INT: "", GLOBAL: " AMSL", GLOBAL_INT: " AMSL"} | dict.fromkeys(
     (TERRAIN, TERRAIN_INT), " above ground"

@@ -39,6 +39,7 @@ from anafi_mav.relay.feed import Feed, FeedReader, PackedPicture
 from anafi_mav.relay.outlet import Outlet, TcpOutlet, UdpOutlet
 from anafi_mav.relay.source import DroneSource, NotShown
 from anafi_mav.relay.uri_host import is_loopback, uri_host
+from anafi_mav.units import counted
 
 log = logging.getLogger(__name__)
 
@@ -172,7 +173,7 @@ class RelayServer:
     def describe(self) -> str:
         """Return one line for people."""
         count = self.viewers
-        return f"rtsp://{self.host}:{self.port}/SYSTEM/STREAM: {count} viewer{'' if count == 1 else 's'}"
+        return f"rtsp://{self.host}:{self.port}/SYSTEM/STREAM: {counted(count, 'viewer')}"
 
     def source(self, name: str) -> DroneSource | None:
         """Return the source of a drone, by its system id or its name."""

@@ -14,7 +14,8 @@ from typing import Literal
 from anafi_mav import mav_enums
 from anafi_mav.errors import PlanError
 from anafi_mav.plans.formats.waypoints import editor_losses, rows, text_of
-from anafi_mav.plans.plan import GLOBAL, GLOBAL_INT, MISSION, RELATIVE, RELATIVE_INT, Item, Loss, Params, Plan, counted
+from anafi_mav.plans.plan import GLOBAL, GLOBAL_INT, MISSION, RELATIVE, RELATIVE_INT, Item, Loss, Params, Plan
+from anafi_mav.units import counted
 
 Version = Literal[1, 2]
 

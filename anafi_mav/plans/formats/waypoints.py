@@ -25,11 +25,11 @@ from anafi_mav.plans.plan import (
     Params,
     Plan,
     Point,
-    counted,
     shifted,
     with_heading,
     without_zero_heading,
 )
+from anafi_mav.units import counted
 
 HEADER = "QGC WPL 110"
 

@@ -275,7 +275,7 @@ async def test_service_manager_hears_ready_and_log_file_is_json(tmp_path: Path) 
         env = {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "200000"}
         options = ("-v", "--log-file", str(log), "--log-format", "json")
         async with product(tmp_path, fleet(loopback(), loopback()), *options, env=env) as p:
-            assert await asyncio.wait_for(loop.sock_recv(manager, 100), 10.0) == b"READY=1\nSTATUS=1 drones"
+            assert await asyncio.wait_for(loop.sock_recv(manager, 100), 10.0) == b"READY=1\nSTATUS=1 drone"
             assert await asyncio.wait_for(loop.sock_recv(manager, 100), 10.0) == b"WATCHDOG=1"
             p.process.send_signal(signal.SIGTERM)
             assert await p.end(15.0) == 0

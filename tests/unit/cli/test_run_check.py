@@ -36,7 +36,7 @@ def test_check_of_a_good_configuration_leaves_nothing_open(tmp_path: Path, capsy
         status, out = check(path, capsys)
         assert status == 0
         assert "versions: ok: anafi-mav " in out
-        assert "configuration: ok: 1 drones, 1 endpoints" in out
+        assert "configuration: ok: 1 drone, 1 endpoint\n" in out
         assert "state: ok: " in out
         assert "open: ok: endpoint tcpin://127.0.0.1:" in out
         assert "WRONG" not in out
