@@ -47,6 +47,7 @@ from support.setpoints import VELOCITY_ONLY, local, streaming
 from support.world import ARMED, HOME, World, world
 
 from anafi_mav.arsdk.messages import ardrone3, common, piloting_style, rth
+from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
 from anafi_mav.arsdk.messages.rth import StateReason
 from anafi_mav.drone.automatic.flight_plan import FlightPlan
 from anafi_mav.mavlink import dialect as newer
@@ -340,6 +341,25 @@ async def test_mission_that_replaces_one_that_waits_for_arming_says_so() -> None
         mark = w.client.mark()
         await put(w, [takeoff(6.0), way(9.0, 0.0, 6.0)])
         await said(w, "Mission not started", mark)
+
+
+@pytest.mark.parametrize("is_faulty", [True, False])
+async def test_mission_that_waited_for_arming_is_not_started_unready_or_disarmed(
+    monkeypatch: pytest.MonkeyPatch, is_faulty: bool
+) -> None:
+    """The drone takes its time for the file: it becomes unfit to take off meanwhile, or the armed state expires."""
+    has_begun = take_time(monkeypatch, 5.0 if is_faulty else 14.0)
+    async with world(speed=1.0, web=True) as w:
+        await put(w, CORNERS)
+        assert (await w.client.command(SET_MODE, *PX4_MISSION)).result == ACCEPTED
+        mark = w.client.mark()
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        await has_begun.wait()
+        if is_faulty:
+            w.drone.faults.refuse_take_off = frozenset({TakeoffChecklistType.VCAM})
+        reason = "PreArm: vcam" if is_faulty else "Mission refused: armed state has expired"
+        await w.client.wait("STATUSTEXT", lambda m: m.text == reason, since=mark, timeout=20.0)
+        assert w.commands("common.Mavlink.Start") == []
 
 
 @pytest.mark.parametrize("late", [{PLAYING: 0.5}, {PLAYING: 0.5, EXECUTED: 0.5}, {PLAYING: 0.5, EXECUTED: 0.8}])

@@ -487,9 +487,11 @@ class MissionFlight(PlainTask):
         def condition() -> None:
             self._require_freedom(work.attempt, ends_return=ends_return)
             if not self._vehicle.armed:
-                raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
+                raise Refused(texts.MISSION, texts.ARMING_EXPIRED)
 
         async with contextlib.nullcontext() if by is None else control.acquire(self, by=by, condition=condition):
+            if by is None:  # `acquire` has checked it for a client
+                condition()
             await self._stop(work.prepared, condition)
             if not (effects := self.machine.granted(work.attempt)):
                 raise Refused(texts.MISSION, texts.MISSION_DISPLACED)
