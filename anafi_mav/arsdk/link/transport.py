@@ -371,7 +371,8 @@ class Transport:
         `rank` is of an acknowledged message. In version 1 each takes a round trip of its own, and a stop must not wait
         behind a list of settings that a client loads.
         `unheard` (s): it is sent to a silent peer, too, which may hear us; the caller cancels it. In version 1, where a
-        frame holds one command, the next one has its turn after this time at most, and without an acknowledgement.
+        frame holds one command, the next one has its turn after this time at most, and without an acknowledgement; the
+        last one is sent on.
         Raises `LocalProtocolError` when it cannot be encoded or is too long for its queue. On a link that is down
         the message is counted and forgotten.
         """
@@ -544,8 +545,11 @@ class Transport:
         return encode_frame(self.version, _WITHACK, queue.id, queue.seq, payload)
 
     def _give_up(self, queue: _AckQueue) -> None:
-        """Version 1, controller: a command is sent so often, then the next one has its turn."""
-        if queue.sendings >= queue.flight[0].source.sendings:
+        """Version 1, controller: a command is sent so often, then the next one has its turn.
+
+        The last one to a silent peer is sent until the caller cancels it.
+        """
+        if queue.sendings >= queue.flight[0].source.sendings and (queue.waiting or not self._silent):
             self.counters["undelivered"] += 1
             self._pending.append(Undelivered(queue.flight[0].source.token, "no acknowledgement"))
             queue.land()

@@ -670,6 +670,27 @@ def test_commands_to_a_silent_peer_are_all_sent_in_their_time(version: int) -> N
         assert sum(wire.encode(message) in payload for payload in sent) > MAX_RETRIES_V1
 
 
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("count", [1, 2])
+def test_last_command_to_a_silent_peer_is_sent_until_it_is_cancelled(version: int, count: int) -> None:
+    """It may hear us again at any moment."""
+    transport = Transport(Role.CONTROLLER, version, 0.0, ping_after=9.0, silence_limit=2.5, gives_up=False, fades=True)
+    assert Silent("nothing received for 2.5 s") in transport.expire(2.5)
+    for _ in range(count - 1):
+        transport.send(ardrone3.CancelMoveTo(), 2.5, unheard=4.0 / count)
+    stop = ardrone3.StopPilotedPOI()
+    token = transport.send(stop, 2.5, unheard=4.0 / count)
+    sent_at: list[float] = []
+    for step in range(160):
+        now = 2.5 + 0.05 * step
+        if step == 80:
+            transport.cancel(token)
+        transport.expire(now)
+        datagrams = frames(transport, transport.outgoing(now))
+        sent_at += [now for frame in datagrams if wire.encode(stop) in frame.payload]
+    assert 6.3 < sent_at[-1] < 6.5
+
+
 # What another process sends for us.
 
 
