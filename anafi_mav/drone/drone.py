@@ -207,6 +207,11 @@ class Drone:
         """The elements that keep events of values; None for those with an event that a callback is called with."""
         self._on_values: tuple[OnValues, ...] = ()
         self._set_subscriptions(())
+        self.on_event: Callable[[Message], None] | None = None
+        """Called with each event as the drone sends it; None: nothing is.
+
+        What `subscribe` calls also receives the end of a plan, for example, that the drone does not report.
+        """
 
         self._session: ControllerSession | None = None
         self._fading: ControllerSession | None = None
@@ -921,6 +926,8 @@ class Drone:
                     if lost.done():
                         return
                 unpacked = message
+            if self.on_event is not None:
+                self._show(unpacked, self.on_event)
             try:
                 self._handle(unpacked, now)
             except Exception as error:
@@ -930,9 +937,17 @@ class Drone:
         if together:
             self._report(together, now)
 
+    def _show(self, message: Message | UnknownMessage, on_event: Callable[[Message], None]) -> None:
+        if type(message) is UnknownMessage:
+            return
+        try:
+            on_event(message)
+        except Exception:  # what listens must not keep an event from the states
+            log.exception("%s: %s not recorded", self.name, message.NAME)
+
     def _holders_of(self, layout: ValueLayout) -> Sequence[Element[Any]] | None:
         """Return the elements that keep events of values; None if one of them is wanted."""
-        if message_log.isEnabledFor(logging.DEBUG):
+        if self.on_event is not None or message_log.isEnabledFor(logging.DEBUG):
             return None
         waiting = self._commander.waiting
         if waiting and not waiting.keys().isdisjoint(layout.kinds):

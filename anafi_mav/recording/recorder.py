@@ -51,7 +51,7 @@ class Recorder:
     def add(self, drone: Drone) -> None:
         """Record the messages of a drone."""
         name = drone.name
-        drone.subscribe(lambda message, now: self._trace(name, EVENT, message))
+        drone.on_event = lambda message: self._trace(name, EVENT, message)
         drone.on_command = lambda message: self._trace(name, COMMAND, message)
 
     async def close(self) -> None:

@@ -11,8 +11,11 @@ import pytest
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.lines import UdpClient
-from support.world import HOLD, LAND, world
+from support.missions import ACTIVE, put, start, state, takeoff, way
+from support.missions import LAND as LAND_ITEM
+from support.world import ARMED, HOLD, LAND, world
 
+from anafi_mav.arsdk.messages import common
 from anafi_mav.cli import main, replay
 from anafi_mav.cli.replay import files_of, read_tlogs, read_traces
 from anafi_mav.config import RecordingConfig
@@ -65,6 +68,21 @@ async def test_recording_has_both_wires_on_one_clock_and_no_key(tmp_path: Path) 
     assert landing.t <= ack + 1e-5
     times = [entry.time for entry in read_tlogs(tlogs)]
     assert times == sorted(times)
+
+
+async def test_recording_has_the_events_that_the_drone_has_sent_alone(tmp_path: Path) -> None:
+    """It shows whether a real drone reports the end of its plan: the gateway finds that out without a report, too."""
+    playing = common.MavlinkFilePlayingStateChanged.NAME
+    async with world(web=True, recording=RecordingConfig(folder=str(tmp_path))) as w:
+        await put(w, [takeoff(5.0), way(8.0, 0.0, 5.0), LAND_ITEM])
+        await start(w)
+        await state(w, ACTIVE, seq=1)
+        w.drone.faults.unreported = frozenset({playing})
+        await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, timeout=30.0)
+        (line,) = (line for line in w.gateway.lines() if line.startswith("recording "))
+    _, traces = files_of(Path(line.removeprefix("recording ")))
+    states = [entry.args["state"] for entry in read_traces(traces) if entry.name == playing]
+    assert states[-1] == common.PlayingState.PLAYING
 
 
 async def test_replay_shows_a_station_the_vehicle_alone(tmp_path: Path) -> None:
