@@ -50,6 +50,7 @@ ROI, YAW, ALTITUDE = (
     dialect.MAV_CMD_CONDITION_YAW,
     dialect.MAV_CMD_DO_CHANGE_ALTITUDE,
 )
+SET_HOME = dialect.MAV_CMD_DO_SET_HOME
 BRAKE = (1, 17)
 FORCED = 21196
 FLYING, MOVED_BY, MOVED_TO, PLAYING = (
@@ -337,6 +338,19 @@ async def test_return_is_flown_although_the_end_of_the_one_before_was_never_repo
         began = now()
         assert (await w.client.command(RTL)).result == ACCEPTED
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] < 10.0, 60.0, since=began)
+
+
+async def test_home_is_not_refused_by_a_report_of_the_one_before() -> None:
+    """The drone has sent it before it received the new place, and acknowledges that first."""
+    async with world(speed=1.0) as w:
+        await w.take_off(5.0)
+        w.drone.faults.late = {rth.CustomLocation.NAME: 0.3}
+        first, second = geo.destination(*HOME[:2], 20.0, 0.0), geo.destination(*HOME[:2], 40.0, 0.0)
+        assert (await w.client.command(SET_HOME, 0, frame=6, x=first[0], y=first[1], z=0.0)).result == ACCEPTED
+        w.drone.inject(rth.CustomLocation(*first, 0.0))
+        mark = w.client.mark()
+        assert (await w.client.command(SET_HOME, 0, frame=6, x=second[0], y=second[1], z=0.0)).result == ACCEPTED
+        await w.client.wait("HOME_POSITION", lambda m: abs(m.latitude - round(second[0] * 1e7)) <= 40, since=mark)
 
 
 async def test_landing_that_is_reported_late_is_not_ended_by_an_older_stream() -> None:

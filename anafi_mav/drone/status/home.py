@@ -29,7 +29,7 @@ from anafi_mav.arsdk.messages.rth import (
 from anafi_mav.drone.element import Position, Range, Reducer, members, position, setting
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.settings import Commanding
-from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
+from anafi_mav.errors import CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
 
 _SAME_PLACE_DEG = 1e-7
 """About a centimetre: an echo that went through single precision is further off than that."""
@@ -239,8 +239,9 @@ class Home(Commanding[HomeState]):
         """Choose a place (deg, deg, m above take-off) for homes of type custom.
 
         The drone flies there only while `preferred_type` is CUSTOM. One that does not accept the place (it is too far
-        away, or the drone does not know where it is itself) reports its old one or nothing: `CommandRejected`, at once
-        or after `QUIET`. `CommandTimeout` when the command did not arrive.
+        away, or the drone does not know where it is itself) reports its old one or nothing: `CommandRejected`, `QUIET`
+        after it has received the command, for a report of the old place may be from before that. `CommandTimeout` when
+        the command did not arrive.
         """
         wanted = position(latitude, longitude, altitude)
         if wanted is None:
@@ -249,22 +250,19 @@ class Home(Commanding[HomeState]):
         if self.state.types is not None and RthHomeType.CUSTOM not in self.state.types:
             raise NotSupported("home of type custom")
 
-        def judge(message: rth.CustomLocation) -> Position | AnafiMavError | None:
+        def judge(message: rth.CustomLocation) -> Position | None:
             same = math.isclose(message.latitude, latitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG) and math.isclose(
                 message.longitude, longitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG
             )
-            if same:
-                return position(message.latitude, message.longitude, message.altitude)
-            return refused if delivery.done() else None  # else it is about an earlier command
+            return position(message.latitude, message.longitude, message.altitude) if same else None
 
-        refused = CommandRejected("Home refused: the drone does not accept the place")
         command = rth.SetCustomLocation(latitude, longitude, altitude)
         async with self._setting_lock(rth.CustomLocation):
             answer = self._commander.expect((rth.CustomLocation,), judge)
             delivery = self._commander.deliver(command)
             try:
                 if not await answer.wait_or_quiet(delivery, command.NAME, timeout):
-                    raise refused
+                    raise CommandRejected("Home refused: the drone does not accept the place")
                 return answer.future.result()
             finally:
                 answer.close()
