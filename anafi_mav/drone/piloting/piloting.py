@@ -457,8 +457,8 @@ class Piloting(PilotingSettings):
             owed = {kind: end for kind, end in ends.items() if not end.future.done()}
             if owed:
                 self._home.request_states()
-                last = next(iter(owed.values())).future  # all of them expire with this one
-                await asyncio.wait({last, states.future}, return_when=asyncio.FIRST_COMPLETED)
+            while not states.future.done() and (left := {end.future for end in owed.values() if not end.future.done()}):
+                await asyncio.wait({states.future, *left}, return_when=asyncio.FIRST_COMPLETED)
             for kind, end in owed.items():
                 if not end.future.done() and await self._hovers_without(end) and not named[kind].future.done():
                     self.end_unreported(kind)

@@ -1058,6 +1058,23 @@ async def test_stop_without_confirmation_raises(drone: Drone, device: ScriptedDe
         await drone.piloting.stop(timeout=SHORT)
 
 
+async def test_stop_waits_for_all_states_although_one_end_is_reported_before(
+    drone: Drone, device: ScriptedDevice
+) -> None:
+    """Those that follow name the panorama as under way: it has not ended, however long the drone hovers."""
+    panorama = animation.State(animation.Type.HORIZONTAL_PANORAMA, 10)
+    await flying(drone, device)
+    await reported(drone, device, following(follow_me.Mode.LOOK_AT), panorama)
+    device.script[common.AllStates] = lambda _: [following(follow_me.Mode.NONE)]
+    asked = len(device.got(common.AllStates))
+    stopped = asyncio.ensure_future(drone.piloting.stop())
+    await device.until(common.AllStates, asked + 1)
+    await watched(1.5)  # of a slow link
+    device.say(panorama, common.AllStatesChanged())
+    with pytest.raises(CommandTimeout):
+        await stopped
+
+
 # -- settings
 
 
