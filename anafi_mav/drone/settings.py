@@ -14,6 +14,8 @@ from collections import Counter
 from collections.abc import Callable, Hashable
 from typing import Any, TypeAlias, TypeVar
 
+import msgspec
+
 from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.drone.element import Element, StateT
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation
@@ -43,6 +45,20 @@ def number(value: float, what: str) -> float:
     if not math.isfinite(value):
         raise LocalProtocolError(f"{what}: {value} is not a number")
     return value
+
+
+def is_same(one: object, other: object) -> bool:
+    """Return True for equal values.
+
+    Numbers in them are compared to three digits: the drone may round.
+    """
+    if isinstance(one, msgspec.Struct) and isinstance(other, msgspec.Struct):
+        one, other = msgspec.structs.astuple(one), msgspec.structs.astuple(other)
+    if isinstance(one, tuple) and isinstance(other, tuple):
+        return len(one) == len(other) and all(map(is_same, one, other))
+    if isinstance(one, float) and isinstance(other, float):
+        return math.isclose(one, other, rel_tol=1e-3)
+    return one == other
 
 
 class Commanding(Element[StateT]):
@@ -83,7 +99,7 @@ class Commanding(Element[StateT]):
                 command,
                 answer,
                 judge,
-                lambda result: wanted in (None, result),
+                lambda result: wanted is None or is_same(wanted, result),
                 timeout,
                 stops=stops,
                 is_setting=not stops,
@@ -166,6 +182,6 @@ class Commanding(Element[StateT]):
                 command,
                 answer,
                 lambda message: float(message.current) if math.isfinite(message.current) else None,
-                lambda result: math.isclose(result, value, rel_tol=1e-3),
+                lambda result: is_same(result, value),
                 is_setting=True,
             )

@@ -156,5 +156,8 @@ class FollowMe(Commanding[FollowMeState]):
         """Choose the target: the controller, or what the picture's `target_image_detection` reports."""
         self._require(self.state.target_is_controller, "follow me")
         return await self._change(
-            follow_me.SetTargetIsController(int(on)), follow_me.TargetIsController, lambda m: bool(m.state)
+            follow_me.SetTargetIsController(int(on)),
+            follow_me.TargetIsController,
+            lambda m: bool(m.state),
+            wanted=on,
         )

@@ -27,6 +27,8 @@ from anafi_mav.drone.payload.camera_enums import (
     Streaming,
     Style,
     WhiteBalance,
+    ev_of,
+    ev_step,
 )
 from anafi_mav.drone.payload.camera_modern import ModernCamera
 from anafi_mav.drone.payload.camera_state import (
@@ -38,8 +40,9 @@ from anafi_mav.drone.payload.camera_state import (
     ExposureSettings,
     PhotoSettings,
     RecordingSettings,
+    StyleSettings,
 )
-from anafi_mav.drone.settings import Commanding, Question, number
+from anafi_mav.drone.settings import Commanding, Question, is_same, number
 from anafi_mav.errors import (
     AnafiMavError,
     CommandRejected,
@@ -56,6 +59,8 @@ MAIN = 0
 STATE_TIMEOUT = 2.0
 """s after the report that a photo or recording has begun or ended in which the camera's state has it, too. Parrot
 promises no order between the two events."""
+TEMPERATURE_STEP = 250.0
+"""K between two temperatures of the white balance."""
 SAVE_TIMEOUT = 30.0
 """s between two signs of life of a photo: a burst or a full resolution DNG takes a while to be stored."""
 ZOOM_TIMEOUT = 60.0
@@ -370,7 +375,13 @@ class Camera(Commanding[CamerasState]):
     async def set_zoom_speed(self, speed: float, id: int = MAIN) -> float | None:
         """Set the highest zoom speed, tan(deg)/s."""
         number(speed, "zoom speed")
-        return (await self._ask(id, "zoom_speed", lambda s, now: s.zoom_speed(id, now, speed))).zoom_speed
+        state = await self._ask(
+            id,
+            "zoom_speed",
+            lambda s, now: s.zoom_speed(id, now, speed),
+            lambda state: is_same(state.zoom_speed, float(speed)),
+        )
+        return state.zoom_speed
 
     async def set_zoom_may_degrade(self, allowed: bool, id: int = MAIN) -> bool | None:
         """Allow or forbid a zoom by rate beyond the lossless range."""
@@ -386,7 +397,10 @@ class Camera(Commanding[CamerasState]):
 
     async def set_ev(self, ev: float, id: int = MAIN) -> float | None:
         """Set the exposure compensation, EV, to the nearest third."""
-        return (await self._ask(id, "ev", lambda s, now: s.ev(id, now, ev))).ev
+        state = await self._ask(
+            id, "ev", lambda s, now: s.ev(id, now, ev), lambda state: state.ev == ev_of(ev_step(ev))
+        )
+        return state.ev
 
     async def set_exposure(self, wish: ExposureSettings, id: int = MAIN) -> ExposureSettings | None:
         """Change the exposure; a field that is None stays. Shutter and ISO take the nearest step."""
@@ -416,11 +430,17 @@ class Camera(Commanding[CamerasState]):
         self, mode: WhiteBalance, temperature_k: float | None = None, id: int = MAIN
     ) -> tuple[WhiteBalance | None, float | None]:
         """Set the white balance; `temperature_k` (to the nearest 250 K) is for CUSTOM. Return both."""
+
+        def is_done(state: CameraState) -> bool:
+            if state.white_balance is not mode or temperature_k is None or state.temperature_k is None:
+                return state.white_balance is mode
+            return abs(state.temperature_k - temperature_k) <= TEMPERATURE_STEP / 2
+
         state = await self._ask(
             id,
             "white_balance",
             lambda s, now: s.white_balance(id, now, mode, temperature_k),
-            lambda state: state.white_balance is mode,
+            is_done,
         )
         return state.white_balance, state.temperature_k
 
@@ -455,7 +475,17 @@ class Camera(Commanding[CamerasState]):
     ) -> CameraState:
         """Set the levels of the present style; their ranges are in `StyleSettings`."""
         number(saturation + contrast + sharpness, "style")
-        return await self._ask(id, "style", lambda s, now: s.style_params(id, now, saturation, contrast, sharpness))
+
+        def is_done(state: CameraState) -> bool:
+            style = state.style or StyleSettings()
+            levels = [
+                None if one is None else one.current for one in (style.saturation, style.contrast, style.sharpness)
+            ]
+            return is_same(tuple(levels), (float(saturation), float(contrast), float(sharpness)))
+
+        return await self._ask(
+            id, "style", lambda s, now: s.style_params(id, now, saturation, contrast, sharpness), is_done
+        )
 
     async def set_streaming(self, mode: Streaming, id: int = MAIN) -> Streaming | None:
         """Choose between low latency and reliability of the live video."""
@@ -467,14 +497,20 @@ class Camera(Commanding[CamerasState]):
     async def set_alignment(self, yaw: float, pitch: float, roll: float, id: int = MAIN) -> CameraState:
         """Set the corrections against the other camera, deg."""
         number(yaw + pitch + roll, "alignment")
-        return await self._ask(id, "alignment", lambda s, now: s.alignment(id, now, yaw, pitch, roll))
+        wanted = {"yaw": float(yaw), "pitch": float(pitch), "roll": float(roll)}
+        return await self._ask(
+            id,
+            "alignment",
+            lambda s, now: s.alignment(id, now, yaw, pitch, roll),
+            lambda state: all(is_same(one.current, wanted.get(axis)) for axis, one in state.alignment.items()),
+        )
 
     async def set_antiflicker(self, mode: Antiflicker) -> Antiflicker | None:
         """Set the mains frequency that the exposure adapts to; one for all cameras."""
         self._require(self.state.antiflicker, "antiflicker")
         speech, _ = self._known(min(self.state.cameras, default=MAIN))
         command, answer = speech.antiflicker(mode)
-        return await self._change(command, answer, lambda message: self.state.antiflicker)
+        return await self._change(command, answer, lambda message: self.state.antiflicker, wanted=mode)
 
     # -- the connection
 

@@ -363,6 +363,7 @@ class Gimbal(Commanding[Gimbals]):
             gimbal.StartOffsetsUpdate(id) if on else gimbal.StopOffsetsUpdate(id),
             gimbal.Offsets,
             lambda message: message.update_state == gimbal.State.ACTIVE if message.gimbal_id == id else None,
+            wanted=on,
         )
 
     async def set_offsets(

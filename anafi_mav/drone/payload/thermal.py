@@ -113,7 +113,7 @@ class Thermal(Commanding[ThermalState]):
     async def set_mode(self, mode: ThermalMode) -> ThermalMode:
         """Switch the thermal camera on or off, or blend it with the visible picture."""
         self._require(self.state.mode, "thermal camera")
-        return await self._change(thermal.SetMode(mode), thermal.Mode, lambda m: ThermalMode(m.mode))
+        return await self._change(thermal.SetMode(mode), thermal.Mode, lambda m: ThermalMode(m.mode), wanted=mode)
 
     async def set_rendering(self, mode: RenderingMode, blending: float | None = None) -> tuple[RenderingMode, float]:
         """Set the mixture of thermal and visible picture; `blending` None keeps its share.
@@ -126,6 +126,7 @@ class Thermal(Commanding[ThermalState]):
             thermal.SetRendering(mode, share),
             thermal.Rendering,
             lambda m: (RenderingMode(m.mode), float(m.blending_rate)),
+            wanted=(mode, share),
         )
 
     async def set_palette(self, palette: Palette) -> Palette:
@@ -141,7 +142,7 @@ class Thermal(Commanding[ThermalState]):
             palette.spot,
             palette.spot_threshold,
         )
-        return await self._change(command, thermal.PaletteSettings, _palette)
+        return await self._change(command, thermal.PaletteSettings, _palette, wanted=palette)
 
     async def set_colours(self, colours: Sequence[Colour]) -> tuple[Colour, ...]:
         """Set the colours of the palette; return those of the drone."""
@@ -171,7 +172,7 @@ class Thermal(Commanding[ThermalState]):
         """Set the emissivity of the objects, 0 to 1."""
         self._require(self.state.emissivity, "thermal camera")
         command = thermal.SetEmissivity(number(emissivity, "emissivity"))
-        return await self._change(command, thermal.Emissivity, lambda m: float(m.emissivity))
+        return await self._change(command, thermal.Emissivity, lambda m: float(m.emissivity), wanted=emissivity)
 
     async def set_background(self, kelvin: float) -> float:
         """Set the temperature of the background that objects reflect, K."""
@@ -180,20 +181,27 @@ class Thermal(Commanding[ThermalState]):
             thermal.SetBackgroundTemperature(number(kelvin, "temperature")),
             thermal.BackgroundTemperature,
             lambda m: float(m.background_temperature),
+            wanted=kelvin,
         )
 
     async def set_sensitivity(self, sensitivity: Sensitivity) -> Sensitivity:
         """Set the sensitivity: HIGH covers hotter objects, LOW finer differences."""
         self._require(self.state.sensitivity, "thermal camera")
         return await self._change(
-            thermal.SetSensitivity(sensitivity), thermal.Sensitivity, lambda m: Sensitivity(m.current_range)
+            thermal.SetSensitivity(sensitivity),
+            thermal.Sensitivity,
+            lambda m: Sensitivity(m.current_range),
+            wanted=sensitivity,
         )
 
     async def set_shutter(self, trigger: ShutterTrigger) -> ShutterTrigger:
         """Set if the sensor calibrates itself or by `trigger_shutter`."""
         self._require(self.state.shutter, "thermal camera")
         return await self._change(
-            thermal.SetShutterMode(trigger), thermal.ShutterMode, lambda m: ShutterTrigger(m.current_trigger)
+            thermal.SetShutterMode(trigger),
+            thermal.ShutterMode,
+            lambda m: ShutterTrigger(m.current_trigger),
+            wanted=trigger,
         )
 
     def trigger_shutter(self) -> None:

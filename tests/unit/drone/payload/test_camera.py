@@ -490,6 +490,12 @@ async def test_report_of_another_setting_of_an_ai_is_not_the_answer_to_a_change(
     ai.script[new.Configure] = lambda m: [other, new.State(camera_id=3, config=m.config)]
     assert await ai_drone.camera.set_mode(CameraMode.PHOTO, id=3) is CameraMode.PHOTO
     assert await ai_drone.camera.set_hdr(False, id=3) is False
+    assert await ai_drone.camera.set_ev(-1.0, id=3) == -1.0
+    for kelvin in (4000.0, 5000.0):
+        assert await ai_drone.camera.set_white_balance(WhiteBalance.CUSTOM, kelvin, id=3) == (
+            WhiteBalance.CUSTOM,
+            kelvin,
+        )
 
 
 async def test_photo_and_film_of_an_ai(ai: ScriptedDevice, ai_drone: Drone) -> None:

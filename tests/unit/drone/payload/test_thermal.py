@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Any
 
 import pytest
 from support.scripted_device import STATES, ScriptedDevice
 from support.simulated import connected
 
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import common, thermal
 from anafi_mav.arsdk.messages.thermal import (
     PaletteMode,
@@ -17,7 +20,8 @@ from anafi_mav.arsdk.messages.thermal import (
     ThermalMode,
 )
 from anafi_mav.arsdk.messages.thermal import Range as Sensitivity
-from anafi_mav.drone.payload.thermal import MAX_COLOURS, Colour, Palette
+from anafi_mav.drone.payload.thermal import MAX_COLOURS, Colour, Palette, Thermal
+from anafi_mav.drone.settings import KEPT_AFTER
 from anafi_mav.errors import LocalProtocolError, NotSupported
 
 FIRST, LAST, EMPTY = 1, 2, 4
@@ -72,6 +76,47 @@ async def test_in_the_simulator(model: str) -> None:
                 await thermal_camera.set_colours(colours)
         with pytest.raises(LocalProtocolError):
             await thermal_camera.set_emissivity(float("nan"))
+
+
+@pytest.mark.parametrize(
+    ("call", "command", "before", "after"),
+    [
+        (
+            lambda camera: camera.set_mode(ThermalMode.BLENDED),
+            thermal.SetMode,
+            thermal.Mode(ThermalMode.DISABLED),
+            thermal.Mode(ThermalMode.BLENDED),
+        ),
+        (
+            lambda camera: camera.set_emissivity(0.3),
+            thermal.SetEmissivity,
+            thermal.Emissivity(0.9),
+            thermal.Emissivity(0.3),
+        ),
+        (
+            lambda camera: camera.set_rendering(RenderingMode.BLENDED, 0.3),
+            thermal.SetRendering,
+            thermal.Rendering(RenderingMode.VISIBLE, 0.3),
+            thermal.Rendering(RenderingMode.BLENDED, 0.3),
+        ),
+    ],
+)
+async def test_report_of_before_a_thermal_setting_is_not_its_answer(
+    call: Callable[[Thermal], Awaitable[Any]], command: type[Message], before: Message, after: Message
+) -> None:
+    async with ScriptedDevice() as device:
+        reported = [
+            thermal.Mode(ThermalMode.DISABLED),
+            thermal.Emissivity(0.9),
+            thermal.Rendering(RenderingMode.VISIBLE, 0.3),
+        ]
+        device.script[common.AllStates] = lambda _: [*STATES, *reported, common.AllStatesChanged()]
+        device.script[command] = lambda _: [before, after]
+        async with device.connected() as drone:
+            began = asyncio.get_running_loop().time()
+            result = await call(drone.thermal)
+            assert result in (ThermalMode.BLENDED, pytest.approx(0.3), (RenderingMode.BLENDED, pytest.approx(0.3)))
+            assert asyncio.get_running_loop().time() - began < KEPT_AFTER
 
 
 async def test_a_drone_without() -> None:
