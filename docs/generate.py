@@ -42,7 +42,7 @@ Options of the command line replace a list of the file, or of the defaults:
 
 | option | replaces |
 |---|---|
-| `--drone ADDRESS` (repeatable) | `drones`, with ids from 1 in `sysids`; `192.168.42.1%wlan1` names the interface too |
+| `--drone ADDRESS` (repeatable) | `drones`, with system ids 1, 2, … (refused outside of `sysids`); `192.168.42.1%wlan1` names the interface too |
 | `--endpoint URL` (repeatable) | `endpoints` |
 | `--allow-kill` | `allow_kill: true` |
 
