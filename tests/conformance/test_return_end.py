@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support.fault_scenarios import another_controller, deaf, return_by_itself
+from support.fault_scenarios import another_controller, deaf, on_command, return_by_itself
 from support.flavours import both
 from support.mav import NAN, Client
 from support.missions import RTL as RTL_ITEM
@@ -481,3 +481,18 @@ async def test_home_here_during_the_drones_own_return_is_refused(flavour: str) -
         assert "Home refused: drone is returning by itself" in texts(w.client, mark)
         assert w.commands("rth.set_preferred_home_type") == w.commands("rth.set_custom_location") == []
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] < 5.0, 60.0)
+
+
+async def test_new_place_of_a_custom_home_is_accepted_although_the_drones_own_return_begins_then() -> None:
+    """The drone has it already, and will return there: a refusal would be untrue."""
+    async with world(speed=1.0) as w:
+        await away(w, 40.0)
+        w.drone.faults.late = {rth.CustomLocation.NAME: 0.5}
+        assert (await w.client.command(SET_HOME, 0, frame=6, x=HOME[0], y=HOME[1], z=0.0)).result == ACCEPTED
+        begun = on_command(w, rth.SetCustomLocation.NAME, lambda: return_by_itself(w))
+        mark = w.client.mark()
+        assert (await w.client.command(SET_HOME, 1)).result == ACCEPTED, texts(w.client, mark)
+        await begun
+        custom = w.drone.firmware.homing.custom
+        assert custom is not None
+        assert custom.latitude > HOME[0] + 1e-4

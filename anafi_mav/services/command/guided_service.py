@@ -298,7 +298,8 @@ class GuidedService(Service):
             given = await home.set_custom_location(where.latitude, where.longitude, home_height(vehicle, ato))
             before = home.state.preferred_type
             try:
-                require_no_own_return()
+                if before != RthHomeType.CUSTOM:  # else the place is home already
+                    require_no_own_return()
                 await home.set_preferred_type(RthHomeType.CUSTOM)
             except BaseException:
                 # What is not reported to be home must not stay it: a return that replaces this waits until it is not.
