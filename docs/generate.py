@@ -42,9 +42,11 @@ Options of the command line replace a list of the file, or of the defaults:
 
 | option | replaces |
 |---|---|
-| `--drone ADDRESS` (repeatable) | `drones`, with system ids 1, 2, … (refused outside of `sysids`); `192.168.42.1%wlan1` names the interface too |
+| `--drone ADDRESS` (repeatable) | `drones`, with ids 1, 2, …; `192.168.42.1%wlan1` names the interface too |
 | `--endpoint URL` (repeatable) | `endpoints` |
 | `--allow-kill` | `allow_kill: true` |
+
+An id of `--drone` outside of `sysids` is refused.
 
 One gateway uses one `state` folder. Its file `gateway.lock` names the process and its drones. A second gateway with the
 same folder is refused: two gateways on one computer need a folder each. A gateway with an unusable folder runs. It
