@@ -200,6 +200,37 @@ async def test_cancelled_home_leaves_the_old_one(step: str, how: str) -> None:
             assert heard(w, "set_preferred_home_type", "return_to_home")[-1] == "return_to_home"
 
 
+@pytest.mark.parametrize("how", ["a return", "cancel"])
+@pytest.mark.parametrize(
+    ("step", "report"),
+    [
+        (rth.SetCustomLocation.NAME, rth.CustomLocation.NAME),
+        (rth.SetPreferredHomeType.NAME, rth.PreferredHomeType.NAME),
+    ],
+)
+async def test_cancelled_place_of_a_custom_home_leaves_the_old_one(step: str, report: str, how: str) -> None:
+    """It is home as soon as the drone has it: the one before is sent again, before the drone returns."""
+    async with world(speed=1.0) as w:
+        await w.take_off()
+        first, other = HOME[0] + 0.0001, await w.connect(sysid=250)
+        assert (await w.client.command(SET_HOME, 0, frame=6, x=first, y=HOME[1], z=NAN)).result == ACCEPTED
+        w.drone.faults.unreported = frozenset({report})
+        mark, began = w.client.mark(), asyncio.get_running_loop().time()
+        w.client.send_command(SET_HOME, 0, frame=6, x=HOME[0] + 0.0003, y=HOME[1], z=NAN)
+        await w.drone.wait_log(lambda e: e.kind == "command" and e.name == step, 5.0, since=began)
+        w.drone.faults.unreported = frozenset()
+        if how == "cancel":
+            w.client.send(dialect.MAVLink_command_cancel_message(1, 1, SET_HOME))
+        else:
+            assert (await other.command(RTL)).result == ACCEPTED
+        assert await until(w.client, mark, 1) == [(SET_HOME, CANCELLED)]
+        custom = w.drone.firmware.homing.custom
+        assert custom is not None
+        assert custom.latitude == pytest.approx(first, abs=1e-6)
+        if how != "cancel":
+            assert heard(w, "set_custom_location", "return_to_home")[-1] == "return_to_home"
+
+
 # -- the ground station is back
 
 

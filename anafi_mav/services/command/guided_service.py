@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from anafi_mav import texts, units
+from anafi_mav.drone import Position
 from anafi_mav.drone.events import RthHomeType
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
@@ -267,6 +268,12 @@ class GuidedService(Service):
         except AnafiMavError as error:
             self.host.text(Severity.CRITICAL, texts.HOME_TYPE_KEPT.fill(error=error))
 
+    async def _restore_place(self, place: Position) -> None:
+        try:
+            await self.host.drone.home.set_custom_location(place.latitude, place.longitude, place.altitude)
+        except AnafiMavError as error:
+            self.host.text(Severity.CRITICAL, texts.HOME_PLACE_KEPT.fill(error=error))
+
     async def _set_home(self, command: Command) -> None:
         """MAV_CMD_DO_SET_HOME: param1 1 takes the drone's position, else the command's place.
 
@@ -295,15 +302,19 @@ class GuidedService(Service):
         async with vehicle.home_choice:
             # First the place: preferred before it, the custom home of some other day would be home until it is sent.
             require_no_own_return()
-            given = await home.set_custom_location(where.latitude, where.longitude, home_height(vehicle, ato))
-            before = home.state.preferred_type
+            before, old = home.state.preferred_type, home.state.custom_location
+            is_custom = before == RthHomeType.CUSTOM  # then the place is home as soon as the drone has it
+            given: Position | None = None
             try:
-                if before != RthHomeType.CUSTOM:  # else the place is home already
+                given = await home.set_custom_location(where.latitude, where.longitude, home_height(vehicle, ato))
+                if not is_custom:
                     require_no_own_return()
                 await home.set_preferred_type(RthHomeType.CUSTOM)
             except BaseException:
                 # What is not reported to be home must not stay it: a return that replaces this waits until it is not.
-                if before is not None and before != RthHomeType.CUSTOM:
+                if is_custom and old is not None:
+                    await asyncio.wait([self.host.spawn(self._restore_place(old))])
+                elif given is not None and before is not None and not is_custom:
                     await asyncio.wait([self.host.spawn(self._prefer(before))])
                 raise
         vehicle.return_end.set_home(given, texts.SET_HOME)
