@@ -29,8 +29,9 @@ from anafi_mav.drone.payload.media import MediaItem
 from anafi_mav.mavlink import dialect
 from anafi_mav.sim.world.faults import Impairment
 
-DENIED, REJECTED, UNSUPPORTED = (
+DENIED, FAILED, REJECTED, UNSUPPORTED = (
     dialect.MAV_RESULT_DENIED,
+    dialect.MAV_RESULT_FAILED,
     dialect.MAV_RESULT_TEMPORARILY_REJECTED,
     dialect.MAV_RESULT_UNSUPPORTED,
 )
@@ -349,6 +350,24 @@ async def test_conf_087_settings_that_the_end_of_the_link_kept_from_being_restor
         await photo_mode_shown(w.client, before, mark)
         assert sim_value(w.drone, "CAM_PHOTOMODE") == before
         assert not texts(w.client, mark)
+
+
+@pytest.mark.parametrize("is_lost", [True, False])
+async def test_conf_087_photo_mode_of_a_series_that_does_not_begin_is_restored(is_lost: bool) -> None:
+    """The drone sets the mode and does not report it; `is_lost`: because the link is lost."""
+    async with world(speed=1.0) as w:
+        await enter(w.client, PHOTO)
+        before = sim_value(w.drone, "CAM_PHOTOMODE")
+        w.drone.faults.unreported = frozenset({camera_messages.PhotoMode.NAME})
+        answer = asyncio.ensure_future(command(w.client, START_PHOTO, 0, 2, 0))
+        await w.drone.wait_log(lambda e: sim_value(w.drone, "CAM_PHOTOMODE") == TIME_LAPSE, 10.0)
+        session = w.drone.session
+        assert session is not None
+        if is_lost:
+            session.end("restart")
+        assert await answer == FAILED
+        w.drone.faults.unreported = frozenset()
+        await w.drone.wait_log(lambda e: sim_value(w.drone, "CAM_PHOTOMODE") == before, 30.0)
 
 
 async def test_conf_087_series_whose_end_was_lost_with_the_link_is_ended_after_it() -> None:

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from anafi_mav import texts
 from anafi_mav.drone.payload.camera_enums import CameraMode, PhotoMode
 from anafi_mav.drone.payload.camera_state import CameraState, CaptureProgress, CaptureUpdate, PhotoSettings
-from anafi_mav.errors import AnafiMavError, LinkLost
+from anafi_mav.errors import AnafiMavError, CommandTimeout, LinkLost
 from anafi_mav.services.camera.camera_targets import require_free, require_idle, require_storage
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.base.refusal import Refused
@@ -132,7 +132,12 @@ class PhotoControl:
             before = self.camera.photo
             is_set = before is not None and before.mode is mode and interval in (None, before.interval)
             if not is_set:
-                await self._set_series(mode, interval)
+                unbegun = PhotoSeries(self.host.drone.camera.active_id, None, before, self.host.memory.generation)
+                try:
+                    await self._set_series(mode, interval)
+                except (LinkLost, CommandTimeout):  # the drone may have set it
+                    self._restore(unbegun)
+                    raise
             await self._shoot_series(limit, None if is_set else before)
 
     async def follow_distance(self, distance: float) -> None:
