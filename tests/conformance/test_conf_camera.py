@@ -162,6 +162,17 @@ async def test_conf_086_geotag_is_that_of_the_shutter() -> None:
         assert pitch == pytest.approx(scene.pitch, abs=2.0)
 
 
+async def test_conf_086_shutter_of_a_photo_that_is_reported_twice_is_one_picture() -> None:
+    async with world(model="ai", speed=1.0, web=True) as w:
+        await enter(w.client, PHOTO)
+        taking = camera2.Photo(camera_id=0, type=camera2.PhotoEvent.TAKING_PHOTO)
+        repeated = on_command(w, "camera2.Command.StartPhoto", lambda: w.drone.inject(taking))
+        first = await shoot(w.client)
+        await repeated
+        await w.client.wait("HEARTBEAT")
+        assert (await shoot(w.client)).image_index == first.image_index + 1
+
+
 @both
 async def test_conf_087_series_counts_and_ends(flavour: str) -> None:
     async with world(flavour=flavour, web=True) as w:

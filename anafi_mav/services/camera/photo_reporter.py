@@ -17,6 +17,8 @@ from typing import Any
 from msgspec.structs import replace
 
 from anafi_mav import texts, units
+from anafi_mav.drone.events import PlayingState
+from anafi_mav.drone.payload.camera_enums import PhotoMode
 from anafi_mav.drone.payload.camera_state import CaptureProgress, CaptureUpdate
 from anafi_mav.drone.payload.media import MediaItem
 from anafi_mav.drone.payload.media_file import Resource
@@ -128,12 +130,22 @@ class PhotoReporter:
 
     def receive(self, update: CaptureUpdate, now: float) -> None:
         """Handle an event about a photo of the active camera."""
-        shots = self._shots.receive(update, now)
+        shots = self._shots.receive(update, now, 1 if self._is_single(update.camera) else None)
         if update.progress is CaptureProgress.FAILED and shots:
             self.host.text(Severity.WARNING, texts.PHOTO_NOT_STORED.fill(reason=update.reason))
         self._report(shots, update.media, is_last=update.is_last)
         if update.progress is CaptureProgress.ENDED:
             self._name_rest()
+
+    def _is_single(self, camera: int) -> bool:
+        """Return True when a photo of this camera is one picture: the drone may report its shutter twice.
+
+        A panorama, of a plan or by itself, has many pictures in that mode.
+        """
+        drone = self.host.drone
+        photo, playing = drone.camera[camera].photo, drone.flight_plan.state.playing
+        is_panorama = drone.animations.state.is_running or playing is PlayingState.PLAYING
+        return photo is not None and photo.mode is PhotoMode.SINGLE and not is_panorama
 
     def reset(self) -> None:
         """Begin the index again: the storage was formatted."""

@@ -181,8 +181,11 @@ class ShotTracker:
         """Return True when the pictures of this media are all taken."""
         return not self._now.is_open or self.capture_of(media) != self.capture
 
-    def receive(self, update: CaptureUpdate, now: float) -> list[CapturedShot]:
-        """Take an event about a photo; return the pictures that it completes."""
+    def receive(self, update: CaptureUpdate, now: float, most: int | None = None) -> list[CapturedShot]:
+        """Take an event about a photo; return the pictures that it completes.
+
+        `most`: pictures that the capture under way can have, for events without a count; None: not known.
+        """
         match update.progress:
             case CaptureProgress.STARTED:
                 return self._open(update, now)
@@ -190,7 +193,9 @@ class ShotTracker:
                 if not self._now.is_open and self._now.has_taken(update.count):
                     return []  # the same report again; of another photo its media is reported too
                 lost = self._open(update, now)
-                self._now.take(1 if update.count is None else self._now.more(update.count), now)
+                is_repeated = update.count is None and most is not None and self._now.taken >= most
+                more = 1 if update.count is None else self._now.more(update.count)
+                self._now.take(0 if is_repeated else more, now)
                 return lost
             case CaptureProgress.SAVED:
                 return self._save(update, now)

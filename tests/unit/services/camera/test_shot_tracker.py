@@ -36,6 +36,13 @@ def test_single_photo_has_the_time_of_its_shutter() -> None:
     assert feed(tracker, (2.0, STARTED, None), (2.1, TAKEN, 1), (2.5, SAVED, 1)) == [CapturedShot(2, 1, 2.1, True)]
 
 
+def test_shutter_of_a_single_photo_that_is_reported_twice_is_one_picture() -> None:
+    tracker = ShotTracker()
+    for at, progress in ((1.0, STARTED), (1.2, TAKEN), (1.3, TAKEN)):
+        assert tracker.receive(CaptureUpdate(0, progress), at, 1) == []
+    assert tracker.receive(saved("a", is_last=True), 1.6, 1) == [CapturedShot(1, 1, 1.2, True)]
+
+
 def test_burst_with_left_out_reports_spreads_its_times() -> None:
     tracker = ShotTracker()
     shots = feed(tracker, (1.0, STARTED, None), (1.2, TAKEN, 2), (2.0, TAKEN, 4), (2.3, SAVED, 4))
