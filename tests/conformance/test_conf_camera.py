@@ -173,6 +173,31 @@ async def test_conf_086_shutter_of_a_photo_that_is_reported_twice_is_one_picture
         assert (await shoot(w.client)).image_index == first.image_index + 1
 
 
+async def test_conf_086_photos_that_are_taken_before_the_first_is_stored_have_their_own_files() -> None:
+    result, progress = camera_messages.PhotoResult, camera_messages.PhotoProgress
+    shown = "CAMERA_IMAGE_CAPTURED"
+    async with world(speed=1.0, web=True) as w:
+        await enter(w.client, PHOTO)
+        for _ in range(2):
+            assert await command(w.client, START_PHOTO, 0, 0, 1) == ACCEPTED
+            assert w.drone.firmware.payload.cameras.busy
+            w.drone.faults.unreported = frozenset()
+            w.drone.inject(progress(0, result.PHOTO_TAKEN, 1, ""))
+            w.drone.faults.unreported = frozenset({progress.NAME})
+            await w.drone.wait_log(lambda e: not w.drone.firmware.payload.cameras.busy, 10.0)
+        w.drone.faults.unreported = frozenset()
+        stored = [media.id for media in photos(w)]
+        for id in stored:
+            w.drone.inject(progress(0, result.PHOTO_SAVED, 1, id))
+        await w.client.wait(shown, lambda image: image.image_index == 1, since=0)
+        mark = w.client.mark()
+        assert await command(w.client, dialect.MAV_CMD_REQUEST_MESSAGE, IMAGE, -1) == ACCEPTED
+        await w.client.wait(shown, lambda image: image.image_index == 1, since=mark)
+        images = sorted((image for _, image in w.client.since(mark, shown)), key=lambda image: image.time_boot_ms)
+        names = [image.file_url.rpartition("/")[2] for image in images]
+        assert names == [media.resources[0].id for media in photos(w)]
+
+
 @both
 async def test_conf_087_series_counts_and_ends(flavour: str) -> None:
     async with world(flavour=flavour, web=True) as w:

@@ -114,8 +114,8 @@ class CaptureService(Service):
         update = Camera.photo_update(message)
         if update is None or not self._is_of_photo(update):
             return
-        self._reporter.receive(update, now)
-        self._photos.receive(update, self._reporter.taken, is_present=self._reporter.is_present(update.media))
+        is_present = self._reporter.receive(update, now)
+        self._photos.receive(update, self._reporter.taken, is_present=is_present)
         self._send_changed()
 
     def _is_of_photo(self, update: CaptureUpdate) -> bool:

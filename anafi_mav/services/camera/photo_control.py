@@ -86,7 +86,7 @@ class PhotoControl:
     def receive(self, update: CaptureUpdate, taken: int, *, is_present: bool) -> None:
         """Handle an event about a photo; `taken`: pictures of the series so far.
 
-        `is_present`: the media of the event is that of the photo or series under way, or of the last one.
+        `is_present`: media or failure of the event are those of the photo or series under way, or of the last one.
         """
         series = self._series
         if series is None or update.is_refused:
@@ -99,7 +99,7 @@ class PhotoControl:
             series.ending = self.host.spawn(self._end_series(series))
         is_saved = update.progress is CaptureProgress.SAVED and update.is_last and is_present
         ended = not is_own or is_saved or update.progress is CaptureProgress.ENDED
-        if (ended and series.has_begun) or (is_own and update.progress is CaptureProgress.FAILED):
+        if (ended and series.has_begun) or (is_own and is_present and update.progress is CaptureProgress.FAILED):
             self._series = None
             self._restore(series)
 

@@ -88,10 +88,6 @@ class PhotoReporter:
         """Camera of the photo under way, or whose pictures are not all reported; None: none."""
         return self._shots.camera
 
-    def is_present(self, media: str) -> bool:
-        """Return True for the media of the photo under way, or of the last one; "": not reported."""
-        return not media or self._shots.capture_of(media) == self._shots.capture
-
     @property
     def is_saving(self) -> bool:
         """True while a picture is taken that is not reported yet."""
@@ -128,14 +124,22 @@ class PhotoReporter:
         """Return the handler of the values that change the camera's pose."""
         return {self._samples.add: ValueInterest(EventSamples.KINDS)}
 
-    def receive(self, update: CaptureUpdate, now: float) -> None:
-        """Handle an event about a photo of the active camera."""
+    def receive(self, update: CaptureUpdate, now: float) -> bool:
+        """Handle an event about a photo of the active camera.
+
+        Return False for the failure, or the media, of a photo before the one under way or the last one.
+        """
+        is_earlier = update.progress is CaptureProgress.FAILED and self._shots.awaits_capture_before
         shots = self._shots.receive(update, now, 1 if self._is_single(update.camera) else None)
         if update.progress is CaptureProgress.FAILED and shots:
             self.host.text(Severity.WARNING, texts.PHOTO_NOT_STORED.fill(reason=update.reason))
-        self._report(shots, update.media, is_last=update.is_last)
+        stored_as = self._shots.media_of(shots[-1].capture) if shots and update.media else update.media
+        if stored_as != update.media:  # that of the last photo had been taken for its own
+            self._name_later([], update.media, is_last=update.is_last)
+        self._report(shots, stored_as, is_last=update.is_last)
         if update.progress is CaptureProgress.ENDED:
             self._name_rest()
+        return not is_earlier and (not update.media or self._shots.capture_of(update.media) == self._shots.capture)
 
     def _is_single(self, camera: int) -> bool:
         """Return True when a photo of this camera is one picture: the drone may report its shutter twice.
@@ -271,6 +275,7 @@ class PhotoReporter:
     def _name(self, item: MediaItem, capture: int, *, is_last: bool) -> list[CapturedImage]:
         """Fill in file and place of the pictures of a media; return pictures that were not reported."""
         files = named((file.resource_id, file) for file in item.resources)
+        capture = self._shots.capture_of(item.media_id) or capture  # it may have been taken for that of the next photo
         known = self._log.of_capture(capture)
         added: list[CapturedImage] = []
         if is_last and known:
@@ -280,8 +285,8 @@ class PhotoReporter:
         if added:
             self._remember()
         for image in (*known, *added):
-            if image.is_saved and not image.url and 0 < image.number <= len(files):
-                file = files[image.number - 1]
+            file = files[image.number - 1] if 0 < image.number <= len(files) else None
+            if image.is_saved and file is not None and image.url != file_url(file):
                 changes: dict[str, Any] = {"url": file_url(file)}
                 place = file.gps or item.gps
                 if place is not None and abs(place.latitude) <= 90.0 and abs(place.longitude) <= 180.0:

@@ -177,6 +177,15 @@ class ShotTracker:
         """Return the number of the capture that is stored as this media; 0: not known."""
         return self._captures.get(media, 0)
 
+    def media_of(self, capture: int) -> str:
+        """Return the media that a capture is stored as; empty until it is reported."""
+        return next((media for media, number in self._captures.items() if number == capture), "")
+
+    @property
+    def awaits_capture_before(self) -> bool:
+        """True while pictures of the capture before are not reported: they are stored, or fail, first."""
+        return bool(self._before.shots)
+
     def is_over(self, media: str) -> bool:
         """Return True when the pictures of this media are all taken."""
         return not self._now.is_open or self.capture_of(media) != self.capture
@@ -257,7 +266,10 @@ class ShotTracker:
 
     def _save(self, update: CaptureUpdate, now: float) -> list[CapturedShot]:
         if self._is_of_capture_before(update.media):
-            self._name(self._before, update.media)
+            if not self._before.media and self._now.media and self._before.taken == self._now.taken:
+                self._exchange(update.media)
+            else:
+                self._name(self._before, update.media)
             self._before.ended = None
             return self._before.report_all(is_saved=True)
         if self.capture_of(update.media) not in (0, self.capture):
@@ -309,8 +321,17 @@ class ShotTracker:
         if len(self._captures) > REPEATED:
             del self._captures[next(iter(self._captures))]
 
+    def _exchange(self, media: str) -> None:
+        """Note this media as that of the last capture, and the media of that as the one of the capture before.
+
+        Both were taken before the first was stored, and it was taken for the last. A drone stores them in sequence.
+        """
+        first = self._now.media
+        self._name(self._now, media)
+        self._name(self._before, first)
+
     def _fail(self, now: float) -> list[CapturedShot]:
-        capture = self._now
+        capture = self._before if self.awaits_capture_before else self._now
         if not capture.is_open and not capture.shots:
             return []  # a photo that never began
         if not capture.taken:

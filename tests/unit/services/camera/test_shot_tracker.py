@@ -181,6 +181,18 @@ def test_photos_stored_after_both_were_taken_are_two_pictures() -> None:
     shots = [*tracker.receive(saved("a", 1), 1.7), *tracker.receive(saved("b", 1), 1.9)]
     assert sorted(shot.at for shot in shots) == [1.2, 1.6]
     assert all(shot.is_saved for shot in shots)
+    assert {tracker.media_of(shot.capture): shot.at for shot in shots} == {"a": 1.2, "b": 1.6}
+
+
+def test_failure_of_a_photo_that_is_reported_after_the_next_one_has_begun_is_its_own() -> None:
+    tracker = ShotTracker()
+    feed(tracker, (1.0, STARTED, None), (1.2, TAKEN, 1), (1.3, ENDED, None), (1.4, STARTED, None))
+    assert tracker.awaits_capture_before
+    assert feed(tracker, (1.5, FAILED, None)) == [CapturedShot(1, 1, 1.2, False)]
+    assert not tracker.awaits_capture_before
+    feed(tracker, (1.6, TAKEN, 1))
+    assert tracker.receive(saved("b", 1), 1.9) == [CapturedShot(2, 1, 1.6, True)]
+    assert tracker.expire(2.0 + LOST, is_series=False) == []
 
 
 def test_last_picture_of_a_series_is_stored_after_the_next_photo_has_begun() -> None:
