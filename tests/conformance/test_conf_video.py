@@ -139,6 +139,16 @@ async def test_conf_091_each_uri_opens_once_its_stream_is_shown(model: str) -> N
             assert rendered == [RenderingMode.THERMAL, RenderingMode.BLENDED]
 
 
+async def test_conf_137_stream_of_a_camera_that_does_not_exist_is_denied() -> None:
+    async with world(model="thermal") as w:
+        start, stop = stock.MAV_CMD_VIDEO_START_STREAMING, stock.MAV_CMD_VIDEO_STOP_STREAMING
+        for camera, result in ((2, DENIED), (101, DENIED), (100, ACCEPTED), (NAN, ACCEPTED)):
+            for command in (start, stop):
+                assert (await w.client.command(command, 2, camera, target=TARGET)).result == result
+            shown = [one.stream_id for one in await informed(w.client) if one.flags & RUNNING]
+            assert shown == [2 if result == ACCEPTED else 1]
+
+
 async def test_conf_137_thermal_stream_follows_the_thermal_camera() -> None:
     async with world(model="thermal", speed=1.0) as w:
         visible, thermal, _ = await informed(w.client)

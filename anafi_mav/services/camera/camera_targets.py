@@ -1,20 +1,14 @@
-"""Checks that the camera's commands have in common: camera, owner, storage."""
+"""Checks that the camera's commands have in common: owner, storage."""
 
 from __future__ import annotations
-
-import math
 
 from anafi_mav import texts
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import FsState, PhyState
-from anafi_mav.mavlink import dialect
 from anafi_mav.services.flavours import Flavour
 from anafi_mav.texts import OperatorText, Reason
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.vehicle import Vehicle
-
-OURS = (0.0, 1.0, float(dialect.MAV_COMP_ID_CAMERA))
-"""Target camera ids that mean the drone's camera: all cameras, the autopilot's first, this component."""
 
 PROBLEMS: dict[PhyState, Reason] = {
     PhyState.UNDETECTED: texts.NO_STORAGE,
@@ -36,12 +30,6 @@ PASSING = (texts.STORAGE_FORMATTING, texts.STORAGE_CHECKING)
 def is_at_autopilot(flavour: Flavour) -> bool:
     """Return True for flavours whose clients address camera commands to component 1."""
     return flavour.camera_at_autopilot
-
-
-def require_camera(what: OperatorText, id: float) -> None:
-    """Refuse a command for a camera that does not exist."""
-    if not math.isnan(id) and id not in OURS:
-        raise Refused(what, texts.NO_SUCH_CAMERA.fill(number=f"{id:g}"), lasting=True)
 
 
 def require_free(vehicle: Vehicle, what: OperatorText) -> None:

@@ -24,7 +24,6 @@ from anafi_mav.services.camera.camera_messages import MEBIBYTE, stepped_zoom, zo
 from anafi_mav.services.camera.camera_targets import (
     is_at_autopilot,
     media_storage,
-    require_camera,
     require_free,
     require_storage,
 )
@@ -33,6 +32,7 @@ from anafi_mav.services.camera.photo_reporter import PhotoReporter
 from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect
 from anafi_mav.services.service import LOOK_EVERY, Host, Request, Service
 from anafi_mav.services.stream import MessageStream, Times
+from anafi_mav.services.target_camera import require_camera
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import EventHandler, Subscriptions, ValueSubscriptions

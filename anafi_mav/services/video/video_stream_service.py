@@ -17,6 +17,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect
 from anafi_mav.services.service import Answer, Host, Request, Service
+from anafi_mav.services.target_camera import require_camera
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
 
@@ -112,8 +113,9 @@ class VideoStreamService(Service):
     def _commanded(self, command: Command) -> OfferedStream | None:
         """Return the stream of a command, None for all.
 
-        Raises `Refused` when there is no such stream.
+        Raises `Refused` when there is no such stream, or no such camera (param2).
         """
+        require_camera(texts.VIDEO_STREAM, command.params[1])
         id = command.params[0]
         if id == ALL or math.isnan(id):
             return None
