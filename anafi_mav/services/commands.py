@@ -214,6 +214,16 @@ class Action(Definition):
     `AnafiMavError` that says why not."""
 
 
+OURS = (0.0, 1.0, float(dialect.MAV_COMP_ID_CAMERA))
+"""Target camera ids that mean the drone's camera: all cameras, the autopilot's first, this component."""
+
+
+def require_camera(what: texts.OperatorText, id: float) -> None:
+    """Refuse a command for a camera that does not exist."""
+    if not math.isnan(id) and id not in OURS:
+        raise Refused(what, texts.NO_SUCH_CAMERA.fill(number=f"{id:g}"), lasting=True)
+
+
 QUERY = Definition(location=False, altitude=Altitude.UNUSED, effect=Effect.CHANGE)
 """A command that is answered at once, and changes nothing."""
 

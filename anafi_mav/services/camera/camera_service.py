@@ -23,10 +23,9 @@ from anafi_mav.services.camera import camera_messages
 from anafi_mav.services.camera.camera_pose import current_pose
 from anafi_mav.services.camera.camera_reset import reset_camera
 from anafi_mav.services.camera.camera_targets import is_at_autopilot, require_free, require_idle
-from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect, ProgressPolicy
+from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect, ProgressPolicy, require_camera
 from anafi_mav.services.service import Answer, Host, Request, Service
 from anafi_mav.services.stream import MessageStream, Times
-from anafi_mav.services.target_camera import require_camera
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
 from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueInterest, ValueSubscriptions
 from anafi_mav.vehicle.vehicle import Vehicle

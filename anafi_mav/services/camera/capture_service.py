@@ -29,10 +29,9 @@ from anafi_mav.services.camera.camera_targets import (
 )
 from anafi_mav.services.camera.photo_control import PhotoControl
 from anafi_mav.services.camera.photo_reporter import PhotoReporter
-from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect
+from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect, require_camera
 from anafi_mav.services.service import LOOK_EVERY, Host, Request, Service
 from anafi_mav.services.stream import MessageStream, Times
-from anafi_mav.services.target_camera import require_camera
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import EventHandler, Subscriptions, ValueSubscriptions

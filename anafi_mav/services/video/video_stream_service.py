@@ -15,9 +15,8 @@ from anafi_mav.drone.video.stream_choice import OfferedStream, StreamKind
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect
+from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect, require_camera
 from anafi_mav.services.service import Answer, Host, Request, Service
-from anafi_mav.services.target_camera import require_camera
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
 
