@@ -57,7 +57,7 @@ def is_same(one: object, other: object) -> bool:
     if isinstance(one, tuple) and isinstance(other, tuple):
         return len(one) == len(other) and all(map(is_same, one, other))
     if isinstance(one, float) and isinstance(other, float):
-        return math.isclose(one, other, rel_tol=1e-3)
+        return math.isclose(one, other, rel_tol=1e-3, abs_tol=1e-6)
     return one == other
 
 
@@ -89,17 +89,19 @@ class Commanding(Element[StateT]):
         *,
         stops: bool = False,
         wanted: T | None = None,
+        is_done: Callable[[T], bool] | None = None,
     ) -> T:
         """Send a setting and return what the judge makes of its answer.
 
-        `stops`: it ends something that goes on. `wanted`: another result counts if this one does not follow.
+        `stops`: it ends something that goes on. `wanted`: another result counts if this one does not follow; or one for
+        which `is_done` is True.
         """
         async with self._setting_lock(answer):
             return await self._answered(
                 command,
                 answer,
                 judge,
-                lambda result: wanted is None or is_same(wanted, result),
+                is_done or (lambda result: wanted is None or is_same(wanted, result)),
                 timeout,
                 stops=stops,
                 is_setting=not stops,

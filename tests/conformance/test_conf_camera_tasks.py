@@ -11,7 +11,7 @@ import pytest
 from support import camera_commands
 from support.cameras import ACCEPTED, PHOTO, VIDEO, command, enter, photos, press, request, shoot, texts, videos
 from support.ext_params import CHOICE, fetch, write
-from support.fault_scenarios import watched
+from support.fault_scenarios import on_command, watched
 from support.flavours import both
 from support.mav import CAMERA, Client
 from support.missions import ACTIVE, PAUSED, put, start, state, takeoff, way
@@ -142,6 +142,16 @@ async def test_camera_source_chooses_the_shown_picture(model: str) -> None:
         assert await command(w.client, dialect.MAV_CMD_VIDEO_STOP_CAPTURE, 0) == ACCEPTED
         assert await command(w.client, SOURCE, 0, dialect.CAMERA_SOURCE_IR, 1) == ACCEPTED
         assert await command(w.client, dialect.MAV_CMD_SET_CAMERA_MODE, 0, PHOTO) == REJECTED
+
+
+async def test_camera_source_is_not_refused_by_a_report_of_before_the_change() -> None:
+    async with world(model="thermal", speed=1.0) as w:
+        mark = w.client.mark()
+        before = thermal_messages.Mode(ThermalMode.DISABLED)
+        reported = on_command(w, "thermal.set_mode", lambda: w.drone.inject(before))
+        assert await command(w.client, SOURCE, 0, dialect.CAMERA_SOURCE_IR, 0) == ACCEPTED
+        await reported
+        assert texts(w.client, mark) == []
 
 
 async def test_series_that_a_thermal_mode_ends_restores_its_settings() -> None:

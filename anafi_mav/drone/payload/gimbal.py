@@ -30,7 +30,7 @@ from anafi_mav.arsdk.messages.gimbal import (
 )
 from anafi_mav.drone.element import Range, Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, require_number
-from anafi_mav.drone.settings import Commanding
+from anafi_mav.drone.settings import Commanding, is_same
 from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError, CommandRejected, LocalProtocolError, NotSupported
 from anafi_mav.units import clip
@@ -138,6 +138,11 @@ def _ranges(message: gimbal.MaxSpeed | gimbal.Offsets) -> dict[Axis, Range]:
         Axis.ROLL: (message.current_roll, message.min_bound_roll, message.max_bound_roll),
     }
     return {axis: Range(*numbers) for axis, numbers in values.items() if all(map(math.isfinite, numbers))}
+
+
+def _is_set(setting: Range, wanted: float) -> bool:
+    """Return True for a reported setting that is the wanted one, or the end of its range that is nearest to it."""
+    return is_same(setting.current, float(clip(wanted, setting.min, setting.max)))
 
 
 def _bounds(message: gimbal.RelativeAttitudeBounds | gimbal.AbsoluteAttitudeBounds) -> dict[Axis, tuple[float, float]]:
@@ -354,6 +359,7 @@ class Gimbal(Commanding[Gimbals]):
             gimbal.SetMaxSpeed(id, degrees_per_second, degrees_per_second, degrees_per_second),
             gimbal.MaxSpeed,
             lambda message: self[id].max_speed if message.gimbal_id == id else None,
+            is_done=lambda speeds: all(_is_set(speed, degrees_per_second) for speed in speeds.values()),
         )
 
     async def open_offsets(self, on: bool, id: int = MAIN) -> bool:
@@ -372,16 +378,17 @@ class Gimbal(Commanding[Gimbals]):
         """Set the offsets, deg, while they are open; None keeps one. Return those of the drone."""
         now = self[id].offsets
         self._require(now, gimbal.SetOffsets.NAME)
-        wanted = []
+        wanted = {}
         for axis, value in ((Axis.YAW, yaw), (Axis.PITCH, pitch), (Axis.ROLL, roll)):
             kept = now[axis].current if axis in now else 0.0
-            wanted.append(kept if value is None else value)
-        if not math.isfinite(sum(wanted)):
+            wanted[axis] = kept if value is None else value
+        if not math.isfinite(sum(wanted.values())):
             raise LocalProtocolError("an offset is not a number")
         return await self._change(
-            gimbal.SetOffsets(id, *wanted),
+            gimbal.SetOffsets(id, *wanted.values()),
             gimbal.Offsets,
             lambda message: self[id].offsets if message.gimbal_id == id else None,
+            is_done=lambda offsets: all(_is_set(offset, wanted[axis]) for axis, offset in offsets.items()),
         )
 
     # -- calibration

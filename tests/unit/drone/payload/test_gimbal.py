@@ -202,3 +202,11 @@ async def test_in_the_simulator(model: str) -> None:
         assert back.absolute.pitch == pytest.approx(0.0, abs=0.5)
         await drone.gimbal.calibrate()
         await drone.gimbal.cancel_calibration()
+
+
+async def test_report_of_before_a_change_of_the_speed_is_not_its_answer() -> None:
+    async with connected("4k") as (drone, simulator):
+        change = asyncio.ensure_future(drone.gimbal.set_max_speed(33.3))
+        await asyncio.sleep(0)
+        simulator.inject(gimbal.MaxSpeed(0, *(1.0, 180.0, 60.0) * 3))  # as it was
+        assert (await change)[Axis.PITCH].current == pytest.approx(33.3)
