@@ -269,7 +269,10 @@ class Commander:
         `CommandTimeout` when the transport drops the command. Do not await it bare, a cancelled wait would cancel it:
         use `asyncio.wait`.
         """
-        token = self.send(message, stops=stops)
+        return self.delivery(self.send(message, stops=stops))
+
+    def delivery(self, token: int) -> asyncio.Future[None]:
+        """Return a future that is done when the drone has received this command; see `deliver`."""
         delivery: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._deliveries[token] = delivery
         return delivery
@@ -335,7 +338,11 @@ class Commander:
 
     def cancel(self, token: int | None) -> None:
         """Withdraw a command that has not been delivered; None: it was not sent."""
-        if self._wire is not None and token is not None:
+        if token is None:
+            return
+        if (delivery := self._deliveries.pop(token, None)) is not None:
+            delivery.cancel()
+        if self._wire is not None:
             self._wire.cancel(token)
 
     def expect(

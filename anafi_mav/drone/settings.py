@@ -27,8 +27,8 @@ Question: TypeAlias = tuple[Message, type[Message], Callable[[Any], bool | None]
 """Something to ask after connecting: the question, the kind of event that answers it, and its judge."""
 
 KEPT_AFTER = 0.5
-"""s after an answer with another value than the wanted one until it counts: the drone may have sent that event before
-it received the change."""
+"""s until an answer with another value than the wanted one counts, after it and the drone's receipt of the change: the
+drone may have sent that event before."""
 
 REPEAT = 0.5
 """s after which an unacknowledged target is sent again while no event shows its effect.
@@ -128,13 +128,20 @@ class Commanding(Element[StateT]):
             result = judge(message)
             if result is None or isinstance(result, AnafiMavError) or is_done(result):
                 return result
-            if not kept:
+            if not kept and delivery.done():
                 expectation.expire_after(KEPT_AFTER, command.NAME)
             kept[:] = [result]
             return None
 
+        def delivered(delivery: asyncio.Future[None]) -> None:
+            if kept and not delivery.cancelled() and not expectation.future.done():
+                expectation.expire_after(KEPT_AFTER, command.NAME)
+
         expectation = self._commander.expect((answer,), listen)
         self._commander.dispatch(expectation, command, timeout, stops=stops, is_setting=is_setting)
+        assert expectation.token is not None
+        delivery = self._commander.delivery(expectation.token)
+        delivery.add_done_callback(delivered)
         try:
             return await expectation.wait()
         except CommandTimeout:

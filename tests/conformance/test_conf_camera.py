@@ -496,6 +496,17 @@ async def test_mode_that_is_reported_once_more_before_it_changes_is_not_refused(
         assert texts(w.client, mark) == []
 
 
+async def test_mode_that_is_reported_once_more_on_a_slow_link_is_not_refused() -> None:
+    """The change arrives half a second after that report, and its answer as much later."""
+    async with world(speed=1.0) as w:
+        mark = w.client.mark()
+        w.drone.faults.up = w.drone.faults.down = Impairment(delay=0.4)
+        before = camera_messages.CameraMode(0, camera_messages.CameraCameraMode.RECORDING)
+        w.drone.inject(before)  # arrives after the command is sent
+        await enter(w.client, PHOTO)
+        assert texts(w.client, mark) == []
+
+
 async def test_conf_087_picture_that_is_reported_after_the_end_of_its_series_is_captured() -> None:
     async with world(speed=1.0, web=True) as w:
         await enter(w.client, PHOTO)
