@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 import shutil
 from typing import Any
 
@@ -37,7 +38,7 @@ AbortSignal.timeout = (limit) => {
   return end.signal;
 };
 globalThis.fetch = (path, { signal }) => ANSWERS.length
-  ? Promise.resolve({ ok: true, json: () => Promise.resolve(ANSWERS.shift()) })
+  ? Promise.resolve({ ok: ANSWERS[0] !== REFUSED, status: 401, json: () => Promise.resolve(ANSWERS.shift()) })
   : new Promise((_, reject) => { signal.addEventListener("abort", () => reject(signal.reason)); });
 setTimeout(() => {
   const names = document.getElementById("drones").children.map((item) => item.querySelector(".name").textContent);
@@ -48,10 +49,15 @@ setTimeout(() => {
 """A browser whose gateway gives these answers, and then none, as in a network that is lost."""
 
 
+REFUSED = "refused"
+"""In place of an answer: the gateway refuses every request from then on, for want of its token."""
+
+
 async def shown(scripts: tuple[str, ...], answers: list[Any], length: float) -> dict[str, Any]:
     """Return what a page shows after `length` s: its problem, and the names of the drones in its list."""
     assert NODE is not None
-    program = f"const ANSWERS = {json.dumps(answers)}, LENGTH = {length * 1000.0};" + BROWSER
+    values = f"ANSWERS = {json.dumps(answers)}, REFUSED = {json.dumps(REFUSED)}, LENGTH = {length * 1000.0}"
+    program = f"const {values};" + BROWSER
     program += "".join((FOLDER / name).read_text() for name in scripts)
     process = await asyncio.create_subprocess_exec(NODE, "-e", program, stdout=asyncio.subprocess.PIPE)
     out, _ = await process.communicate()
@@ -80,6 +86,12 @@ LIST, DRONE, STATUS = (
 async def test_page_without_an_answer_says_since_when(scripts: tuple[str, ...], answer: Any) -> None:
     found = await shown(scripts, [answer], 1.5)
     assert found["problem"].startswith("No answer for 1 s, the values are of before: no answer within 3000 ms")
+
+
+@pytest.mark.parametrize(("scripts", "answer"), [(LIST, []), (DRONE, []), (STATUS, status())])
+async def test_page_whose_requests_are_refused_says_so(scripts: tuple[str, ...], answer: Any) -> None:
+    found = await shown(scripts, [answer, REFUSED], 2.5)
+    assert re.fullmatch(r"Requests are refused for \d s, the values are of before: status 401", found["problem"])
 
 
 @pytest.mark.parametrize(
