@@ -27,6 +27,7 @@ from anafi_mav.arsdk.messages.proto import camera2
 from anafi_mav.arsdk.messages.user_storage import FsState, PhyState
 from anafi_mav.drone.payload.media import MediaItem
 from anafi_mav.mavlink import dialect
+from anafi_mav.sim.payload import capture
 from anafi_mav.sim.world.faults import Impairment
 
 DENIED, FAILED, REJECTED, UNSUPPORTED = (
@@ -505,6 +506,28 @@ async def test_mode_that_is_reported_once_more_on_a_slow_link_is_not_refused() -
         w.drone.inject(before)  # arrives after the command is sent
         await enter(w.client, PHOTO)
         assert texts(w.client, mark) == []
+
+
+async def test_conf_087_files_of_a_series_on_a_slow_card_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A picture is reported before the drone reports that it is stored."""
+    monkeypatch.setattr(capture, "SAVE_TIME", 1.5)
+    shown = "CAMERA_IMAGE_CAPTURED"
+    async with world(speed=1.0, web=True) as w:
+        await enter(w.client, PHOTO)
+        assert await command(w.client, START_PHOTO, 0, 3, 0) == ACCEPTED
+        await w.client.wait(shown, lambda image: image.image_index == 1, since=0, timeout=20.0)
+        await w.drone.wait_log(lambda e: len(photos(w)[0].resources) == 2, 10.0)
+        assert await command(w.client, STOP_PHOTO, 0) == ACCEPTED
+        names = [""]
+        for _ in range(10):
+            if "" not in names:
+                break
+            mark = w.client.mark()
+            await w.client.wait("HEARTBEAT", since=mark)
+            assert await command(w.client, dialect.MAV_CMD_REQUEST_MESSAGE, IMAGE, -1) == ACCEPTED
+            await w.client.wait(shown, lambda image: image.image_index == 1, since=mark)
+            names = [image.file_url.rpartition("/")[2] for _, image in w.client.since(mark, shown)]
+        assert names == [resource.id for resource in photos(w)[0].resources]
 
 
 async def test_conf_087_picture_that_is_reported_after_the_end_of_its_series_is_captured() -> None:

@@ -183,14 +183,20 @@ class PhotoReporter:
         images = [self._log.add(partial(self._image, shot)) for shot in shots]
         if images:
             self._remember()
-        is_due = self._shots.is_over(media) or any(is_listed(shot.number) for shot in shots)
+        numbers = [shot.number for shot in shots] or [image.number for image in self._unnamed(media)]
+        is_due = self._shots.is_over(media) or any(map(is_listed, numbers))
         self._name_later(images, media if is_due else "", is_last=is_last)
 
     def _name_rest(self) -> None:
         """Name the last pictures of a series, which has ended."""
-        images = self._log.of_capture(self._shots.capture)
-        if images and not is_listed(images[-1].number):
+        if self._unnamed(self._shots.media):
             self._name_later([], self._shots.media, is_last=False)
+
+    def _unnamed(self, media: str) -> list[CapturedImage]:
+        """Return the stored pictures of a media whose files are not known: they were reported before it, perhaps."""
+        capture = self._shots.capture_of(media)
+        images = self._log.of_capture(capture) if capture else []
+        return [image for image in images if image.is_saved and not image.url]
 
     def _name_later(self, images: list[CapturedImage], media: str, *, is_last: bool) -> None:
         """Send the messages of these pictures.
