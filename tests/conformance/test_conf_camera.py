@@ -508,6 +508,20 @@ async def test_mode_that_is_reported_once_more_on_a_slow_link_is_not_refused() -
         assert texts(w.client, mark) == []
 
 
+async def test_conf_087_series_is_not_ended_by_the_late_end_of_the_photo_before() -> None:
+    async with world(speed=1.0, web=True) as w:
+        await enter(w.client, PHOTO)
+        before = sim_value(w.drone, "CAM_PHOTOMODE")
+        w.drone.faults.late = {camera_messages.PhotoState.NAME: 0.8}
+        assert await command(w.client, START_PHOTO, 0, 0, 1) == ACCEPTED
+        await w.drone.wait_log(lambda e: bool(photos(w)) and not w.drone.firmware.payload.cameras.busy, 10.0)
+        assert await command(w.client, START_PHOTO, 0, 2, 3) == ACCEPTED
+        shown = "CAMERA_IMAGE_CAPTURED"
+        await w.client.wait(shown, lambda image: image.image_index == 3, since=0, timeout=20.0)
+        await w.drone.wait_log(lambda e: sim_value(w.drone, "CAM_PHOTOMODE") == before, 10.0)
+        assert [len(media.resources) for media in photos(w)] == [1, 3]
+
+
 async def test_conf_087_files_of_a_series_on_a_slow_card_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """A picture is reported before the drone reports that it is stored."""
     monkeypatch.setattr(capture, "SAVE_TIME", 1.5)
@@ -561,6 +575,22 @@ async def test_conf_087_photo_after_a_series_is_taken_as_commanded(
         await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 0, since=mark, timeout=20.0)
         second = photos(w)[-1]
         assert (len(photos(w)), second.mode, len(second.resources)) == (2, mode, count)
+
+
+async def test_conf_087_bursts_whose_end_is_reported_early_are_one_message_per_file() -> None:
+    shown = "CAMERA_IMAGE_CAPTURED"
+    async with world(speed=1.0, web=True) as w:
+        await enter(w.client, PHOTO)
+        assert (await write(w.client, "CAM_PHOTOMODE", 2.0, CHOICE)).param_result == dialect.PARAM_ACK_ACCEPTED
+        w.drone.faults.late = {camera_messages.PhotoProgress.NAME: 0.7}
+        for number in (1, 2):
+            assert await command(w.client, START_PHOTO, 0, 0, 1) == ACCEPTED
+            await w.client.wait(shown, lambda image, n=number: image.image_index == 14 * n - 1, since=0, timeout=10.0)
+        images = [image for _, image in w.client.since(0, shown)]
+        assert [image.image_index for image in images] == list(range(28))
+        assert all(image.capture_result == 1 for image in images)
+        names = [image.file_url.rpartition("/")[2] for image in images]
+        assert names == [resource.id for media in photos(w) for resource in media.resources]
 
 
 @pytest.mark.parametrize("model", ["4k", "ai"])

@@ -321,7 +321,8 @@ RECORDING_EVENTS: tuple[type[Message], ...] = (wire.RecordingProgress, wire.Reco
 def photo_news(m: Any) -> CaptureUpdate | None:
     """Return the progress that a photo event reports."""
     if isinstance(m, wire.PhotoState):
-        return CaptureUpdate(m.cam_id, CaptureProgress.STARTED if m.state == State.ACTIVE else CaptureProgress.ENDED)
+        is_active = m.state == State.ACTIVE
+        return CaptureUpdate(m.cam_id, CaptureProgress.STARTED if is_active else CaptureProgress.ENDED, is_state=True)
     if m.result == PhotoResult.PHOTO_SAVED:
         return CaptureUpdate(m.cam_id, CaptureProgress.SAVED, m.media_id, count=m.photo_count or None)
     if m.result == PhotoResult.PHOTO_TAKEN:

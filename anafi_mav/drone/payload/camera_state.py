@@ -286,3 +286,6 @@ class CaptureUpdate(msgspec.Struct, frozen=True):
 
     ENDED: the recording never began.
     """
+    is_state: bool = False
+    """STARTED and ENDED of a photo: reported by the camera's state. Parrot promises no order between that and the
+    reports of the progress."""

@@ -37,6 +37,8 @@ class PhotoSeries:
     """Of the host's memory: which drone takes it."""
     has_begun: bool = False
     """The drone has reported its begin; an end before that is another photo's."""
+    is_active: bool = False
+    """The camera's state has reported it; an end by the state before that is another photo's."""
     ending: asyncio.Task[None] | None = None
     """Ends it when it has all its pictures; tried again with the next picture."""
     restoring: asyncio.Task[None] | None = None
@@ -70,7 +72,7 @@ class PhotoControl:
         if not camera.taking:
             self._restore(series)
         elif series is under_way or not series.has_begun:  # else another one
-            series.has_begun, self._series = True, series
+            series.has_begun, series.is_active, self._series = True, True, series
 
     @property
     def camera(self) -> CameraState:
@@ -93,12 +95,13 @@ class PhotoControl:
             return
         is_own = update.camera == series.camera  # else another camera takes photos, and the series is over
         if is_own and update.progress in (CaptureProgress.STARTED, CaptureProgress.TAKEN):
-            series.has_begun = True
+            series.has_begun, series.is_active = True, series.is_active or update.is_state
         is_full = is_own and series.limit is not None and taken >= series.limit
         if is_full and update.progress is CaptureProgress.TAKEN and (series.ending is None or series.ending.done()):
             series.ending = self.host.spawn(self._end_series(series))
         is_saved = update.progress is CaptureProgress.SAVED and update.is_last and is_present
-        ended = not is_own or is_saved or update.progress is CaptureProgress.ENDED
+        has_ended = update.progress is CaptureProgress.ENDED and (series.is_active or not update.is_state)
+        ended = not is_own or is_saved or has_ended
         if (ended and series.has_begun) or (is_own and is_present and update.progress is CaptureProgress.FAILED):
             self._series = None
             self._restore(series)
@@ -236,10 +239,17 @@ class PhotoControl:
     async def _restore_photo(self, series: PhotoSeries, settings: PhotoSettings) -> None:
         """Restore photo settings.
 
-        Without a link they are left to be restored at the next connection.
+        Without a link they are left to be restored at the next connection. A drone that keeps its mode may take photos:
+        the end of another photo has then been taken for that of the series, which goes on.
         """
+        camera = self.host.drone.camera
         try:
-            await self.host.drone.camera.set_photo(replace(settings, megapixels=None), series.camera)
+            restored = await camera.set_photo(replace(settings, megapixels=None), series.camera)
+            if restored is None or restored.mode is not settings.mode:
+                if camera[series.camera].taking and self._series is None:
+                    self._series = series
+                    return
+                raise Refused(texts.PHOTO, texts.CAMERA_MODE_KEPT)
         except LinkLost:
             return
         except AnafiMavError as error:

@@ -84,6 +84,12 @@ class _Capture:
         """Return True for a count that adds nothing."""
         return count is not None and bool(self.taken) and self.reported is not None and not self.more(count)
 
+    def continues(self, update: CaptureUpdate) -> bool:
+        """Return True for the shutter of a picture of this capture, whose end has been reported before it."""
+        if self.ended is None or self.camera != update.camera or update.count is None or not self.taken:
+            return False
+        return self.reported is not None and self.more(update.count) > 0
+
     def take(self, pictures: int, now: float) -> None:
         """Add pictures, spread over the time since the last report."""
         if self.reported is None and pictures:
@@ -201,7 +207,7 @@ class ShotTracker:
             case CaptureProgress.TAKEN:
                 if not self._now.is_open and self._now.has_taken(update.count):
                     return []  # the same report again; of another photo its media is reported too
-                lost = self._open(update, now)
+                lost = [] if self._now.continues(update) else self._open(update, now)
                 is_repeated = update.count is None and most is not None and self._now.taken >= most
                 more = 1 if update.count is None else self._now.more(update.count)
                 self._now.take(0 if is_repeated else more, now)
@@ -228,14 +234,30 @@ class ShotTracker:
     def _open(self, update: CaptureUpdate, now: float) -> list[CapturedShot]:
         """Begin a capture, unless one is under way; return lost pictures of an earlier one.
 
-        One of another camera is over, although its end was not reported: a drone takes photos with one at a time.
+        One of another camera is over, although its end was not reported: a drone takes photos with one at a time. One
+        without a picture has been ended by the late state of the photo before, and goes on.
         """
-        if self._now.is_open and self._now.camera == update.camera:
-            return []
-        self._now.end(now)
+        last = self._now
+        if last.camera == update.camera:
+            if last.is_open and not self._is_next(update):
+                return []
+            if update.is_state and last.ended is not None and last.shots:
+                return []  # further reports of that one may follow; the next one's progress begins it
+            if last.ended is not None and last.reported == 0 and not last.taken:
+                last.is_open, last.ended, last.since = True, None, now
+                return []
+        last.end(now)
         lost = self._before.report_all(is_saved=False)
         self._before, self._now = self._now, _Capture(self._now.number + 1, now, update.camera, is_open=True)
         return lost
+
+    def _is_next(self, update: CaptureUpdate) -> bool:
+        """Return True for the begin of another capture than the open one, which is stored.
+
+        The state reports the end of that one, and that may arrive after the progress of the next.
+        """
+        is_begin = update.progress is CaptureProgress.STARTED and not update.is_state
+        return is_begin and self._now.media != "" and not self._now.shots
 
     def _open_unreported(self, update: CaptureUpdate, now: float) -> list[CapturedShot]:
         """Begin the capture of a media whose other reports were lost, but for those of its pictures.

@@ -247,6 +247,41 @@ def test_picture_of_a_series_that_is_reported_after_the_next_photo_is_its_own() 
     assert tracker.receive(saved("b", 1), 3.6) == [CapturedShot(2, 1, 3.4, True)]
 
 
+def state(tracker: ShotTracker, at: float, *, is_active: bool) -> list[CapturedShot]:
+    """Report the camera's state, which may arrive before or after the progress that belongs to it."""
+    return tracker.receive(CaptureUpdate(0, STARTED if is_active else ENDED, is_state=True), at)
+
+
+@pytest.mark.parametrize("is_next_active", [False, True])
+def test_burst_whose_end_is_reported_before_its_last_shutters_is_one_media(is_next_active: bool) -> None:
+    """`is_next_active`: the state has reported the begin of the next one, too."""
+    tracker = ShotTracker()
+    state(tracker, 1.0, is_active=True)
+    feed(tracker, (1.1, STARTED, None), (1.2, TAKEN, 2))
+    state(tracker, 1.3, is_active=False)
+    if is_next_active:
+        state(tracker, 1.35, is_active=True)
+    feed(tracker, (1.4, TAKEN, 4))
+    shots = tracker.receive(saved("a", 4), 1.5)
+    assert [(shot.capture, shot.number, shot.is_saved) for shot in shots] == [(1, n, True) for n in (1, 2, 3, 4)]
+    feed(tracker, (1.6, STARTED, None), (1.8, TAKEN, 2), (2.0, TAKEN, 4))
+    shots = tracker.receive(saved("b", 4), 2.1)
+    assert [(shot.capture, shot.number) for shot in shots] == [(2, n) for n in (1, 2, 3, 4)]
+    assert tracker.expire(2.1 + LOST, is_series=False) == []
+
+
+def test_photo_has_the_time_of_its_shutter_although_the_end_of_the_one_before_is_late() -> None:
+    tracker = ShotTracker()
+    state(tracker, 1.0, is_active=True)
+    feed(tracker, (1.0, STARTED, None), (1.2, TAKEN, 1))
+    assert tracker.receive(saved("a", 1), 1.4) == [CapturedShot(1, 1, 1.2, True)]
+    feed(tracker, (2.0, STARTED, None))
+    state(tracker, 2.05, is_active=False)  # of the first
+    state(tracker, 2.1, is_active=True)
+    feed(tracker, (2.2, TAKEN, 1))
+    assert tracker.receive(saved("b", 1), 2.4) == [CapturedShot(2, 1, 2.2, True)]
+
+
 def test_failure_before_the_shutter_is_one_lost_picture() -> None:
     tracker = ShotTracker()
     assert feed(tracker, (1.0, FAILED, None)) == []  # a photo that never began
