@@ -154,6 +154,18 @@ async def test_camera_source_is_not_refused_by_a_report_of_before_the_change() -
         assert texts(w.client, mark) == []
 
 
+async def test_command_after_a_change_of_the_source_is_for_the_shown_camera() -> None:
+    """Which camera works is reported later than the thermal mode."""
+    async with world(model="thermal", speed=1.0) as w:
+        await enter(w.client, PHOTO)
+        w.drone.faults.late = {camera_messages.CameraStates.NAME: 0.8}
+        assert await command(w.client, SOURCE, 0, dialect.CAMERA_SOURCE_IR, 0) == ACCEPTED
+        assert await command(w.client, dialect.MAV_CMD_SET_CAMERA_MODE, 0, PHOTO) == REJECTED
+        assert await command(w.client, SOURCE, 0, dialect.CAMERA_SOURCE_RGB, 0) == ACCEPTED
+        await enter(w.client, VIDEO)
+        assert sim_value(w.drone, "CAM_MODE") == VIDEO
+
+
 async def test_series_that_a_thermal_mode_ends_restores_its_settings() -> None:
     """Its end may be reported when the thermal camera is the active one already."""
     async with world(model="thermal", speed=1.0) as w:

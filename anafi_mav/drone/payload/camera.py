@@ -535,6 +535,21 @@ class Camera(Commanding[CamerasState]):
 
     # -- inside
 
+    async def until_main(self, *, is_active: bool) -> None:
+        """Wait until the main camera is reported as the one that takes the pictures, or as another one.
+
+        A thermal mode changes that. Returns without it when the drone does not report it in `STATE_TIMEOUT`.
+        """
+
+        def judge(message: Message) -> bool | None:
+            return True if (self.active_id == MAIN) is is_active else None
+
+        if self.state.active and (self.active_id == MAIN) is not is_active:
+            with contextlib.suppress(CommandTimeout, LinkLost):
+                answer = self._commander.expect((camera_classic.ACTIVE_EVENT,), judge)
+                answer.expire_after(STATE_TIMEOUT, camera_classic.ACTIVE_EVENT.NAME)
+                await answer.wait()
+
     def _known(self, id: int) -> tuple[type[ClassicCamera] | type[ModernCamera], CameraState]:
         """How to ask this camera, and its state."""
         now = self[id]

@@ -314,6 +314,9 @@ FREQUENT: tuple[type[Message], ...] = (
     wire.NextPhotoDelay,
 )
 
+ACTIVE_EVENT: type[Message] = wire.CameraStates
+"""Reports which cameras work."""
+
 PHOTO_EVENTS: tuple[type[Message], ...] = (wire.PhotoProgress, wire.PhotoState)
 RECORDING_EVENTS: tuple[type[Message], ...] = (wire.RecordingProgress, wire.RecordingState)
 

@@ -148,8 +148,10 @@ class StreamChoice:
         # THERMAL is a rendering of the blended stream: STANDARD sends the sensor's raw picture, for programs that
         # colour it themselves (GroundSDK ThermalControl; anafi_ros uses BLENDED for both renderings).
         mode = ThermalMode.BLENDED if kind.is_thermal else ThermalMode.DISABLED
-        if self._thermal.state.mode is not mode and await self._thermal.set_mode(mode) is not mode:
-            raise CommandRejected("the drone keeps its thermal mode")
+        if self._thermal.state.mode is not mode:
+            if await self._thermal.set_mode(mode) is not mode:
+                raise CommandRejected("the drone keeps its thermal mode")
+            await self._camera.until_main(is_active=not kind.is_thermal)  # the next command is for that camera
         if kind.is_thermal:
             wanted = RenderingMode.THERMAL if kind is StreamKind.THERMAL else RenderingMode.BLENDED
             rendering, _ = await self._thermal.set_rendering(wanted)
