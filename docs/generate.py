@@ -605,7 +605,8 @@ recording is ACCEPTED.
 ## Zoom
 
 CAMERA_SETTINGS has the zoom as a share (%) of the range from 1 to the largest factor. A step is a factor of 1.25. A
-rate goes on to the end of the range or until a rate of 0; ACCEPTED means that the zoom moves.
+rate goes on to the end of the range or until a rate of 0; ACCEPTED means that the zoom moves. While the thermal or
+blended picture is shown, a zoom is TEMPORARILY_REJECTED: that camera has none.
 
 ## Storage
 

@@ -166,6 +166,17 @@ async def test_command_after_a_change_of_the_source_is_for_the_shown_camera() ->
         assert sim_value(w.drone, "CAM_MODE") == VIDEO
 
 
+async def test_zoom_is_refused_while_the_thermal_picture_is_shown() -> None:
+    async with world(model="thermal") as w:
+        zoom = dialect.MAV_CMD_SET_CAMERA_ZOOM, dialect.ZOOM_TYPE_RANGE, 50.0
+        assert await command(w.client, SOURCE, 0, dialect.CAMERA_SOURCE_IR, 0) == ACCEPTED
+        mark = w.client.mark()
+        assert await command(w.client, *zoom) == REJECTED
+        assert texts(w.client, mark) == ["Zoom refused: shown camera has no zoom"]
+        assert await command(w.client, SOURCE, 0, dialect.CAMERA_SOURCE_RGB, 0) == ACCEPTED
+        assert await command(w.client, *zoom) == ACCEPTED
+
+
 async def test_series_that_a_thermal_mode_ends_restores_its_settings() -> None:
     """Its end may be reported when the thermal camera is the active one already."""
     async with world(model="thermal", speed=1.0) as w:

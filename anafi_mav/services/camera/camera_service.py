@@ -209,8 +209,10 @@ class CameraService(Service):
         drone = self.host.drone
         id = drone.camera.active_id
         camera = drone.camera[id]
-        if camera.zoom_max is None or camera.zoom_max <= 1.0:
-            raise Unsupported(texts.ZOOM, texts.CAMERA_UNKNOWN)
+        if camera.feature is None:
+            raise Refused(texts.ZOOM, texts.CAMERA_UNKNOWN)
+        if camera.zoom_max is None or camera.zoom_max <= 1.0:  # the thermal camera
+            raise Refused(texts.ZOOM, texts.CAMERA_LACKS_ZOOM)
         if math.isnan(kind):
             raise Refused(texts.ZOOM, texts.NUMBER_MISSING, lasting=True)
         if kind not in (dialect.ZOOM_TYPE_STEP, dialect.ZOOM_TYPE_CONTINUOUS, dialect.ZOOM_TYPE_RANGE):
