@@ -272,7 +272,7 @@ class Commander:
         return self.delivery(self.send(message, stops=stops))
 
     def delivery(self, token: int) -> asyncio.Future[None]:
-        """Return a future that is done when the drone has received this command; see `deliver`."""
+        """Return a future that is done when the drone has received a command; see `deliver`."""
         delivery: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._deliveries[token] = delivery
         return delivery

@@ -536,7 +536,7 @@ class Camera(Commanding[CamerasState]):
     # -- inside
 
     async def until_main(self, *, is_active: bool) -> None:
-        """Wait until the main camera is reported as the one that takes the pictures, or as another one.
+        """Wait until the main camera is reported to take the pictures, or another one.
 
         A thermal mode changes that. Returns without it when the drone does not report it in `STATE_TIMEOUT`.
         """

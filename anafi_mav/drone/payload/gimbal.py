@@ -141,7 +141,7 @@ def _ranges(message: gimbal.MaxSpeed | gimbal.Offsets) -> dict[Axis, Range]:
 
 
 def _is_set(setting: Range, wanted: float) -> bool:
-    """Return True for a reported setting that is the wanted one, or the end of its range that is nearest to it."""
+    """Return True for the wanted setting, or the end of its range that is nearest to it."""
     return is_same(setting.current, float(clip(wanted, setting.min, setting.max)))
 
 

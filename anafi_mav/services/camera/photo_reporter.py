@@ -142,9 +142,9 @@ class PhotoReporter:
         return not is_earlier and (not update.media or self._shots.capture_of(update.media) == self._shots.capture)
 
     def _is_single(self, camera: int) -> bool:
-        """Return True when a photo of this camera is one picture: the drone may report its shutter twice.
+        """Return True when a photo of this camera is one picture.
 
-        A panorama, of a plan or by itself, has many pictures in that mode.
+        The drone may report its shutter twice. A panorama, of a plan or by itself, has many pictures in that mode.
         """
         drone = self.host.drone
         photo, playing = drone.camera[camera].photo, drone.flight_plan.state.playing
@@ -193,7 +193,7 @@ class PhotoReporter:
             self._name_later([], self._shots.media, is_last=False)
 
     def _unnamed(self, media: str) -> list[CapturedImage]:
-        """Return the stored pictures of a media whose files are not known: they were reported before it, perhaps."""
+        """Return the pictures of a media whose files are not known: they may be reported before it."""
         capture = self._shots.capture_of(media)
         images = self._log.of_capture(capture) if capture else []
         return [image for image in images if image.is_saved and not image.url]

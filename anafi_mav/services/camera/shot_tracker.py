@@ -85,7 +85,7 @@ class _Capture:
         return count is not None and bool(self.taken) and self.reported is not None and not self.more(count)
 
     def continues(self, update: CaptureUpdate) -> bool:
-        """Return True for the shutter of a picture of this capture, whose end has been reported before it."""
+        """Return True for the shutter of a picture of this capture, whose end was reported before."""
         if self.ended is None or self.camera != update.camera or update.count is None or not self.taken:
             return False
         return self.reported is not None and self.more(update.count) > 0
@@ -189,7 +189,7 @@ class ShotTracker:
 
     @property
     def awaits_capture_before(self) -> bool:
-        """True while pictures of the capture before are not reported: they are stored, or fail, first."""
+        """True while the capture before has pictures to report: they are stored, or fail, first."""
         return bool(self._before.shots)
 
     def is_over(self, media: str) -> bool:
@@ -344,7 +344,7 @@ class ShotTracker:
             del self._captures[next(iter(self._captures))]
 
     def _exchange(self, media: str) -> None:
-        """Note this media as that of the last capture, and the media of that as the one of the capture before.
+        """Note this media as the last capture's, and the media of that as the one before's.
 
         Both were taken before the first was stored, and it was taken for the last. A drone stores them in sequence.
         """

@@ -248,7 +248,7 @@ def test_picture_of_a_series_that_is_reported_after_the_next_photo_is_its_own() 
 
 
 def state(tracker: ShotTracker, at: float, *, is_active: bool) -> list[CapturedShot]:
-    """Report the camera's state, which may arrive before or after the progress that belongs to it."""
+    """Report the camera's state, which may arrive before or after its progress."""
     return tracker.receive(CaptureUpdate(0, STARTED if is_active else ENDED, is_state=True), at)
 
 
