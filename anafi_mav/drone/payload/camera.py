@@ -183,7 +183,7 @@ class Camera(Commanding[CamerasState]):
 
         def judge(update: CaptureUpdate) -> str | bool | AnafiMavError | None:
             nonlocal has_begun
-            has_begun = has_begun or update.progress in BEGUN
+            has_begun = has_begun or (update.progress in BEGUN and not update.is_state)
             if update.progress is CaptureProgress.SAVED:
                 return update.media if has_begun else None  # else of the photo before, reported late
             if update.progress is CaptureProgress.FAILED:

@@ -600,3 +600,16 @@ async def test_timeout_of_nan_raises_before_the_camera_or_gimbal_begins() -> Non
             with pytest.raises(LocalProtocolError, match="timeout"):
                 await call
         assert list(real.log.find("command")) == before
+
+
+async def test_photo_returns_its_own_media_although_that_of_the_one_before_is_reported_late() -> None:
+    """The state of the second is reported before the first is reported as stored."""
+    async with connected("4k", speed=1.0) as (drone, simulator):
+        await drone.camera.set_mode(CameraMode.PHOTO)
+        taken = drone.expect(old.PhotoProgress, lambda m: m.result == old.PhotoResult.PHOTO_TAKEN, 5.0)
+        await asyncio.gather(drone.camera.take_photo(until_saved=False), taken)
+        simulator.faults.late = {old.PhotoProgress.NAME: 0.7}
+        await simulator.wait_log(lambda e: not simulator.firmware.payload.cameras.busy, 5.0)
+        media_id = await drone.camera.take_photo()
+        stored = [media.id for media in simulator.firmware.payload.media]
+        assert (len(stored), media_id) == (2, stored[-1])
