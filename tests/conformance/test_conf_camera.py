@@ -867,6 +867,20 @@ async def test_conf_093_format_erases_and_resets_the_index(flavour: str, model: 
         assert (await shoot(w.client)).image_index == 0
 
 
+async def test_conf_093_format_without_a_result_event_resets_the_index() -> None:
+    """The state of the file system alone shows its end."""
+    async with world(web=True) as w:
+        await enter(w.client, PHOTO)
+        await shoot(w.client)
+        w.drone.inject(user_storage.Capabilities(1 << user_storage.Feature.FORMAT_WHEN_READY_ALLOWED))
+        w.drone.faults.unreported = frozenset({user_storage.FormatResult.NAME})
+        await w.client.wait("HEARTBEAT")
+        mark = w.client.mark()
+        assert await command(w.client, FORMAT, 1, 1) == ACCEPTED
+        await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_count == 0, since=mark)
+        assert (await shoot(w.client)).image_index == 0
+
+
 async def test_conf_093_format_is_refused_in_flight_and_while_recording() -> None:
     async with world() as w:
         await enter(w.client, VIDEO)

@@ -73,6 +73,11 @@ class StorageState(msgspec.Struct, frozen=True):
             return None
         return self.physical == PhyState.AVAILABLE and self.file_system == FsState.READY
 
+    @property
+    def has_format_result(self) -> bool:
+        """True when the end of a format is an event of its own; else only the file system's state shows it."""
+        return self.features is None or Feature.FORMAT_RESULT_EVT_SUPPORTED in self.features
+
 
 Storages = Mapping[int, StorageState]
 
@@ -242,6 +247,9 @@ class Storage(Commanding[Storages]):
     RESULT_EVENTS: ClassVar[tuple[type[Message], ...]] = (v1.FormatResult, v2.FormatResult, v3.FormattingResult)
     """Events at the end of a format; `formatted` reads them."""
 
+    STATE_EVENTS: ClassVar[tuple[type[Message], ...]] = (v1.State, v2.State, v3.State)
+    """Events with the state of the file system."""
+
     @staticmethod
     def formatted(message: Message) -> int | None:
         """Return the id of the storage that a result reports as formatted; None: it was not."""
@@ -330,7 +338,7 @@ class Storage(Commanding[Storages]):
         known = self[storage]
         if known.formats is not None and kind not in known.formats:
             raise NotSupported(f"{kind.name.lower()} format")
-        tells = known.features is None or Feature.FORMAT_RESULT_EVT_SUPPORTED in known.features
+        tells = known.has_format_result
         began = False
 
         def judge(message: Any) -> bool | AnafiMavError | None:

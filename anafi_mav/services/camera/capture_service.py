@@ -60,6 +60,8 @@ class CaptureService(Service):
         """When the recording under way began (s, monotonic)."""
         self._recording_failure = ""
         """Reason that the drone reported last; the recording may continue nevertheless."""
+        self._is_formatting = False
+        """The drone formats the storage for media, and reports the end by its state alone."""
         self._sent: _Status | None = None
         """Content of the last CAMERA_CAPTURE_STATUS to all."""
         self._rates: dict[Channel, tuple[float, float]] = {}
@@ -104,6 +106,7 @@ class CaptureService(Service):
         handlers: dict[type[events.Message], EventHandler] = dict.fromkeys(Camera.PHOTO_EVENTS, self._on_photo)
         handlers |= dict.fromkeys(Camera.RECORDING_EVENTS, self._on_recording)
         handlers |= dict.fromkeys(Storage.RESULT_EVENTS, self._on_formatted)
+        handlers |= dict.fromkeys(Storage.STATE_EVENTS, self._on_storage_state)
         return handlers
 
     def value_subscriptions(self) -> ValueSubscriptions:
@@ -157,6 +160,17 @@ class CaptureService(Service):
         """Begin the index again when the storage for media was formatted."""
         formatted = Storage.formatted(message)
         if formatted is not None and formatted == media_storage(self.host.drone):
+            self._reporter.reset()
+            self._send_changed()
+
+    def _on_storage_state(self, message: events.Message, now: float) -> None:
+        """Do the same for a storage whose format has no result event."""
+        id = media_storage(self.host.drone)
+        if id is None or self.host.drone.storage[id].has_format_result:
+            return
+        was_formatting, state = self._is_formatting, self.host.drone.storage[id].file_system
+        self._is_formatting = state == events.FsState.FORMATTING
+        if was_formatting and state == events.FsState.READY:
             self._reporter.reset()
             self._send_changed()
 
