@@ -75,7 +75,7 @@ class StorageState(msgspec.Struct, frozen=True):
 
     @property
     def has_format_result(self) -> bool:
-        """True when the end of a format is an event of its own; else only the file system's state shows it."""
+        """True when the end of a format is an event; else the file system's state shows it."""
         return self.features is None or Feature.FORMAT_RESULT_EVT_SUPPORTED in self.features
 
 
