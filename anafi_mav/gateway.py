@@ -153,6 +153,8 @@ class _Supervised:
         self.connections = 0
         """Handshakes that led to a connection, and silent sessions that went on."""
         self.task: asyncio.Task[None] | None = None
+        self.is_lost_in_air = False
+        """True from a loss of the link in the air until one on the ground; it counts while there is no link."""
         self._is_closing = False
         """True while the drone's connection is closed, which must not be interrupted."""
         self._reported_at = -math.inf
@@ -210,6 +212,7 @@ class _Supervised:
                     reason = await asyncio.shield(self.drone.lost)
                     logger.warning("%s: link lost: %s", self.config.name, reason)
                     self.problem = f"link lost: {reason}"
+                    self.is_lost_in_air = not self.system.vehicle.on_ground
                     await self.system.settle()
                 finally:
                     self.system.link_down()
@@ -672,10 +675,17 @@ class Gateway:
         )
 
     def drones_in_air(self) -> list[str]:
-        """For each flying drone one sentence on what it will do by itself when the gateway ends."""
+        """For each flying drone one sentence on what it will do by itself when the gateway ends.
+
+        What a drone does whose link was lost in the air is not known: it is named as such.
+        """
         sentences = []
         for s in self._supervised:
-            if not s.system.active or s.system.vehicle.on_ground:
+            if not s.system.active:
+                if s.is_lost_in_air:
+                    sentences.append(f"{s.config.name} was in the air when its link was lost: the gateway looks for it")
+                continue
+            if s.system.vehicle.on_ground:
                 continue
             if (ending := s.system.vehicle.alone) is not None:
                 sentences.append(f"{s.config.name} {ending}")

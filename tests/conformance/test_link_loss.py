@@ -160,6 +160,28 @@ async def test_all_datagrams_lost(engaged: bool) -> None:
             sender.cancel()
 
 
+async def test_drone_whose_link_was_lost_in_the_air_is_named_before_the_gateway_ends() -> None:
+    """Ctrl-C must not end the only program that looks for it without a warning."""
+    async with world(speed=1.0) as w:
+        assert w.gateway.drones_in_air() == []
+        await w.take_off()
+        w.drone.faults.mute = True
+        await silent_after(w.client, time.monotonic())
+        (sentence,) = w.gateway.drones_in_air()
+        assert sentence == "alpha was in the air when its link was lost: the gateway looks for it"
+        w.drone.faults.mute = False
+        await w.client.heartbeat(lambda beat: True, timeout=5.0)
+        (sentence,) = w.gateway.drones_in_air()
+        assert sentence.startswith("alpha is in the air: it will hover and fly home")
+
+
+async def test_drone_whose_link_was_lost_on_the_ground_does_not_delay_the_end_of_the_gateway() -> None:
+    async with world(speed=1.0) as w:
+        w.drone.faults.mute = True
+        await silent_after(w.client, time.monotonic())
+        assert w.gateway.drones_in_air() == []
+
+
 async def test_the_ground_station_falls_silent_during_the_loss() -> None:
     """What ANF_GCS_LOSS promises is kept, counted from when the drone is back: no one was heard before."""
     async with world(speed=1.0) as w:
