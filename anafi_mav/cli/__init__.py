@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol, cast
 
 from anafi_mav import __version__
-from anafi_mav.cli.terminal import complain, has_lost_output
+from anafi_mav.cli.terminal import END_LIMIT, STDOUT_WRITER, complain, has_lost_output
 from anafi_mav.errors import AnafiMavError, ConfigError
 
 DONE, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
@@ -67,7 +67,10 @@ def main(argv: Sequence[str] | None = None, *, imported: Callable[[], None] = la
     assert command is not None, "argparse has ended the program"
     imported()
     try:
-        status = command.run(arguments)
+        try:
+            status = command.run(arguments)
+        finally:
+            STDOUT_WRITER.wait(END_LIMIT)
         return FAILED if status == DONE and has_lost_output() else status
     except ConfigError as error:
         complain(str(error))

@@ -10,7 +10,7 @@ import asyncio
 
 from anafi_mav.cli import interrupts, log
 from anafi_mav.cli.start_warnings import warnings_of_ground
-from anafi_mav.cli.terminal import END_LIMIT, STDOUT_WRITER, complain, say_later
+from anafi_mav.cli.terminal import complain, say_later
 from anafi_mav.clock import SystemClock
 from anafi_mav.errors import ConfigError
 from anafi_mav.fabric.ground import FabricGround
@@ -39,7 +39,6 @@ def run(arguments: argparse.Namespace) -> int:
     for warning in warnings_of_ground(fabric, stations):
         complain(f"warning: {warning.text}", warning.style)
     interrupts.run(_serve(fabric, stations))
-    STDOUT_WRITER.wait(END_LIMIT)
     return 0
 
 

@@ -1,4 +1,7 @@
-"""`anafi-mav plan fly`: uploads a plan to a vehicle, starts it and reports its progress."""
+"""`anafi-mav plan fly`: uploads a plan to a vehicle, starts it and reports its progress.
+
+Heartbeats leave from the same event loop. A terminal that is stopped (Ctrl-S) delays neither them nor Ctrl-C.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from typing import Any
 from anafi_mav.cli import interrupts, plan_options
 from anafi_mav.cli.ground_client import Ground, Texts, connected
 from anafi_mav.cli.plan_link import give
-from anafi_mav.cli.terminal import say
+from anafi_mav.cli.terminal import say_later
 from anafi_mav.errors import AnafiMavError, LinkLost, PlanError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
@@ -38,15 +41,15 @@ async def _fly(arguments: argparse.Namespace, sysid: int | None, plan: Plan) -> 
         await give(ground, plan, arguments.file.name)
         follower = MissionFollower(ground, plan)
         if not ground.heartbeat.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED:
-            say("arming")
+            say_later("arming")
             await ground.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
         await ground.command(dialect.MAV_CMD_MISSION_START)
         follower.begin()
-        say("begun; Ctrl-C ends this program, not the flight", "green")
+        say_later("begun; Ctrl-C ends this program, not the flight", "green")
         try:
             await follower.follow()
         except asyncio.CancelledError:
-            say(f"the flight goes on without this program, at {follower.where()}", "yellow")
+            say_later(f"the flight goes on without this program, at {follower.where()}", "yellow")
             raise
 
 
@@ -85,7 +88,7 @@ class MissionFollower:
                 raise LinkLost(f"nothing heard of the vehicle for {SILENCE:g} s, at {self.where()}")
         if self._problem is not None:
             raise self._problem
-        say("mission complete", "green")
+        say_later("mission complete", "green")
 
     def _name(self, number: int) -> str:
         items = self._plan.items
@@ -104,7 +107,7 @@ class MissionFollower:
                 text = self._texts.add(message)
                 if text:
                     severe = message.severity <= dialect.MAV_SEVERITY_WARNING
-                    say(f"system {inbound.sysid}: {text}", "yellow" if severe else "")
+                    say_later(f"system {inbound.sysid}: {text}", "yellow" if severe else "")
 
     def _beat(self, message: Any) -> None:
         self._heard = asyncio.get_running_loop().time()
@@ -117,14 +120,14 @@ class MissionFollower:
         number, state = message.seq - self._first, message.mission_state
         if state != self._state:
             if state == dialect.MISSION_STATE_PAUSED and self._begun:
-                say(f"paused at {self._name(number)}: it resumes when a station commands it", "yellow")
+                say_later(f"paused at {self._name(number)}: it resumes when a station commands it", "yellow")
             elif state == dialect.MISSION_STATE_ACTIVE and self._state == dialect.MISSION_STATE_PAUSED:
-                say("goes on")
+                say_later("goes on")
             self._state = state
         if number != self._current and 0 <= number < len(self._plan.items):
             self._current = number
             if state in (dialect.MISSION_STATE_ACTIVE, dialect.MISSION_STATE_UNKNOWN):
-                say(f"at {self._name(number)}")
+                say_later(f"at {self._name(number)}")
         if state == dialect.MISSION_STATE_COMPLETE and self._begun:
             self._over = True
 
@@ -132,7 +135,7 @@ class MissionFollower:
         if number in self._reached:
             return
         self._reached.add(number)
-        say(f"done: {self._name(number)}")
+        say_later(f"done: {self._name(number)}")
         # A vehicle without a state of the mission is watched to its last item.
         if self._state == dialect.MISSION_STATE_UNKNOWN and number == len(self._plan.items) - 1:
             self._over = True

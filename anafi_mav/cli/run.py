@@ -20,7 +20,7 @@ from anafi_mav.cli.addresses import Reservations, spot
 from anafi_mav.cli.child import SimulatorProcess
 from anafi_mav.cli.heap_freezer import HeapFreezer, frozen_afterwards
 from anafi_mav.cli.service_manager import ServiceManager
-from anafi_mav.cli.terminal import END_LIMIT, STDOUT_WRITER, complain, complain_later, say, say_later
+from anafi_mav.cli.terminal import complain, complain_later, say, say_later
 from anafi_mav.config import Config, from_mapping, load
 from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import Gateway, state_in_use
@@ -116,7 +116,6 @@ def _serve(arguments: argparse.Namespace) -> int:
     problems = event_loop.run(_run(config, arguments.sim_log.absolute() if arguments.sim_log else None))
     for problem in problems:
         complain_later(f"not kept: {problem}")
-    STDOUT_WRITER.wait(END_LIMIT)
     return 1 if problems else 0
 
 

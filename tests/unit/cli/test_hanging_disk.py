@@ -24,6 +24,8 @@ from anafi_mav.disk_writer import HANGS
 from anafi_mav.gateway import Gateway
 from anafi_mav.state_lock import STATE_WRITER, read_holder, state_folder
 
+MISSIONS = Path(__file__).parents[3] / "missions"
+
 
 async def test_hanging_log_file_stops_neither_a_command_nor_the_end(tmp_path: Path) -> None:
     address = loopback()
@@ -81,8 +83,13 @@ def open_pipe() -> Iterator[tuple[int, int]]:
 
 async def ready(pipe: int) -> None:
     """Read a pipe until the program at its other end is ready."""
+    await read_until(pipe, b"ready")
+
+
+async def read_until(pipe: int, word: bytes) -> None:
+    """Read a pipe until a program has written a word."""
     shown = b""
-    while b"ready" not in shown:
+    while word not in shown:
         shown += await asyncio.wait_for(asyncio.to_thread(os.read, pipe, 4096), 30.0)
 
 
@@ -162,6 +169,19 @@ async def test_stopped_terminal_stops_no_ground_process() -> None:
             assert process.stderr is not None
             assert url.encode() in await asyncio.wait_for(process.stderr.readline(), 30.0)  # no router: its loop runs
             assert await end(process) == 0
+
+
+async def test_stopped_terminal_of_plan_fly_delays_neither_its_heartbeats_nor_ctrl_c() -> None:
+    """The lines about the mission have no room on stdout."""
+    async with world(speed=4.0, web=True) as w:
+        words = ("plan", "fly", str(MISSIONS / "orbit.plan"), "--endpoint", f"tcpout://{w.address}:5760")
+        with open_pipe() as (reading, shown):
+            async with started(*words, stdout=shown) as process:
+                await read_until(reading, b"begun")
+                fill(shown)
+                await w.client.wait("MISSION_ITEM_REACHED", lambda m: m.seq >= 1, since=0, timeout=60.0)
+                process.send_signal(signal.SIGINT)
+                assert await asyncio.wait_for(process.wait(), 15.0) == 130
 
 
 async def test_drones_connect_beside_a_hanging_state_folder() -> None:
