@@ -101,9 +101,7 @@ HOVER_TIME = 2.0
 def state_in_use(folder: Path, holder: Holder) -> ConfigError:
     """Return the error of a gateway whose state folder another one holds."""
     drones = "".join(f", {drone.name} at {drone.address}" for drone in holder.drones)
-    who = (
-        f"the gateway with process id {holder.pid}{drones}," if holder.pid else "a gateway whose lock file was deleted"
-    )
+    who = f"{holder.title}{drones}," if drones else holder.title
     return ConfigError(
         "state",
         f"expected a folder that no other gateway uses, but {who} holds {folder / FILE}; "

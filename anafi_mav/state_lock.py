@@ -93,6 +93,13 @@ class Holder(msgspec.Struct, frozen=True):
     web: str = ""
     """URL of its web server on this computer; empty: none."""
 
+    @property
+    def title(self) -> str:
+        """The gateway as a message names it."""
+        if self.pid == 0:
+            return "a gateway whose lock file was deleted or damaged"
+        return f"the gateway with process id {self.pid}"
+
     def find(self, address: str, interface: str | None = None, serial: str = "") -> HeldDrone | None:
         """Return its drone at this address or with this serial number.
 
@@ -129,9 +136,7 @@ class StateLock:
         file = os.open(self._folder / FILE, os.O_RDWR | os.O_CREAT, 0o644)
         try:
             for attempt in range(TRIES):
-                if try_lock(file):
-                    if not self._lock_folder():
-                        break
+                if try_lock(file) and self._lock_folder():
                     self._file, file = file, -1
                     self.write(())
                     return None
@@ -144,19 +149,11 @@ class StateLock:
 
     def _lock_folder(self) -> bool:
         """Lock the folder itself; False when another gateway has it, whose lock file was deleted."""
-        if os.name != "posix":
-            return True
-        folder = os.open(self._folder, os.O_RDONLY)
         try:
-            if not try_lock(folder):
-                return False
-            self._own, folder = folder, -1
-        except OSError:  # a file system on which folders cannot be locked
+            self._own = _try_lock_folder(self._folder)
+        except OSError:
             return True
-        finally:
-            if folder >= 0:
-                os.close(folder)
-        return True
+        return self._own is not None
 
     def write(self, drones: Iterable[HeldDrone], web: str = "") -> None:
         """Replace what the file says. A full disk is no reason to end a flight."""
@@ -200,15 +197,45 @@ def find_holder(folder: Path) -> Holder | None:
     try:
         file = _open_lock(folder / FILE)
     except (FileNotFoundError, NotADirectoryError):
-        return None
+        return _holder_without_file(folder)
     try:
-        return None if try_lock(file) else _read(file)
+        return _holder_without_file(folder) if try_lock(file) else _read(file)
     except OSError as error:
         if error.errno in NO_LOCKS:
             return None
         raise
     finally:
         os.close(file)  # which unlocks it
+
+
+def _holder_without_file(folder: Path) -> Holder | None:
+    """Return the gateway that holds the folder itself, after its lock file was deleted; None where none does."""
+    try:
+        own = _try_lock_folder(folder)
+    except OSError:
+        return None
+    if own is None:
+        return Holder(VERSION, 0)
+    os.close(own)
+    return None
+
+
+def _try_lock_folder(folder: Path) -> int | None:
+    """Open and lock a folder itself; None when another holds it.
+
+    Raises `OSError` for an absent one, and where folders cannot be locked.
+    """
+    if os.name != "posix":
+        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
+    own = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        if not try_lock(own):
+            os.close(own)
+            return None
+    except OSError:
+        os.close(own)
+        raise
+    return own
 
 
 def _open_lock(path: Path) -> int:

@@ -36,7 +36,7 @@ class Held(NamedTuple):
 
     def __str__(self) -> str:
         doing = f"connected to {self.drone.serial}" if self.drone.serial else "not connected, trying"
-        return f"the gateway with process id {self.holder.pid} holds it as {self.drone.name} ({doing})"
+        return f"{self.holder.title} holds it as {self.drone.name} ({doing})"
 
 
 def holder_of(state: str | None) -> Holder | None:
@@ -53,8 +53,13 @@ def holder_of(state: str | None) -> Holder | None:
 
 
 def gateway_of(state: str | None, address: str, interface: str | None, serial: str = "") -> Held | None:
-    """Return the gateway of a state folder that has the drone with this address or serial."""
+    """Return the gateway of a state folder that has the drone with this address or serial.
+
+    Raises `ConfigError` where it cannot be known which drones the gateway has.
+    """
     holder = holder_of(state)
+    if holder is not None and holder.pid == 0:
+        raise ConfigError("--state", f"{holder.title} runs here, and its drones are not known; end it first")
     drone = None if holder is None else holder.find(address, interface, serial)
     return None if holder is None or drone is None else Held(holder, drone)
 

@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
             say(_signing(folder, name, present).content()[:KEY_BYTES].hex())
             return 0
         if present is not None and (holder := read_holder(state)) is not None:
-            problem = f"a gateway with process id {holder.pid} has this key in use and writes its file; end it first"
+            problem = f"{holder.title} has this key in use and writes its file; end it first"
             raise ConfigError("NAME", problem)
         if arguments.undo:
             _undo(folder, name, _signing(folder, name, present))

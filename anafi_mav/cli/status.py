@@ -102,7 +102,7 @@ def find(state: str | None, url: str | None, token: str | None = None) -> AskedG
     if holder is None:
         raise ConfigError("--state", f"expected the folder of a running gateway; no gateway holds {folder}")
     if not holder.web:
-        raise ConfigError("--state", f"expected a gateway with a web server; that of process {holder.pid} has none")
+        raise ConfigError("--state", f"expected a gateway with a web server; {holder.title} names none")
     return AskedGateway(holder.web, given or read_token(folder))
 
 

@@ -18,6 +18,8 @@ import pytest
 from anafi_mav.cli import main
 from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import state_in_use
+from anafi_mav.mavlink.key_ring import folder_of, write_key
+from anafi_mav.mavlink.signing import CONTENT_BYTES
 from anafi_mav.state_lock import FILE, HeldDrone, Holder, StateLock, read_holder, state_folder
 
 ALPHA = HeldDrone("alpha", "192.168.42.1", "wlan1", "PI040416DA9H839157")
@@ -111,14 +113,33 @@ def test_state_folder_that_cannot_be_read_is_an_error_of_the_option(
 
 
 @pytest.mark.skipif(os.name != "posix", reason="Windows deletes no open file")
+@pytest.mark.parametrize("words", [["info", "127.0.0.1", "--take"], ["doctor", "127.0.0.1", "--take"], ["keygen", "k"]])
+def test_gateway_whose_lock_file_was_deleted_keeps_its_drones_and_keys(
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A handshake would take a drone from it in the air."""
+    write_key(folder_of(tmp_path), "k", bytes(range(CONTENT_BYTES)))
+    lock = StateLock(tmp_path)
+    assert lock.acquire() is None
+    (tmp_path / FILE).unlink()
+    assert main([*words, "--state", str(tmp_path)]) == 2
+    assert "a gateway whose lock file was deleted or damaged " in capsys.readouterr().err
+    lock.release()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Windows deletes no open file")
 def test_state_lock_whose_file_was_deleted_is_still_held(tmp_path: Path) -> None:
     first, second = StateLock(tmp_path), StateLock(tmp_path)
     assert first.acquire() is None
     (tmp_path / FILE).unlink()  # by a person who takes it for a leftover
     holder = second.acquire()
     assert holder == Holder(1, 0)
-    assert "a gateway whose lock file was deleted holds " in str(state_in_use(tmp_path, holder))
+    assert "a gateway whose lock file was deleted or damaged holds " in str(state_in_use(tmp_path, holder))
+    assert read_holder(tmp_path) == Holder(1, 0)  # there is a file again, which nothing locks
+    (tmp_path / FILE).unlink()
+    assert read_holder(tmp_path) == Holder(1, 0)
     first.release()
+    assert read_holder(tmp_path) is None
     assert second.acquire() is None
     second.release()
 
