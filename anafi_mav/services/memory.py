@@ -2,7 +2,7 @@
 
 A file holds the plans of a drone and the gateway's own settings for it. It is replaced as a whole, never half: a
 reader finds the old or the new one. A file that cannot be read is moved to another name and reported in one line;
-nothing of it is lost, and the drone starts without stored data.
+nothing of it is lost, and the drone starts without stored data. One that cannot be moved is not replaced.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ MAX_BYTES = 4 * 1024 * 1024
 """Of a file: three full lists take 1.5 MB."""
 
 MAX_ASIDE = 100
-"""Unreadable files of one drone that are kept."""
+"""Unreadable files of one drone that are moved to another name."""
 
 LARGEST = 10**18
 """Largest whole number in settings, either way: JSON has no bound, and floats take none of more than 308 digits."""
@@ -131,7 +131,10 @@ def _read_file(path: Path, serial: str) -> _Stored:
     except OSError as error:
         return _Stored(problem=texts.MEMORY_UNREADABLE.fill(path=path, error=error.strerror), is_unreadable=True)
     except (ValueError, RecursionError) as error:
-        return _Stored(problem=texts.MEMORY_INVALID.fill(path=path, error=error, aside=_put_aside(path)))
+        aside = _put_aside(path)
+        if aside is None:
+            return _Stored(problem=texts.MEMORY_UNREADABLE.fill(path=path, error=error), is_unreadable=True)
+        return _Stored(problem=texts.MEMORY_INVALID.fill(path=path, error=error, aside=aside))
     return _Stored({kind: tuple(map(_loaded, items)) for kind, items in content.plans.items()}, content.settings)
 
 
@@ -144,16 +147,17 @@ def _fits(value: Any) -> bool:
     return not isinstance(value, int) or abs(value) <= LARGEST
 
 
-def _put_aside(path: Path) -> str:
+def _put_aside(path: Path) -> str | None:
+    """Rename an unreadable file; return its new name, or None if it keeps its name."""
     for number in range(1, MAX_ASIDE + 1):
         aside = path.with_suffix(f".unreadable-{number}")
         if not aside.exists():
             try:
                 path.rename(aside)
-            except OSError as error:
-                return f"nothing, for {error.strerror}"
+            except OSError:
+                return None
             return aside.name
-    return "nothing, for there are too many of them"
+    return None
 
 
 class Memory:

@@ -12,7 +12,7 @@ import pytest
 from support.hanging_disk import PATIENCE, hanging
 
 from anafi_mav import mav_enums
-from anafi_mav.services.memory import MAX_BYTES, Memory
+from anafi_mav.services.memory import MAX_ASIDE, MAX_BYTES, Memory
 from anafi_mav.state_lock import STATE_WRITER, state_folder
 from anafi_mav.vehicle.fence.plan_items import PlanItem, opaque_id
 
@@ -211,6 +211,20 @@ async def test_a_bad_file_is_one_line_and_is_kept(tmp_path: Path, data: bytes) -
         assert await memory.save() is None
         assert (tmp_path / f"{SERIAL}.unreadable-{number}").read_bytes() == data
     assert await Memory(tmp_path).load(SERIAL) is None
+
+
+async def test_bad_file_that_cannot_be_put_aside_is_not_replaced(tmp_path: Path) -> None:
+    file = tmp_path / f"{SERIAL}.json"
+    file.write_bytes(b"{")
+    for number in range(1, MAX_ASIDE + 1):
+        file.with_suffix(f".unreadable-{number}").write_bytes(b"[")
+    memory = Memory(tmp_path)
+    line = await memory.load(SERIAL)
+    assert line is not None
+    assert line.endswith("no plans, new ones not kept")
+    memory.put(1, ITEMS)
+    assert await memory.save() == line
+    assert file.read_bytes() == b"{"
 
 
 async def test_the_good_one_is_good(tmp_path: Path) -> None:
