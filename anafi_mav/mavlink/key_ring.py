@@ -67,8 +67,8 @@ class KeyRing:
 
         A program beside the gateway then uses its key with the clock's timestamps.
         """
-        self.problem = ""
-        """Why timestamps or a key could not be saved; empty while they can."""
+        self._problems: dict[str, str] = {}
+        """Why the newest timestamp of a key could not be saved, by the key's name; empty while they can."""
         self._folder = folder
         self._saves = saves
         self._clock = clock
@@ -79,6 +79,14 @@ class KeyRing:
         """Keys that are being replaced: their timestamps are not saved meanwhile."""
         self._reported: dict[str, Counter[str]] = {}
         self._report_at = 0.0
+
+    @property
+    def problem(self) -> str:
+        """Why timestamps could not be saved; empty while they can."""
+        names: dict[str, list[str]] = {}
+        for name, reason in self._problems.items():
+            names.setdefault(reason, []).append(name)
+        return "; ".join(_problem(keys, reason) for reason, keys in names.items())
 
     def open(self, name: str, *, is_required: bool) -> Signing | None:
         """Return the key with this name, off if there is no such key.
@@ -133,7 +141,8 @@ class KeyRing:
         if not done:
             saving.cancel()
             await asyncio.wait([saving])  # what has not begun is not written later
-            self._warn(", ".join(signing.name for signing in keys), HANGS)
+            for signing in keys:
+                self._warn(signing.name, HANGS)
 
     async def _save_last(self, keys: list[Signing], saving: asyncio.Task[None] | None) -> None:
         if saving is not None:
@@ -229,14 +238,13 @@ class KeyRing:
             raise
         else:
             signing.saved, signing.is_kept = max(timestamp, signing.saved), True
-            self.problem = ""
+            self._problems.pop(signing.name, None)
 
-    def _warn(self, names: str, reason: str) -> None:
-        """Note and log that timestamps could not be saved."""
-        problem = f"key {names}: {reason}; old frames may be accepted after a restart"
-        if problem != self.problem:
-            logger.warning("%s", problem)
-        self.problem = problem
+    def _warn(self, name: str, reason: str) -> None:
+        """Note and log that a key's timestamp could not be saved."""
+        if self._problems.get(name) != reason:
+            logger.warning("%s", _problem([name], reason))
+        self._problems[name] = reason
 
     def _report(self) -> None:
         """Write how many frames were refused since the last line."""
@@ -250,6 +258,10 @@ class KeyRing:
                 logger.warning("key %s: frames refused: %s; newest on %s", signing.name, kinds, signing.last_refused)
                 self._reported[signing.name] = signing.refused.copy()
                 self._report_at = now + REPORT_EVERY
+
+
+def _problem(names: list[str], reason: str) -> str:
+    return f"key {', '.join(names)}: {reason}; old frames may be accepted after a restart"
 
 
 def folder_of(state: Path) -> Path:

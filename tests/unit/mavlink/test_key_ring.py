@@ -44,7 +44,11 @@ def opened(one: KeyRing, name: str = "field") -> Signing:
 
 
 def saved(folder: Path) -> int:
-    return int.from_bytes((read_key(folder, "field") or b"")[32:], "little")
+    return saved_of(folder, "field")
+
+
+def saved_of(folder: Path, name: str) -> int:
+    return int.from_bytes((read_key(folder, name) or b"")[32:], "little")
 
 
 async def until(ready: Callable[[], bool]) -> None:
@@ -152,6 +156,21 @@ async def test_key_that_cannot_be_written_stays_in_use(folder: Path) -> None:
         )
     assert signing.is_key(SECRET)
     await one.close()
+
+
+async def test_problem_of_one_key_stays_while_another_key_is_saved(folder: Path) -> None:
+    """A folder in the place of its file stands for one that this user may not write."""
+    write_key(folder, "other", CONTENT)
+    one = ring(folder)
+    for name in ("field", "other"):
+        opened(one, name)
+    path_of(folder, "field").unlink()
+    path_of(folder, "field").mkdir()
+    await one.start()
+    assert saved_of(folder, "other") > 0
+    assert one.problem.startswith("key field: ")
+    await one.close()
+    assert one.problem.startswith("key field: ")
 
 
 async def test_timestamp_that_cannot_be_saved_is_a_problem(folder: Path, caplog: pytest.LogCaptureFixture) -> None:
