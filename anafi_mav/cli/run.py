@@ -15,7 +15,7 @@ from typing import Any
 
 import msgspec
 
-from anafi_mav.cli import event_loop, interrupts, log, run_check, start_warnings
+from anafi_mav.cli import event_loop, interrupts, log, open_files, run_check, start_warnings
 from anafi_mav.cli.addresses import Reservations, spot
 from anafi_mav.cli.child import SimulatorProcess
 from anafi_mav.cli.heap_freezer import HeapFreezer, frozen_afterwards
@@ -76,6 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
         log.set_up(level, kind=arguments.log_format)
         return _check(arguments)
     log.set_up(level, path=arguments.log_file, kind=arguments.log_format)
+    open_files.allow_many()
     try:
         return _serve(arguments)
     except ConfigError as error:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import msgspec
 
-from anafi_mav.cli import interrupts, log, options
+from anafi_mav.cli import interrupts, log, open_files, options
 from anafi_mav.cli.options import integer, number
 from anafi_mav.cli.scenarios import load as load_scenario
 from anafi_mav.cli.terminal import say
@@ -98,6 +98,7 @@ def _add_validate_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Simulate until SIGINT or SIGTERM. Raises `ConfigError` before anything is started."""
     log.set_up()
+    open_files.allow_many()
     if arguments.action == "validate":
         from anafi_mav.cli import sim_validate  # which loads the drone's side too
 

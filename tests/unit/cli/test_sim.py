@@ -118,6 +118,25 @@ async def test_three_drones_in_one_process() -> None:
         assert len({device["name"] for device in devices}) == 3
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such limit")
+async def test_fleet_that_needs_more_open_files_than_a_shell_allows_is_ready() -> None:
+    """Each drone has four sockets, and a shell usually allows 1024 files."""
+    words = (sys.executable, "-m", "anafi_mav", "sim", "--address", loopback(), "--count", "20")
+    process = await asyncio.create_subprocess_exec(
+        *("sh", "-c", 'ulimit -Sn 64 && exec "$@"', "sh", *words),
+        *("--http-port", "8080", "--rtsp-port", "8554"),
+        stdout=asyncio.subprocess.PIPE,
+    )
+    assert process.stdout is not None
+    try:
+        lines = [await asyncio.wait_for(process.stdout.readline(), LIMIT) for _ in range(21)]
+        assert lines[-1].startswith(b"ready")
+        assert sum(b"HTTP 8080, RTSP 8554" in line for line in lines) == 20
+    finally:
+        process.terminate()
+        await asyncio.wait_for(process.wait(), LIMIT)
+
+
 async def test_fleet_from_stdin_ends_with_stdin() -> None:
     network = loopback().rpartition(".")[0]
     drones = [
