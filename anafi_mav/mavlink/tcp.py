@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import logging
+import os
 import re
 import socket
 from collections.abc import Callable
@@ -105,6 +107,8 @@ class TcpIn(Listener):
     async def open(self) -> None:
         loop = asyncio.get_running_loop()
         self._server = await loop.create_server(lambda: _Client(self), self.parsed.place, self.parsed.number)
+        if not self._server.sockets:  # asyncio passes over a kind of addresses that the system does not have
+            raise OSError(errno.EAFNOSUPPORT, os.strerror(errno.EAFNOSUPPORT))
         self._start_sweep()
 
     async def close(self) -> None:

@@ -575,6 +575,20 @@ async def test_broadcast_address_is_refused_with_a_reason() -> None:
     assert caught.value.problem.endswith("Permission denied: expected the address of one station, not of a broadcast")
 
 
+async def test_listening_on_a_kind_of_address_that_the_system_lacks_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As with ipv6.disable=1 of Linux: asyncio would make a server without a socket."""
+    make = socket.socket
+
+    def without_ipv6(family: int = -1, *more: int) -> socket.socket:
+        if family == socket.AF_INET6:
+            raise OSError(errno.EAFNOSUPPORT, os.strerror(errno.EAFNOSUPPORT))
+        return make(family, *more)
+
+    monkeypatch.setattr(socket, "socket", without_ipv6)
+    with pytest.raises(ConfigError, match="cannot open tcpin://\\[::1\\]:5760: Address family not supported"):
+        await Node().start(["tcpin://[::1]:5760"])
+
+
 async def test_closing_ends_every_connection_and_frees_the_port() -> None:
     host = loopback()
     async with bench(f"tcpin://{host}:5760") as d:
