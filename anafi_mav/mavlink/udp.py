@@ -46,6 +46,11 @@ PAUSE = 0.005
 whatever is in it, and telemetry may take 20 ms."""
 
 
+EVERYBODY = "255.255.255.255"
+"""The broadcast address of every network. Without a network the kernel does not refuse it yet."""
+
+_ONE_STATION = "expected the address of one station, not of a broadcast"
+
 HOLDS = 5.0
 """s without an error after which a socket that was opened again counts as working. The kernel looks for a computer that
 is switched off for 3 s (Linux net.ipv4.neigh), and reports it then."""
@@ -77,6 +82,14 @@ def _is_address(place: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def _explained(error: Exception) -> str:
+    """Return the reason of a network error; that of a broadcast address with what is expected instead.
+
+    With a network the kernel refuses to connect to one.
+    """
+    return reason(error) + (f": {_ONE_STATION}" if isinstance(error, PermissionError) else "")
 
 
 class _Datagrams(asyncio.DatagramProtocol):
@@ -155,10 +168,10 @@ class UdpOut(Endpoint):
             await self._connect()
         except socket.gaierror:  # no such host
             raise
-        except PermissionError as error:
-            raise OSError(f"{reason(error)}: expected the address of one station, not of a broadcast") from error
-        except OSError as error:  # no network yet
-            self._reopen(error)
+        except OSError as error:
+            if isinstance(error, PermissionError) or self.parsed.place == EVERYBODY:
+                raise OSError(f"{reason(error)}: {_ONE_STATION}") from error
+            self._reopen(error)  # no network yet
         self._sink.opened(self.channel)
 
     async def close(self) -> None:
@@ -212,7 +225,7 @@ class UdpOut(Endpoint):
             self._reopen(error)
 
     def _reopen(self, error: Exception) -> None:
-        self._problem = reason(error)
+        self._problem = _explained(error)
         if self._problem != self._reported:
             logger.warning("%s: %s", self.url, self._problem)
         self._reported = self._problem
@@ -230,7 +243,7 @@ class UdpOut(Endpoint):
             try:
                 await self._connect()
             except OSError as error:
-                self._problem = reason(error)
+                self._problem = _explained(error)
                 continue
             try:
                 await asyncio.wait_for(self._broken.wait(), HOLDS)

@@ -575,6 +575,30 @@ async def test_broadcast_address_is_refused_with_a_reason() -> None:
     assert caught.value.problem.endswith("Permission denied: expected the address of one station, not of a broadcast")
 
 
+async def test_broadcast_address_is_refused_before_there_is_a_network(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As at boot: the kernel does not report the mistake then, and a start would wait for the network in vain."""
+
+    async def fail(*_: object, **__: object) -> None:
+        raise OSError(errno.ENETUNREACH, os.strerror(errno.ENETUNREACH))
+
+    monkeypatch.setattr(asyncio.get_running_loop(), "create_datagram_endpoint", fail)
+    with pytest.raises(ConfigError, match="Network is unreachable: expected the address of one station"):
+        await Node().start(["udpout://255.255.255.255:14550"])
+
+
+async def test_broadcast_address_of_a_network_that_comes_later_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    errors = iter([OSError(errno.ENETUNREACH, "unreachable")])
+
+    async def fail(*_: object, **__: object) -> None:
+        raise next(errors, PermissionError(errno.EACCES, "denied"))
+
+    monkeypatch.setattr(asyncio.get_running_loop(), "create_datagram_endpoint", fail)
+    async with bench("udpout://192.0.2.255:14550") as d:
+        (endpoint,) = d.node.endpoints
+        assert "Network is unreachable, retrying" in endpoint.describe()
+        await d.until(lambda: "expected the address of one station" in endpoint.describe())
+
+
 async def test_listening_on_a_kind_of_address_that_the_system_lacks_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """As with ipv6.disable=1 of Linux: asyncio would make a server without a socket."""
     make = socket.socket
