@@ -81,6 +81,9 @@ class FabricGround:
             for option in url.options.changed():
                 if option not in allowed:
                     raise ConfigError(key, f"{url.text}: expected no {option}: the gateway's endpoint has it")
+        for number, url in enumerate(stations):
+            if url.text in (other.text for other in stations[:number]):
+                raise ConfigError("--endpoint", f"expected an endpoint of its own, {url.text} is given twice")
         try:
             self.endpoints = [make_endpoint(url, self, clock) for url in stations]
             """For stations."""

@@ -22,3 +22,11 @@ def test_fabric_as_endpoint_for_stations_is_refused(capsys: pytest.CaptureFixtur
     assert main(["ground", "--zenoh", url, "--endpoint", url]) == 2
     expected = f"anafi-mav: --endpoint: {url}: expected another scheme: zenoh:// is for run, and --zenoh of ground"
     assert capsys.readouterr().err.strip() == expected
+
+
+def test_endpoint_that_is_given_twice_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    """Its station would get each message twice, and each of its commands would be published twice."""
+    url = "udpout://127.0.0.1:14550"
+    assert main(["ground", "--zenoh", f"zenoh://127.0.0.1:{free_port()}", *2 * ("--endpoint", url)]) == 2
+    expected = f"anafi-mav: --endpoint: expected an endpoint of its own, {url} is given twice"
+    assert capsys.readouterr().err.strip() == expected
