@@ -256,6 +256,11 @@ def _read(file: int) -> Holder:
     return Holder(VERSION, 0)
 
 
+def is_root() -> bool:
+    """True when this process may write files for other users, as with sudo."""
+    return os.name == "posix" and os.geteuid() == 0
+
+
 def check_folder(folder: Path, *names: str) -> None:
     """Raise `OSError` unless files can be made in a folder.
 
@@ -279,12 +284,16 @@ def check_folder(folder: Path, *names: str) -> None:
 def replace_file(path: Path, data: bytes) -> None:
     """Replace a file of the state folder, so that it survives a power cut at any moment.
 
-    Only this user can read it. Raises `OSError`.
+    Only this user can read it. One that root writes belongs to the owner of its folder, as that of a service: root may
+    make a key for it. Raises `OSError`.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
+            if is_root():
+                owner = path.parent.stat()
+                os.fchown(file.fileno(), owner.st_uid, owner.st_gid)
             file.write(data)
             file.flush()
             os.fsync(file.fileno())

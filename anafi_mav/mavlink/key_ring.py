@@ -26,7 +26,7 @@ from anafi_mav.documents import open_file
 from anafi_mav.endpoint_options import KEY_NAME
 from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink.signing import CONTENT_BYTES, KEY_BYTES, Signing
-from anafi_mav.state_lock import STATE_WRITER, replace_file
+from anafi_mav.state_lock import STATE_WRITER, is_root, replace_file
 
 logger = logging.getLogger(__name__)
 
@@ -303,8 +303,15 @@ def has_key(folder: Path, name: str) -> bool:
 
 
 def write_key(folder: Path, name: str, content: bytes, suffix: str = SUFFIX) -> None:
-    """Replace a key file, and make the folder if it is absent. Raises `OSError`."""
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    """Replace a key file, and make the folder if it is absent.
+
+    What root makes belongs to the owner of the state folder. Raises `OSError`.
+    """
+    if not folder.exists():
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if is_root():
+            owner = folder.parent.stat()
+            os.chown(folder, owner.st_uid, owner.st_gid, follow_symlinks=False)
     replace_file(path_of(folder, name, suffix), content)
 
 
