@@ -261,6 +261,15 @@ def is_root() -> bool:
     return os.name == "posix" and os.geteuid() == 0
 
 
+def give_to_owner_of(folder: Path, file: int) -> None:
+    """Give an open file, which root has just made in a folder, to the owner of the folder.
+
+    Not by its name: the owner may have put another file there meanwhile.
+    """
+    owner = folder.stat()
+    os.fchown(file, owner.st_uid, owner.st_gid)
+
+
 def check_folder(folder: Path, *names: str) -> None:
     """Raise `OSError` unless files can be made in a folder.
 
@@ -292,8 +301,7 @@ def replace_file(path: Path, data: bytes) -> None:
     try:
         with os.fdopen(handle, "wb") as file:
             if is_root():
-                owner = path.parent.stat()
-                os.fchown(file.fileno(), owner.st_uid, owner.st_gid)
+                give_to_owner_of(path.parent, file.fileno())
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
