@@ -188,7 +188,13 @@ class SessionFolder:
 
 
 def parts_of(folder: Path) -> Iterator[Path]:
-    """Yield the parts of all sessions in a folder, oldest first."""
+    """Yield the parts of all sessions in a folder, oldest first.
+
+    Without those of a session that this user may not read: another user's, as of a gateway that root has started.
+    """
     for session in sorted(path for path in folder.iterdir() if SESSION.fullmatch(path.name) and path.is_dir()):
-        own = [part for part in session.iterdir() if PART.fullmatch(part.name) and part.is_file()]
+        try:
+            own = [part for part in session.iterdir() if PART.fullmatch(part.name) and part.is_file()]
+        except PermissionError:
+            continue
         yield from sorted(own, key=lambda part: (part.stat().st_mtime, part.name))

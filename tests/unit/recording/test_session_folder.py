@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -93,6 +95,24 @@ async def test_session_of_a_computer_with_a_late_clock_stays(tmp_path: Path) -> 
     session = await written(tmp_path, 900, 900, 900, max_bytes=16_000)
     assert len(sizes(session)) == 3
     assert sum(part.stat().st_size for part in parts_of(tmp_path)) <= 16_000
+
+
+async def test_session_of_another_user_is_no_reason_to_record_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As of a gateway that root has started once: its folder is root's."""
+    foreign, listing = tmp_path / "20260101T120000Z", Path.iterdir
+    foreign.mkdir()
+
+    def listed(path: Path) -> Iterator[Path]:
+        if path == foreign:
+            raise PermissionError(errno.EACCES, "Permission denied")
+        return listing(path)
+
+    monkeypatch.setattr(Path, "iterdir", listed)
+    session = await written(tmp_path, 600)
+    assert session.problem == ""
+    assert sizes(session) == {"gateway.0001.tlog": 600}
 
 
 async def test_full_disk_is_a_problem_and_no_error(tmp_path: Path) -> None:
