@@ -67,7 +67,7 @@ class Child:
             self._send_all()
 
     def _readable(self, timeout: float | None) -> bool:
-        return bool(select.select([self._pipe], [], [], timeout)[0])
+        return bool(_ready({self._pipe: select.POLLIN}, timeout))
 
     def _read(self) -> bool:
         """Take the records that have arrived. False: the pipe has ended."""
@@ -121,7 +121,7 @@ class Child:
             try:
                 frame = frame[self._link.send(frame) :]
             except BlockingIOError:
-                select.select([], [self._link], [], left)
+                _ready({self._link.fileno(): select.POLLOUT}, left)
             except OSError:
                 return False
         return not frame
@@ -134,7 +134,7 @@ class Child:
                 next_sending = now + REPEAT
                 with contextlib.suppress(OSError):
                     self._link.send(frame)
-            readable = select.select([link, self._pipe], [], [], max(next_sending - now, 0.0))[0]
+            readable = _ready({link: select.POLLIN, self._pipe: select.POLLIN}, max(next_sending - now, 0.0))
             if self._pipe in readable and self._read():
                 return False
             if link in readable and self._acknowledged(seq):
@@ -153,6 +153,17 @@ class Child:
             type == FrameType.ACK and id >= ACK_OFFSET and int.from_bytes(payload[:width], "little") == seq
             for type, id, _, payload in decode_frames(self._version, data)[0]
         )
+
+
+def _ready(events: dict[int, int], timeout: float | None) -> set[int]:
+    """Return the descriptors that are ready, or have ended, after `timeout` s at most; None: after any time.
+
+    Descriptors keep the gateway's numbers, which select(2) does not know from 1024 on.
+    """
+    poll = select.poll()
+    for descriptor, event in events.items():
+        poll.register(descriptor, event)
+    return {descriptor for descriptor, _ in poll.poll(None if timeout is None else timeout * 1000.0)}
 
 
 def _frames(data: bytes) -> list[tuple[int, bytes]]:
