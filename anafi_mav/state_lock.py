@@ -209,7 +209,10 @@ def find_holder(folder: Path) -> Holder | None:
 
 
 def _holder_without_file(folder: Path) -> Holder | None:
-    """Return the gateway that holds the folder itself, after its lock file was deleted; None where none does."""
+    """Return the gateway that holds the folder itself, whose lock file was deleted.
+
+    None where none does.
+    """
     try:
         own = _try_lock_folder(folder)
     except OSError:
@@ -227,7 +230,7 @@ def _try_lock_folder(folder: Path) -> int | None:
     """
     if os.name != "posix":
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
-    own = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    own = os.open(folder, os.O_RDONLY)
     try:
         if not try_lock(own):
             os.close(own)
@@ -256,18 +259,14 @@ def _read(file: int) -> Holder:
     return Holder(VERSION, 0)
 
 
-def is_root() -> bool:
-    """True when this process may write files for other users, as with sudo."""
-    return os.name == "posix" and os.geteuid() == 0
-
-
 def give_to_owner_of(folder: Path, file: int) -> None:
-    """Give an open file, which root has just made in a folder, to the owner of the folder.
+    """Give an open file that root has just made in a folder to the owner of the folder.
 
-    Not by its name: the owner may have put another file there meanwhile.
+    Not by its name: the owner may have put another file there meanwhile. What another user makes stays that user's.
     """
-    owner = folder.stat()
-    os.fchown(file, owner.st_uid, owner.st_gid)
+    if os.name == "posix" and os.geteuid() == 0:
+        owner = folder.stat()
+        os.fchown(file, owner.st_uid, owner.st_gid)
 
 
 def check_folder(folder: Path, *names: str) -> None:
@@ -300,8 +299,7 @@ def replace_file(path: Path, data: bytes) -> None:
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
-            if is_root():
-                give_to_owner_of(path.parent, file.fileno())
+            give_to_owner_of(path.parent, file.fileno())
             file.write(data)
             file.flush()
             os.fsync(file.fileno())

@@ -1,4 +1,7 @@
-"""Limit of open files and sockets: a fleet needs more than the 1024 that a shell usually allows."""
+"""Limit of open files and sockets.
+
+A fleet needs more than the 1024 that a shell usually allows.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,10 @@ else:
     import resource
 
     def allow_many() -> None:
-        """Raise the soft limit of this process and its children as far as its hard limit allows (setrlimit(2))."""
+        """Raise the soft limit of this process as far as its hard limit allows.
+
+        Its children inherit that (setrlimit(2)).
+        """
         soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
         limit = ENOUGH if hard == resource.RLIM_INFINITY else min(hard, ENOUGH)
         if soft != resource.RLIM_INFINITY and soft < limit:

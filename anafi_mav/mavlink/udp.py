@@ -85,9 +85,9 @@ def _is_address(place: str) -> bool:
 
 
 def _explained(error: Exception) -> str:
-    """Return the reason of a network error; that of a broadcast address with what is expected instead.
+    """Return the reason of a network error.
 
-    With a network the kernel refuses to connect to one.
+    That of a broadcast address, to which the kernel refuses to connect, says what is expected instead.
     """
     return reason(error) + (f": {_ONE_STATION}" if isinstance(error, PermissionError) else "")
 

@@ -156,9 +156,9 @@ class Child:
 
 
 def _ready(events: dict[int, int], timeout: float | None) -> set[int]:
-    """Return the descriptors that are ready, or have ended, after `timeout` s at most; None: after any time.
+    """Return the descriptors that are ready, or have ended, after `timeout` s at most.
 
-    Descriptors keep the gateway's numbers, which select(2) does not know from 1024 on.
+    None: after any time. Descriptors keep the gateway's numbers, which select(2) does not know from 1024 on.
     """
     poll = select.poll()
     for descriptor, event in events.items():
