@@ -320,7 +320,8 @@ def settings(drone: Drone) -> Iterator[Finding]:
     if not blockers:
         fence = f"{distance.current:g} m" if state.geofence and distance is not None else "off"
         top = "not reported" if ceiling is None else f"{ceiling.current:g} m"
-        yield ok("settings", f"take-off is possible, highest altitude {top}, geofence {fence}")
+        takeoff = "take-off is possible" if drone.alerts.state.checklist else "no reason against a take-off reported"
+        yield ok("settings", f"{takeoff}, highest altitude {top}, geofence {fence}")
 
 
 def failsafes(drone: Drone) -> Iterator[Finding]:

@@ -108,6 +108,7 @@ def _facts(drone: Drone) -> dict[str, Any]:
         "flights": product.flights,
         "flown_s": product.total_flight_s,
         "takeoff_blockers": drone.takeoff_blockers(),
+        "takeoff_checklist": bool(drone.alerts.state.checklist),
         "controller": {
             "serial": controller.serial,
             "firmware": controller.firmware,
@@ -135,7 +136,10 @@ def _lines(facts: Mapping[str, Any]) -> Iterator[str]:
     if facts["flights"] is not None and facts["flown_s"] is not None:
         yield f"flown: {facts['flights']} times, {facts['flown_s'] / 3600.0:.1f} h"
     blockers = facts["takeoff_blockers"]
-    yield f"take-off: {'refused: ' + ', '.join(blockers) if blockers else 'possible'}"
+    if blockers:
+        yield f"take-off: refused: {', '.join(blockers)}"
+    else:  # without the drone's own list nothing is known of most reasons
+        yield f"take-off: {'possible' if facts['takeoff_checklist'] else 'no reason against it reported'}"
     if (controller := facts["controller"]) is not None:
         percent = controller["battery_percent"]
         charge = "charging or not reported" if percent is None else f"{percent} %"

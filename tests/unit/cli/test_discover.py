@@ -22,7 +22,7 @@ from anafi_mav.arsdk.link.handshake import DeviceInfo
 from anafi_mav.cli.discover import Find, SearchAddress, configuration, places
 from anafi_mav.config import from_text
 from anafi_mav.errors import LinkLost
-from anafi_mav.sim import DroneSpec, Simulator
+from anafi_mav.sim import DroneSpec, Simulator, states
 
 
 @contextlib.asynccontextmanager
@@ -125,6 +125,18 @@ def test_unusual_device_name_makes_valid_configuration(name: str) -> None:
     lines = configuration([Find(SearchAddress("192.168.42.1"), device)])
     (drone,) = from_text("\n".join(lines), "lines").drones
     assert drone.address == "192.168.42.1"
+
+
+async def test_info_of_a_drone_without_a_takeoff_checklist_promises_no_takeoff(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is known then of most reasons: the drone may refuse."""
+    monkeypatch.setattr(states, "checklist", lambda blockers: [])
+    async with Simulator([spec("4k")], seed=1) as simulator:
+        async with words("info", simulator.drones[0].address, "--take") as held:
+            assert await held.end() == 0, str(held)
+        async with words("doctor", simulator.drones[0].address, "--take") as doctor:
+            await doctor.end()
+    assert "take-off: no reason against it reported" in held.lines
+    assert any("settings: ok: no reason against a take-off reported" in line for line in doctor.lines), str(doctor)
 
 
 async def test_info_prints_the_drone() -> None:
