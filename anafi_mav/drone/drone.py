@@ -523,7 +523,8 @@ class Drone:
         state = self.controller.state
         self._model = _model(state.drone_model or 0)
         self._announced_serial, self._announced_name = state.drone_serial or "", state.drone_name or ""
-        self._check_serial(self._announced_serial)
+        if self._announced_serial:  # else the drone's own settings have it
+            self._check_serial(self._announced_serial)
 
     def _controller_says(self, message: Message, now: float) -> None:
         """End the connection when the Skycontroller has lost its drone, or has another one."""
