@@ -103,7 +103,7 @@ async def test_aircraft_behind_a_skycontroller_that_names_no_serial_is_known_by_
 
     monkeypatch.setattr(Skycontroller, "_connection", connection)
     address = loopback()
-    async with gateway_of(address) as (gateway, client):
+    async with gateway_of(address) as (_, client):
         async with aircraft(address, OTHER, 3):
             await client.wait("STATUSTEXT", lambda m: m.text == f"Not connected: drone has serial {OTHER}", since=0)
             assert client.since(0, "HEARTBEAT") == []
