@@ -199,7 +199,7 @@ def find_holder(folder: Path) -> Holder | None:
     except (FileNotFoundError, NotADirectoryError):
         return _holder_without_file(folder)
     try:
-        return _holder_without_file(folder) if try_lock(file) else _read(file)
+        return _holder_without_file(folder) if try_lock(file, is_shared=True) else _read(file)
     except OSError as error:
         if error.errno in NO_LOCKS:
             return None
@@ -214,7 +214,7 @@ def _holder_without_file(folder: Path) -> Holder | None:
     None where none does.
     """
     try:
-        own = _try_lock_folder(folder)
+        own = _try_lock_folder(folder, is_shared=True)
     except OSError:
         return None
     if own is None:
@@ -223,7 +223,7 @@ def _holder_without_file(folder: Path) -> Holder | None:
     return None
 
 
-def _try_lock_folder(folder: Path) -> int | None:
+def _try_lock_folder(folder: Path, *, is_shared: bool = False) -> int | None:
     """Open and lock a folder itself; None when another holds it.
 
     Raises `OSError` for an absent one, and where folders cannot be locked.
@@ -232,7 +232,7 @@ def _try_lock_folder(folder: Path) -> int | None:
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
     own = os.open(folder, os.O_RDONLY)
     try:
-        if not try_lock(own):
+        if not try_lock(own, is_shared=is_shared):
             os.close(own)
             return None
     except OSError:
@@ -322,7 +322,7 @@ if sys.platform == "win32":
     _BEYOND = 1 << 30
     """Place of the byte that is locked: Windows lets no other process read locked bytes."""
 
-    def try_lock(file: int) -> bool:
+    def try_lock(file: int, *, is_shared: bool = False) -> bool:
         os.lseek(file, _BEYOND, os.SEEK_SET)
         try:
             msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
@@ -335,13 +335,14 @@ if sys.platform == "win32":
 else:
     import fcntl
 
-    def try_lock(file: int) -> bool:
+    def try_lock(file: int, *, is_shared: bool = False) -> bool:
         """Lock an open file; False when another holds it.
 
-        Raises `OSError` where the file system has no locks.
+        `is_shared`: for a look only, beside others that look; Windows has no such locks. Raises `OSError` where the
+        file system has no locks.
         """
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(file, (fcntl.LOCK_SH if is_shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
         except OSError as error:
             if error.errno in _HELD:
                 return False

@@ -144,6 +144,31 @@ def test_state_lock_whose_file_was_deleted_is_still_held(tmp_path: Path) -> None
     second.release()
 
 
+@pytest.mark.skipif(os.name != "posix", reason="Windows has no shared locks")
+@pytest.mark.parametrize("is_deleted", [False, True])
+def test_two_programs_that_look_at_the_same_moment_find_no_holder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_deleted: bool
+) -> None:
+    """The file says what a gateway wrote that was killed."""
+    lock = StateLock(tmp_path)
+    assert lock.acquire() is None
+    lock.write((ALPHA,))
+    content = (tmp_path / FILE).read_bytes()
+    lock.release()
+    (tmp_path / FILE).write_bytes(content)
+    if is_deleted:
+        (tmp_path / FILE).unlink()
+    close = os.close
+
+    def look_before(file: int) -> None:
+        monkeypatch.setattr(os, "close", close)
+        assert read_holder(tmp_path) is None
+        close(file)
+
+    monkeypatch.setattr(os, "close", look_before)
+    assert read_holder(tmp_path) is None
+
+
 def test_state_lock_that_is_released_while_it_is_written_closes_no_other_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
