@@ -312,7 +312,7 @@ class _Supervised:
         identity = self.drone.identity
         percent = self.drone.battery.state.percent
         battery = "" if percent is None else f", battery {percent} %"
-        line = f"{head}: {identity.model.title} {identity.serial}, firmware {identity.firmware}{battery}"
+        line = f"{head}: {identity}{battery}"
         if self.drone.controller.present:
             charge = self.drone.controller.state.battery_percent
             line += ", through a Skycontroller" + ("" if charge is None else f" with {charge} % battery")

@@ -55,6 +55,9 @@ class Identity(msgspec.Struct, frozen=True):
     hardware: str | None
     name: str
 
+    def __str__(self) -> str:
+        return f"{self.model.title} {self.serial}, firmware {self.firmware or 'not reported'}"
+
 
 class Product(Element[ProductState]):
     """The drone as a product. No verbs: `Drone.identity` sums it up."""

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import AsyncIterator
 from pathlib import Path
 
+import msgspec
 import pytest
 from support.world import loopback
 
@@ -187,6 +188,16 @@ async def test_lost_link_ends_the_block_without_another_error(simulator: Simulat
         await simulator.close()
         with pytest.raises(LinkLost):
             await drone.wait_for(FlyingState.LANDED)
+
+
+async def test_log_line_of_a_connection_names_model_serial_and_firmware(
+    simulator: Simulator, real: SimulatedDrone, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO", "anafi_mav")
+    async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
+        lines = [record.getMessage() for record in caplog.records if "connected to" in record.getMessage()]
+        assert lines == [f"127.0.0.1: connected to ANAFI 4K {drone.identity.serial}, firmware 1.8.2, protocol 3"]
+        assert str(msgspec.structs.replace(drone.identity, firmware=None)).endswith("firmware not reported")
 
 
 async def test_connect_without_a_drone_raises_link_lost(real: SimulatedDrone) -> None:
