@@ -15,6 +15,7 @@ import json
 import logging
 import os
 import re
+import stat
 import time
 from collections.abc import Callable, Sequence
 from datetime import datetime, timezone
@@ -142,7 +143,8 @@ class BoundedLogFile:
         """Append a line."""
         data = line.encode(errors="backslashreplace") + b"\n"
         try:
-            if self._size and self._size + len(data) > FILE_BYTES:
+            # Of a device, as /dev/null or a pipe, nothing is full, and no other file may get its name.
+            if self._is_regular and self._size and self._size + len(data) > FILE_BYTES:
                 self._file.close()
                 self._put_aside()
             if self._file.closed:
@@ -157,7 +159,8 @@ class BoundedLogFile:
 
     def _open(self) -> io.FileIO:
         file = io.FileIO(self._path, "ab")
-        self._size = os.fstat(file.fileno()).st_size
+        status = os.fstat(file.fileno())
+        self._size, self._is_regular = status.st_size, stat.S_ISREG(status.st_mode)
         return file
 
     def _put_aside(self) -> None:

@@ -55,6 +55,19 @@ def test_log_file_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert path.read_text().endswith("line 299\n")
 
 
+def test_log_to_a_device_is_not_put_aside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As root, /dev/null would get another name, and a file would take its place. A pipe stands for it."""
+    monkeypatch.setattr(log, "FILE_BYTES", 200)
+    path = tmp_path / "log"
+    os.mkfifo(path)
+    with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as reading:
+        file = log.BoundedLogFile(path)
+        for number in range(100):
+            file.write(f"line {number}")
+        assert reading.read().endswith(b"line 99\n")
+    assert [one.name for one in tmp_path.iterdir()] == ["log"]
+
+
 def test_repeated_line_is_counted_once_for_all_outputs(tmp_path: Path) -> None:
     first, second = log.LogFileHandler(tmp_path / "a"), log.LogFileHandler(tmp_path / "b")
     outputs = log.LogOutputs([first, second])
