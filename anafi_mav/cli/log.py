@@ -146,16 +146,24 @@ class BoundedLogFile:
             # Of a device, as /dev/null or a pipe, nothing is full, and no other file may get its name.
             if self._is_regular and self._size and self._size + len(data) > FILE_BYTES:
                 self._file.close()
-                self._put_aside()
+                try:
+                    self._put_aside()
+                except OSError as error:  # as a file in /var/log, whose folder is root's
+                    self._complain(f"begins again, because it cannot be put aside: {error}")
+                    os.truncate(self._path, 0)
             if self._file.closed:
                 self._file = self._open()
             self._size += len(data)
             while data:
                 data = data[self._file.write(data) :]
         except OSError as error:
-            if not self._has_failed:
-                self._has_failed = True
-                complain_later(f"--log-file: {self._path} cannot be written: {error}")
+            self._complain(f"cannot be written: {error}")
+
+    def _complain(self, problem: str) -> None:
+        """Report the first problem."""
+        if not self._has_failed:
+            self._has_failed = True
+            complain_later(f"--log-file: {self._path} {problem}")
 
     def _open(self) -> io.FileIO:
         file = io.FileIO(self._path, "ab")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import logging
 import os
@@ -66,6 +67,27 @@ def test_log_to_a_device_is_not_put_aside(tmp_path: Path, monkeypatch: pytest.Mo
             file.write(f"line {number}")
         assert reading.read().endswith(b"line 99\n")
     assert [one.name for one in tmp_path.iterdir()] == ["log"]
+
+
+def test_log_file_that_cannot_be_put_aside_begins_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As a file in /var/log that root has made for the user of the service."""
+
+    def refuse(path: Path, target: Path) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(log, "FILE_BYTES", 200)
+    monkeypatch.setattr(Path, "replace", refuse)
+    path = tmp_path / "gateway.log"
+    file = log.BoundedLogFile(path)
+    for number in range(100):
+        file.write(f"line {number}")
+    assert [one.name for one in tmp_path.iterdir()] == ["gateway.log"]
+    assert path.stat().st_size <= 200
+    assert path.read_text().endswith("line 99\n")
+    assert STDERR_WRITER.wait(PATIENCE)
+    assert capsys.readouterr().err.count("begins again, because it cannot be put aside: ") == 1
 
 
 def test_repeated_line_is_counted_once_for_all_outputs(tmp_path: Path) -> None:
