@@ -104,6 +104,7 @@ def test_full_disk_is_reported_once(capsys: pytest.CaptureFixture[str]) -> None:
     file = log.BoundedLogFile(Path("/dev/full"))
     for _ in range(3):
         file.write("line")
+    assert STDERR_WRITER.wait(PATIENCE)
     assert capsys.readouterr().err.count("/dev/full cannot be written: [Errno 28]") == 1
 
 
