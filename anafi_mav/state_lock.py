@@ -259,16 +259,6 @@ def _read(file: int) -> Holder:
     return Holder(VERSION, 0)
 
 
-def give_to_owner_of(folder: Path, file: int) -> None:
-    """Give an open file that root has just made in a folder to the owner of the folder.
-
-    Not by its name: the owner may have put another file there meanwhile. What another user makes stays that user's.
-    """
-    if os.name == "posix" and os.geteuid() == 0:
-        owner = folder.stat()
-        os.fchown(file, owner.st_uid, owner.st_gid)
-
-
 def check_folder(folder: Path, *names: str) -> None:
     """Raise `OSError` unless files can be made in a folder.
 
@@ -299,7 +289,9 @@ def replace_file(path: Path, data: bytes) -> None:
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
-            give_to_owner_of(path.parent, file.fileno())
+            if os.name == "posix" and os.geteuid() == 0:
+                owner = path.parent.stat()
+                os.fchown(file.fileno(), owner.st_uid, owner.st_gid)
             file.write(data)
             file.flush()
             os.fsync(file.fileno())

@@ -26,7 +26,7 @@ from anafi_mav.documents import open_file
 from anafi_mav.endpoint_options import KEY_NAME
 from anafi_mav.errors import ConfigError
 from anafi_mav.mavlink.signing import CONTENT_BYTES, KEY_BYTES, Signing
-from anafi_mav.state_lock import STATE_WRITER, give_to_owner_of, replace_file
+from anafi_mav.state_lock import STATE_WRITER, replace_file
 
 logger = logging.getLogger(__name__)
 
@@ -309,10 +309,11 @@ def write_key(folder: Path, name: str, content: bytes, suffix: str = SUFFIX) -> 
     """
     if not folder.exists():
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if os.name == "posix":
-            made = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+        if os.name == "posix" and os.geteuid() == 0:
+            # Not by its name: the owner may have put another file there meanwhile.
+            owner, made = folder.parent.stat(), os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
             try:
-                give_to_owner_of(folder.parent, made)
+                os.fchown(made, owner.st_uid, owner.st_gid)
             finally:
                 os.close(made)
     replace_file(path_of(folder, name, suffix), content)
