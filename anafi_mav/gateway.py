@@ -14,7 +14,6 @@ import logging
 import math
 from collections import Counter
 from collections.abc import Awaitable, Callable
-from functools import partial
 from pathlib import Path
 from types import TracebackType
 
@@ -483,8 +482,7 @@ class Gateway:
         """Have the thread of files write the drones into the lock file: some may be in the air."""
         if self._lock is not None:
             web = "" if self.web is None else self.web.describe()
-            drones = [supervised.held() for supervised in self._supervised]
-            STATE_WRITER.post(partial(self._lock.write, drones, web))
+            self._lock.write_later([supervised.held() for supervised in self._supervised], web)
 
     def state_problems(self) -> list[str]:
         """Return a line for each problem with reading or storing state; empty without problems."""

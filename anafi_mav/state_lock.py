@@ -20,6 +20,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections import deque
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
@@ -124,6 +125,8 @@ class StateLock:
         self._file: int | None = None
         self._own: int | None = None
         """The folder itself, where it can be locked: a person may delete a lock file that looks old."""
+        self._newest: deque[tuple[tuple[HeldDrone, ...], str]] = deque(maxlen=1)
+        """Content that is to be written: what follows replaces it while the disk is busy."""
         self._access = threading.Lock()
         """Held while the file is written, by a thread, or closed: its descriptor may be another file's later."""
 
@@ -154,6 +157,19 @@ class StateLock:
         except OSError:
             return True
         return self._own is not None
+
+    def write_later(self, drones: Iterable[HeldDrone], web: str = "") -> None:
+        """Have the thread of files replace what the file says.
+
+        Behind a slow disk the newest content counts.
+        """
+        self._newest.append((tuple(drones), web))
+        STATE_WRITER.post(self._write_newest)
+
+    def _write_newest(self) -> None:
+        with contextlib.suppress(IndexError):  # it was written together with what followed it
+            drones, web = self._newest.pop()
+            self.write(drones, web)
 
     def write(self, drones: Iterable[HeldDrone], web: str = "") -> None:
         """Replace what the file says. A full disk is no reason to end a flight."""

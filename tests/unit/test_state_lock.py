@@ -8,19 +8,20 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
+from support.hanging_disk import PATIENCE, hanging
 
 from anafi_mav.cli import main
 from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import state_in_use
 from anafi_mav.mavlink.key_ring import folder_of, write_key
 from anafi_mav.mavlink.signing import CONTENT_BYTES
-from anafi_mav.state_lock import FILE, HeldDrone, Holder, StateLock, read_holder, state_folder
+from anafi_mav.state_lock import FILE, STATE_WRITER, HeldDrone, Holder, StateLock, read_holder, state_folder
 
 ALPHA = HeldDrone("alpha", "192.168.42.1", "wlan1", "PI040416DA9H839157")
 
@@ -187,6 +188,28 @@ def test_state_lock_that_is_released_while_it_is_written_closes_no_other_file(
     lock.write((ALPHA,))
     releasing.join()
     assert (tmp_path / FILE).read_bytes() == b""
+
+
+def test_state_lock_behind_a_hanging_disk_keeps_the_newest_content_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A fleet whose links come and go must not fill the memory meanwhile."""
+    lock = StateLock(tmp_path)
+    assert lock.acquire() is None
+    written, write = [], StateLock.write
+
+    def note(self: StateLock, drones: Iterable[HeldDrone], web: str = "") -> None:
+        written.append(web)
+        write(self, drones, web)
+
+    monkeypatch.setattr(StateLock, "write", note)
+    with hanging(STATE_WRITER):
+        for number in range(1000):
+            lock.write_later([ALPHA], f"http://127.0.0.1:{number}/")
+    assert STATE_WRITER.wait(PATIENCE)
+    assert written == ["http://127.0.0.1:999/"]
+    assert held(tmp_path).web == "http://127.0.0.1:999/"
+    lock.release()
 
 
 def test_state_lock_of_a_killed_process_is_free(tmp_path: Path) -> None:
