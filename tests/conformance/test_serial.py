@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from dataclasses import replace
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -16,7 +17,6 @@ from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState a
 from anafi_mav.config import Config, DroneConfig, HttpConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
-from anafi_mav.sim.skycontroller import Skycontroller
 
 OURS, OTHER = "PI040416AA0A000001", "PI040416AA0A000002"
 
@@ -93,21 +93,22 @@ async def test_other_aircraft_behind_the_skycontroller_gets_no_command(generatio
             await client.heartbeat(lambda beat: True, timeout=30.0)
 
 
-async def test_aircraft_behind_a_skycontroller_that_names_no_serial_is_known_by_its_own_report(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def unnamed(simulator: Simulator) -> Simulator:
+    """The same, with a Skycontroller that reports its drone without a serial number."""
+    pilot = simulator.drones[0].skycontroller
+    assert pilot is not None
+    pilot.drone = replace(pilot.drone, serial="")
+    return simulator
+
+
+async def test_aircraft_behind_a_skycontroller_that_names_no_serial_is_known_by_its_own_report() -> None:
     """No aircraft is refused as "unknown": it reports its serial number with its settings."""
-
-    def connection(pilot: Skycontroller) -> drone_manager.ConnectionState:
-        return drone_manager.ConnectionState(Connection.CONNECTED, "", pilot.drone.model_id, pilot.drone.name)
-
-    monkeypatch.setattr(Skycontroller, "_connection", connection)
     address = loopback()
     async with gateway_of(address) as (_, client):
-        async with aircraft(address, OTHER, 3):
+        async with unnamed(aircraft(address, OTHER, 3)):
             await client.wait("STATUSTEXT", lambda m: m.text == f"Not connected: drone has serial {OTHER}", since=0)
             assert client.since(0, "HEARTBEAT") == []
-        async with aircraft(address, OURS, 3):
+        async with unnamed(aircraft(address, OURS, 3)):
             await client.heartbeat(lambda beat: True, timeout=30.0)
 
 
