@@ -29,6 +29,21 @@ def _clean(text: str) -> bytes:
     return data
 
 
+def _chunks(data: bytes) -> list[bytes]:
+    """Divide a text into chunks that hold whole characters, for each is read by itself (QGroundControl).
+
+    A chunk shorter than 50 bytes would end the text, so spaces fill one: beside its last space, if it has one.
+    """
+    chunks = []
+    while len(data) > CHUNK:
+        chunk = data[:CHUNK].decode(errors="ignore").encode()
+        data = data[len(chunk) :]
+        at = chunk.rfind(b" ")
+        at = len(chunk) if at < 0 else at
+        chunks.append(chunk[:at] + b" " * (CHUNK - len(chunk)) + chunk[at:])
+    return [*chunks, data]
+
+
 class TextNumbers:
     """Numbers that tie the chunks of one long text together.
 
@@ -49,7 +64,7 @@ class TextNumbers:
         if len(data) <= CHUNK:
             return [dialect.MAVLink_statustext_message(int(severity), data)]
         number = next(self._next)
-        chunks = [data[start : start + CHUNK] for start in range(0, len(data), CHUNK)]
+        chunks = _chunks(data)
         if len(chunks[-1]) == CHUNK:
             chunks.append(b"")  # a chunk shorter than 50 bytes is what ends a text
         return [

@@ -113,6 +113,13 @@ def test_text_of_full_chunks_ends_in_an_empty_one() -> None:
     assert [chunk for _, _, chunk in texts("a" * 100)] == [b"a" * 50, b"a" * 50, b""]
 
 
+def test_chunks_of_a_text_hold_whole_characters() -> None:
+    """QGroundControl reads each chunk by itself; one shorter than 50 bytes would end the text."""
+    chunks = [chunk for _, _, chunk in texts("a" * 9 + " " + "b" * 39 + "é" * 52)]
+    assert [chunk.decode() for chunk in chunks] == ["a" * 9 + "  " + "b" * 39, "é" * 25, "é" * 25, "é" * 2]
+    assert [chunk.decode() for _, _, chunk in texts("x" + "é" * 26)] == ["x" + "é" * 24 + " ", "é" * 2]
+
+
 def test_height_is_latched_on_the_ground() -> None:
     height = HeightReference()
     assert height.ato(100.0) is None
