@@ -85,6 +85,9 @@ async def test_conf_125_metadata(flavour: str) -> None:
         assert described[name]["longDesc"].endswith("The same as ANF_MAX_TILT.")
         assert described[name]["units"] == unit
         assert described["ANF_TKOFF_ALT"]["default"] == 2.5
+        if flavour == "ardupilot":
+            cruise, limits = described["WPNAV_SPEED"], described["ANF_CRUISE_SPEED"]
+            assert (cruise["min"], cruise["max"]) == (100.0 * limits["min"], 100.0 * limits["max"])
         assert "default" not in tilt  # a drone does not tell its own
 
         basic = await requested(w.client, 396, "COMPONENT_INFORMATION_BASIC")

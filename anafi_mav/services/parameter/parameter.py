@@ -42,6 +42,8 @@ class Parameter:
     """Sets it; returns when the drone confirmed, or raises an `AnafiMavError`. None: read only."""
     limits: Callable[[Host], Limits | None] | None = None
     """None: the limits of the type. Returns None while the drone has not reported them."""
+    tolerance: float = 0.0
+    """A value so little beyond a limit may be written, too; `write` keeps to the limit."""
     values: Mapping[int, str] = field(default_factory=dict)
     """The values that may be written, with their meaning, for a parameter with a fixed choice."""
     updates: tuple[type[Message], ...] = ()
@@ -92,7 +94,7 @@ class Parameter:
         if self.values:
             return value in self.values
         limits = None if self.limits is None else self.limits(host)
-        return limits is None or limits[0] <= value <= limits[1]
+        return limits is None or limits[0] - self.tolerance <= value <= limits[1] + self.tolerance
 
 
 def own(put: Callable[[Host, float], None]) -> Callable[[Host, float], Awaitable[None]]:
@@ -125,7 +127,7 @@ def alias(
         low, high = found[0] * scale, found[1] * scale
         if kind.whole:
             return math.ceil(low - TOLERANCE), math.floor(high + TOLERANCE)
-        return (low, high) if scale == 1.0 else (low - TOLERANCE, high + TOLERANCE)
+        return low, high
 
     def write(host: Host, value: float) -> Awaitable[object]:
         assert native.write is not None
@@ -141,6 +143,7 @@ def alias(
         read=read,
         write=None if native.write is None else write,
         limits=None if native.limits is None else limits,
+        tolerance=0.0 if scale == 1.0 or kind.whole else TOLERANCE,
         step=None if native.step is None else native.step * scale,
         default=None if native.default is None else native.default * scale,
         native=native.name,
