@@ -484,6 +484,7 @@ GIMBAL_STOP_FAILED = Template("Gimbal stop not confirmed: {error}", error=BELOW)
 ROI_LOST = Template("ROI kept: no position of system {system}", system=255)
 REGION_INSTEAD = Reason("region of interest instead")
 ROI_ENDED = Template("ROI ended: {reason}", reason="r" * REASON_BYTES)
+ROI_SYSTEM_NUMBER = Reason("param1 is no system")
 ROI_NO_SYSTEM = ReasonTemplate("no position of system {system:g}", system=255)
 ROI_NO_WAYPOINT = Reason("no waypoint is flown to")
 

@@ -121,6 +121,7 @@ async def test_region_follows_another_system_that_reports_its_position() -> None
 
         assert (await w.client.command(ROI_SYSTEM, 7.0)).result == REJECTED
         assert (await w.client.command(ROI_SYSTEM, NAN)).result == REJECTED
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "ROI refused: param1 is no system", since=0)
         report_place(other, EAST)
         assert (await w.client.command(ROI_SYSTEM, 7.0)).result == ACCEPTED
         await heads(w, 90.0)

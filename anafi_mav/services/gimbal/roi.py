@@ -190,7 +190,9 @@ class RegionOfInterest(PlainTask):
 
     def position_of(self, system: float) -> SystemPosition:
         """Return the position of another system. Raises `Refused` without a recent one."""
-        seen = self._newest(int(system)) if math.isfinite(system) else None
+        if system not in range(1, 256):
+            raise Refused(texts.ROI, texts.ROI_SYSTEM_NUMBER)
+        seen = self._newest(int(system))
         if seen is None or self._host.clock.monotonic() - seen.at > POSITION_OLD:
             raise Refused(texts.ROI, texts.ROI_NO_SYSTEM.fill(system=system))
         return seen

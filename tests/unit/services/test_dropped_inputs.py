@@ -163,7 +163,7 @@ OF_COMMANDS = {
         *("GIMBAL_IDS", "GIMBAL_NO_PRIMARY", "ROI_KINDS", "NO_PLACE", "ROI_NO_WAYPOINT", "POSITION_UNKNOWN"),
         *("RATE_CLIENT_SILENT", "DRONE_FLIES"),
     },
-    REGION: {"REGION_INSTEAD", "ROI_NO_SYSTEM"},
+    REGION: {"REGION_INSTEAD", "ROI_NO_SYSTEM", "ROI_SYSTEM_NUMBER"},
     CHANGE: set(),
 }
 """Reasons in these modules of commands, of the end of a mode, or of another stream."""
