@@ -549,6 +549,18 @@ async def test_conf_143_kinds_of_a_fence_and_its_switch_are_independent() -> Non
         assert ack.result == DENIED
 
 
+async def test_conf_143_fence_switched_on_without_a_boundary_is_reported() -> None:
+    """Accepted, for a fence that is uploaded later is to be in force."""
+    async with world() as w:
+        assert (await w.client.command(ENABLE, 1)).result == ACCEPTED
+        await said(w.client, "Fence on, but no boundary is in force")
+        assert (await upload(w.client, square(PLACE, 30.0), FENCE)).type == TAKEN
+        mark = w.client.mark()
+        assert (await w.client.command(ENABLE, 1)).result == ACCEPTED
+        await bits(w.client, True, True, True)
+        assert not [m for _, m in w.client.since(mark, "STATUSTEXT") if "no boundary" in m.text]
+
+
 async def test_conf_076_a_motor_cut_needs_leave() -> None:
     async with world() as w:
         value = await put(w, "GF_ACTION", 4)

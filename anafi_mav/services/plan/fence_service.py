@@ -323,6 +323,8 @@ class FenceService(Service):
             if wanted != EVERYTHING and int(wanted) & ~watch.types:
                 raise Refused(texts.FENCE, texts.FENCE_KIND_NOT_CHOSEN, lasting=True)
             watch.enable(int(wanted))
+            if not watch.in_force:
+                self.host.text(Severity.WARNING, texts.FENCE_ON_WITHOUT)
         else:
             watch.disable(int(wanted))
         self._look(self.host.clock.monotonic())
