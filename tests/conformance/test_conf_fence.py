@@ -549,7 +549,7 @@ async def test_conf_143_kinds_of_a_fence_and_its_switch_are_independent() -> Non
         assert ack.result == DENIED
 
 
-async def test_conf_143_fence_switched_on_without_a_boundary_is_reported() -> None:
+async def test_fence_switched_on_without_a_boundary_is_reported() -> None:
     """Accepted, for a fence that is uploaded later is to be in force."""
     async with world() as w:
         assert (await w.client.command(ENABLE, 1)).result == ACCEPTED
