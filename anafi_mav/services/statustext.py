@@ -30,9 +30,10 @@ def _clean(text: str) -> bytes:
 
 
 def _chunks(data: bytes) -> list[bytes]:
-    """Divide a text into chunks that hold whole characters, for each is read by itself (QGroundControl).
+    """Divide a text into chunks that hold whole characters.
 
-    A chunk shorter than 50 bytes would end the text, so spaces fill one: beside its last space, if it has one.
+    QGroundControl reads each by itself. A chunk shorter than 50 bytes would end the text, so spaces fill one: beside
+    its last space, if it has one.
     """
     chunks = []
     while len(data) > CHUNK:

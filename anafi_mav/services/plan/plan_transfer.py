@@ -84,7 +84,10 @@ class Peer(msgspec.Struct, frozen=True):
     """False for a client that only reads plans: its downloads keep no other client away."""
 
     def is_copy_of(self, other: Peer) -> bool:
-        """Return True for the ids of `other` over another link, as behind a router with two links to us."""
+        """Return True for the ids of `other` over another link.
+
+        So does a router with two links to us show its clients.
+        """
         return self.client != other.client and (self.sysid, self.compid) == (other.sysid, other.compid)
 
 
