@@ -296,7 +296,8 @@ class Vehicle(Aircraft):
         if state in TAKING_OFF or (self.takeoff.climbing and not self.on_ground):
             return FlightMode.MISSION if self.mission.flying else FlightMode.TAKEOFF
         plays = self.drone.piloting.state.plan == PlayingState.PLAYING
-        if state in AIRBORNE and plays and not self.drone.flight_plan.plays_withdrawn:
+        is_over = self.drone.flight_plan.plays_withdrawn or self.mission.ended_unreported
+        if state in AIRBORNE and plays and not is_over:
             return FlightMode.MISSION
         return self.control.mode
 

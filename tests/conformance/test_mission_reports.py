@@ -44,7 +44,7 @@ from support.missions import (
 from support.params import write
 from support.plans import FENCE, Item, around, polygon, square, upload
 from support.setpoints import VELOCITY_ONLY, local, streaming
-from support.world import ARMED, HOME, World, world
+from support.world import ARMED, HOLD, HOME, World, world
 
 from anafi_mav.arsdk.messages import ardrone3, common, piloting_style, rth
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
@@ -80,6 +80,29 @@ async def test_mission_whose_end_is_reported_late_or_never_is_complete(last: Ite
             w.drone.faults.late = {PLAYING: late}
         await disarmed(w)
         assert whole(await w.client.wait("MISSION_CURRENT")).mission_state == COMPLETE
+
+
+@pytest.mark.parametrize("last", [way(12.0, 12.0, 6.0), WAIT], ids=["way point", "wait"])
+async def test_mission_that_ends_in_the_air_without_a_report_of_its_plans_end_is_complete(last: Item) -> None:
+    async with world(web=True) as w:
+        await put(w, [takeoff(6.0), way(12.0, 0.0, 6.0), last])
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=0)
+        w.drone.faults.unreported = frozenset({PLAYING})
+        await state(w, COMPLETE, since=0)
+        assert reached(w) == [0, 1, 2]
+        await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
+
+
+async def test_turn_after_a_file_whose_plans_end_is_not_reported_is_flown() -> None:
+    async with world(web=True) as w:
+        turn = Item(dialect.MAV_CMD_CONDITION_YAW, 0.0, 0.0, p1=90.0, frame=2)
+        await put(w, [takeoff(6.0), way(12.0, 0.0, 6.0), turn])
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=0)
+        w.drone.faults.unreported = frozenset({PLAYING})
+        await state(w, COMPLETE, since=0)
+        assert abs(w.drone.pose.yaw - 1.57) < 0.1
 
 
 async def test_landing_of_another_controller_on_the_way_to_a_landing_place_pauses_the_mission() -> None:

@@ -264,6 +264,12 @@ class MissionFlight(PlainTask):
         return next_place(progress.leg.content, progress.line)
 
     @property
+    def ended_unreported(self) -> bool:
+        """True when the mission is complete, and the drone has not reported the end of its plan."""
+        plan = self._vehicle.drone.flight_plan.state
+        return plan.playing == PlayingState.PLAYING and self.machine.has_flown(plan.uid)
+
+    @property
     def paused(self) -> bool:
         """True when the mission was begun and stopped."""
         return self.machine.rest is State.PAUSED
@@ -556,7 +562,7 @@ class MissionFlight(PlainTask):
         machine = self.machine
         return {
             events.MavlinkFilePlayingStateChanged: self._on_playing,
-            events.MissionItemExecuted: lambda message, now: self._handle(machine.executed(message.idx)),
+            events.MissionItemExecuted: lambda message, now: self._handle(machine.executed(message.idx, self._now)),
             events.WaypointSkipped: lambda message, now: self._handle(machine.skipped(message.item)),
         }
 

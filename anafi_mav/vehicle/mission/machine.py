@@ -58,7 +58,10 @@ QGroundControl chooses the mode first and arms when it is shown.
 """
 
 END_WAIT = 2.0
-"""s within which a drone whose plan has ended has reported the last line, or begun its landing or return."""
+"""s within which a drone whose plan has ended has reported the last line, or begun its landing or return.
+
+Or the other way round, within which one that has executed the last line has reported that its plan has ended.
+"""
 
 POSITION_WAIT = 10.0
 """s after that end within which a position must be received that proves the drone at its last way point.
@@ -188,6 +191,7 @@ TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
         E.SKIPPED: (S.FLYING_FILE,),
         E.REPORTED: (S.FLYING_FILE, S.COMPLETE),
         E.CONTROL_LOST: (S.PAUSED,),
+        E.TIMEOUT: (S.FLYING_FILE, *_NEXT),
         E.LINK_DOWN: (S.PAUSED,),
     },
     S.FLYING_ITEM: {
@@ -369,6 +373,15 @@ class MissionMachine:
         if leg is None or not self.progress.leg_done or not (self.flying or self.rest is S.COMPLETE):
             return False
         return self.mission.items[leg.origins[-1]].command == mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH
+
+    def has_flown(self, uid: str | None) -> bool:
+        """Return True when the mission is complete, and the plan of this name was its last file.
+
+        A drone that does not report the end of that plan goes on reporting that it flies it. False if another
+        controller has started it again.
+        """
+        progress = self.progress
+        return self.rest is S.COMPLETE and progress.leg_done and uid == progress.uid != self.phase.plays
 
     @property
     def leads_home(self) -> bool:
@@ -656,7 +669,7 @@ class MissionMachine:
             yield from self._stopped_by_drone(stopped=stopped)
 
     @_on(E.EXECUTED)
-    def executed(self, line: int) -> _Steps:
+    def executed(self, line: int, now: float = math.inf) -> _Steps:
         """The drone reports that it has executed a line of its file."""
         leg, state = self.progress.leg, self.phase.state
         late = state is S.PAUSED
@@ -671,6 +684,8 @@ class MissionMachine:
             yield from self._complete()
         elif state is S.ENDING and self.progress.leg_done:
             yield from self._part_over()
+        elif state is S.FLYING_FILE and is_last and not self.ending:
+            self.phase = replace(self.phase, until=now + END_WAIT)
 
     def _execute(self, line: int) -> _Steps:
         self.progress, done = self.progress.with_executed(self.mission.items, line)
@@ -727,6 +742,10 @@ class MissionMachine:
                 yield SendText(Severity.WARNING, texts.MISSION_NOT_STARTED.fill(reason=why))
             case S.ENDING if phase.missing and not phase.waits_for_position:
                 self.phase = replace(phase, waits_for_position=True, until=phase.until + POSITION_WAIT - END_WAIT)
+            case S.FLYING_FILE:  # its plan has ended, but that was not reported
+                self.phase = replace(phase, until=math.inf)
+                if self.progress.leg_done:
+                    yield from self._part_over()
             case _:
                 yield from self._look(report, last=True)
 

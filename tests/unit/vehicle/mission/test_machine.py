@@ -106,6 +106,7 @@ EXPECTED: dict[State, dict[Event, tuple[State, str]]] = {
         E.SKIPPED: (S.FLYING_FILE, "SendText"),
         E.REPORTED: (S.FLYING_FILE, ""),
         E.CONTROL_LOST: (S.PAUSED, "SendText Suspend Persist"),
+        E.TIMEOUT: (S.FLYING_FILE, ""),
         E.LINK_DOWN: (S.PAUSED, ""),
     },
     S.FLYING_ITEM: {
