@@ -295,11 +295,11 @@ class Vehicle(Aircraft):
             return FlightMode.RETURN
         if state in TAKING_OFF or (self.takeoff.climbing and not self.on_ground):
             return FlightMode.MISSION if self.mission.flying else FlightMode.TAKEOFF
-        plays = self.drone.piloting.state.plan == PlayingState.PLAYING
-        is_over = self.drone.flight_plan.plays_withdrawn or self.mission.ended_unreported
-        if state in AIRBORNE and plays and not is_over:
-            return FlightMode.MISSION
-        return self.control.mode
+        mode, plays = self.control.mode, self.drone.piloting.state.plan == PlayingState.PLAYING
+        if plays and mode is not FlightMode.MISSION and state in AIRBORNE:
+            is_over = self.drone.flight_plan.plays_withdrawn or self.mission.ended_unreported
+            return mode if is_over else FlightMode.MISSION
+        return mode
 
     @property
     def _is_about_to_land(self) -> bool:

@@ -150,7 +150,6 @@ class FenceService(Service):
         # A plan and an orbit turn before a fence that was there when they began.
         turns = mode in (FlightMode.MISSION, FlightMode.ORBIT) and self._has_judged_way()
         own_way = turns or self._ends_inside
-        by_plan = state.plan == PlayingState.PLAYING and not vehicle.mission.ended_unreported
         return Sight(
             place,
             now - self._located,
@@ -160,7 +159,8 @@ class FenceService(Service):
             home,
             airborne=not vehicle.on_ground and flying_state is not None,
             flying=vehicle.in_air and mode is not FlightMode.RETURN,
-            steering=not own_way and (not by_plan or vehicle.mission.flying),
+            steering=not own_way
+            and (state.plan != PlayingState.PLAYING or vehicle.mission.flying or vehicle.mission.ended_unreported),
             orders=vehicle.control.epoch,
             takes_off=flying_state in TAKING_OFF,
         )

@@ -562,7 +562,7 @@ class MissionFlight(PlainTask):
         machine = self.machine
         return {
             events.MavlinkFilePlayingStateChanged: self._on_playing,
-            events.MissionItemExecuted: lambda message, now: self._handle(machine.executed(message.idx, self._now)),
+            events.MissionItemExecuted: lambda message, now: self._handle(machine.executed(message.idx, now)),
             events.WaypointSkipped: lambda message, now: self._handle(machine.skipped(message.item)),
         }
 
