@@ -121,7 +121,9 @@ def is_relative(reference: float | None) -> bool:
 
 def _turn(writer: FlightPlanWriter, item: Item) -> None:
     """Only what the drone looks at then: the gateway turns it."""
-    angle, _, way, reference = item.params[:4]
+    angle, rate, way, reference = item.params[:4]
+    if rate is not None and rate < 0.0:
+        writer.refuse(f"invalid rate of {rate:g} deg/s", 2)
     if angle is None or abs(angle) > LARGEST_HEADING:
         writer.refuse("no angle" if angle is None else f"invalid angle of {angle:g} deg", 1)
     if reference is not None and not (reference.is_integer() and 0.0 <= reference <= 0xFF):

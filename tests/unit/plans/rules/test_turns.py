@@ -27,3 +27,11 @@ def test_invalid_reference_byte_is_refused(reference: float) -> None:
     (fault,) = examine((item,), 2).faults
     assert "invalid reference" in fault.reason
     assert fault.param == 4
+
+
+def test_negative_rate_of_a_turn_is_refused() -> None:
+    """In flight the turn would fail, and the mission would be paused before it."""
+    item = Item(TURN, 2, (90.0, -20.0, 1.0, 0.0, None, None, None))
+    (fault,) = examine((item,), 2).faults
+    assert fault.reason == "CONDITION_YAW: invalid rate of -20 deg/s"
+    assert fault.param == 2
