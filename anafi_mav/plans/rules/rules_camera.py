@@ -5,7 +5,12 @@ from __future__ import annotations
 from anafi_mav import mav_enums
 from anafi_mav.plans.formats.parrot import SET_STILL_MODE, SET_VIEW_MODE
 from anafi_mav.plans.plan import Item, Point
-from anafi_mav.plans.rules.flight_plan_writer import SHORTEST_INTERVAL, SHORTEST_STEP, FlightPlanWriter
+from anafi_mav.plans.rules.flight_plan_writer import (
+    LARGEST_HEADING,
+    SHORTEST_INTERVAL,
+    SHORTEST_STEP,
+    FlightPlanWriter,
+)
 from anafi_mav.plans.rules.rule import Fidelity, Rule, only
 
 _CAMERAS = frozenset({None, 0.0, 1.0, 100.0})
@@ -28,6 +33,14 @@ def _gimbal(writer: FlightPlanWriter, item: Item, number: int) -> None:
     only(writer, item, number, "the gimbal is device 1, not this", _GIMBALS)
 
 
+def _require_angles(writer: FlightPlanWriter, item: Item, *numbers: int) -> None:
+    """Refuse an angle beyond two turns in one of these params."""
+    for number in numbers:
+        angle = item.params[number - 1]
+        if angle is not None and abs(angle) > LARGEST_HEADING:
+            writer.refuse(f"invalid angle of {angle:g} deg", number)
+
+
 # What is looked at.
 
 
@@ -48,6 +61,7 @@ def _roi_beside(writer: FlightPlanWriter, item: Item) -> None:
     pitch, roll, yaw = item.params[4:]
     if roll not in (None, 0.0):
         writer.refuse("camera roll is unsupported", 6)
+    _require_angles(writer, item, 7)
     writer.look_ahead()
     writer.look_beside(yaw or 0.0)
     _tilt(writer, pitch or 0.0, 5)
@@ -119,6 +133,7 @@ def _mount(writer: FlightPlanWriter, item: Item) -> None:
     if writer.version == 1:
         only(writer, item, 2, "camera roll is unsupported")
         only(writer, item, 3, "the camera does not pan: turn the drone")
+    _require_angles(writer, item, 2, 3)
     _tilt(writer, pitch, 1, roll, yaw)
 
 
@@ -145,6 +160,7 @@ def _pitch_yaw(writer: FlightPlanWriter, item: Item) -> None:
     if yaw is not None and (earth or (yaw != 0.0 and writer.version == 1)):
         writer.refuse("the camera does not pan: turn the drone" if writer.version == 1
                    else "the camera's yaw from north is unsupported", 2)  # fmt: skip
+    _require_angles(writer, item, 2)
     _tilt(writer, pitch, 1, None, yaw)
 
 
@@ -256,6 +272,7 @@ def _stop_video(writer: FlightPlanWriter, item: Item) -> None:
 def _panorama(writer: FlightPlanWriter, item: Item) -> None:
     if not item.params[0] and not item.params[1]:
         writer.refuse("no angles", 1)
+    _require_angles(writer, item, 1, 2)
     writer.panorama(*item.params[:4])
 
 

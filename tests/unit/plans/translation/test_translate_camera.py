@@ -482,6 +482,18 @@ WRONG = {
         1,
     ),
     "nothing": ([action(mav_enums.MAV_CMD_PANORAMA_CREATE, 0.0, 0.0)], "no angles", FaultKind.PARAM, 1),
+    "panorama": (
+        [action(mav_enums.MAV_CMD_PANORAMA_CREATE, 360.0, 3600.0)],
+        "invalid angle of 3600 deg",
+        FaultKind.PARAM,
+        2,
+    ),
+    "beside": (
+        [action(mav_enums.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET, None, None, None, None, -10.0, 0.0, 5000.0)],
+        "invalid angle of 5000 deg",
+        FaultKind.PARAM,
+        7,
+    ),
     "servo": (
         [action(mav_enums.MAV_CMD_DO_SET_SERVO, 5.0, 1500.0)],
         "the drone has no actuator that a flight plan could move",
@@ -502,6 +514,20 @@ def test_camera_item_that_cannot_be_translated_is_refused(
     assert reason in fault.reason
     with pytest.raises(PlanError):
         translate([GO, *items], version, AIR)
+
+
+@pytest.mark.parametrize(
+    ("item", "param"),
+    [
+        (action(mav_enums.MAV_CMD_DO_MOUNT_CONTROL, 0.0, 5000.0, 0.0), 2),
+        (action(mav_enums.MAV_CMD_DO_MOUNT_CONTROL, 0.0, 0.0, -5000.0), 3),
+        (action(mav_enums.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 0.0, 5000.0), 2),
+    ],
+)
+def test_gimbal_angle_of_an_ai_beyond_two_turns_is_refused(item: Item, param: int) -> None:
+    (fault,) = examine([GO, item], 2).faults
+    assert "invalid angle" in fault.reason
+    assert fault.param == param
 
 
 def test_video_restarted_by_a_jump_during_photos_is_refused() -> None:
