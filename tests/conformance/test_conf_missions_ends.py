@@ -98,6 +98,27 @@ async def test_conf_073_mission_completes_when_its_end_is_not_reported(flavour: 
         assert reached(w) == [0, 1, 2, 3]
 
 
+@both
+@pytest.mark.parametrize("model", ["4k", "ai"])
+@pytest.mark.parametrize("is_late", [True, False], ids=["late", "unreported"])
+async def test_conf_073_return_of_a_plan_whose_lines_are_not_reported_lands(
+    flavour: str, model: str, is_late: bool
+) -> None:
+    """The line before the return is not reported by then either; the drone names its plan as the return's reason."""
+    async with world(flavour=flavour, model=model, web=True) as w:
+        await put(w, [takeoff(6.0), way(9.0, 0.0, 6.0), WAIT, RTL])
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=0)
+        mark, name = w.client.mark(), common.MissionItemExecuted.NAME
+        if is_late:
+            w.drone.faults.late = {name: 0.8}
+        else:
+            w.drone.faults.unreported = frozenset({name})
+        await state(w, COMPLETE, since=mark)
+        await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark, timeout=60.0)
+        assert [m.text for _, m in w.client.since(mark, "STATUSTEXT") if "paused" in m.text] == []
+
+
 async def test_conf_073_last_line_reported_after_the_end_completes_the_mission() -> None:
     """The drone says that its plan has ended, and only then that the last line was executed."""
     async with world(web=True) as w:

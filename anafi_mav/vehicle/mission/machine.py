@@ -386,7 +386,7 @@ class MissionMachine:
     @property
     def leads_home(self) -> bool:
         """The file that is flown, or about to be, has a return as its last line."""
-        leg: object = self.progress.leg if self.state is S.FLYING_FILE else None
+        leg: object = self.progress.leg if self.state in (S.FLYING_FILE, S.ENDING) else None
         if self.state is S.STARTING and self.phase.prepared is not None:
             leg = self.phase.prepared.course.parts[0]
         if not isinstance(leg, FlightPlanFile):
@@ -663,6 +663,8 @@ class MissionMachine:
             yield from self._part_over()
         elif report.pilot:
             yield from self._stop(texts.MISSION_PILOT)
+        elif stopped and self.leads_home:
+            yield from self._await_end(None, report, now)  # reports of lines before the return may be late, too
         elif stopped and (last := self._last_way_point()) is not None:
             yield from self._await_end(last, report, now)
         else:
@@ -898,7 +900,8 @@ class MissionMachine:
         """Decide if the plan is complete. `last`: with what is known now."""
         target, missing = self.phase.target, self.phase.missing
         if target is None:
-            flown = self.progress.at_last_line and report.lands_or_returns
+            returns = self.leads_home and report.returns_by_plan
+            flown = returns or (self.progress.at_last_line and report.lands_or_returns)
             decided = flown or last
         else:
             flown = not report.is_in_trouble and not missing and _is_at(target, report)
