@@ -119,6 +119,22 @@ async def test_conf_073_return_of_a_plan_whose_lines_are_not_reported_lands(
         assert [m.text for _, m in w.client.since(mark, "STATUSTEXT") if "paused" in m.text] == []
 
 
+@both
+async def test_conf_073_landing_that_precedes_the_report_of_its_file_completes_the_mission(flavour: str) -> None:
+    """The gateway turns the drone, and the file behind that has the landing alone: the drone lands at once."""
+    turn = Item(mav_enums.MAV_CMD_CONDITION_YAW, 0.0, 0.0, p1=90.0, p3=1.0, frame=2)
+    async with world(flavour=flavour, web=True) as w:
+        await put(w, [takeoff(6.0), way(9.0, 0.0, 6.0), turn, LAND])
+        await start(w)
+        await state(w, ACTIVE, seq=2, since=0)
+        mark = w.client.mark()
+        w.drone.faults.late = {common.MavlinkFilePlayingStateChanged.NAME: 0.3}
+        await state(w, COMPLETE, since=mark)
+        assert [m.text for _, m in w.client.since(mark, "STATUSTEXT") if "paused" in m.text] == []
+        await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark, timeout=40.0)
+        assert not w.commands("common.Mavlink.Pause")
+
+
 async def test_conf_073_last_line_reported_after_the_end_completes_the_mission() -> None:
     """The drone says that its plan has ended, and only then that the last line was executed."""
     async with world(web=True) as w:

@@ -352,7 +352,18 @@ class MissionMachine:
 
         Not on the way to the place of a landing: a landing or return that begins there is not the plan's.
         """
-        return self.flying and self._ends_with(*ENDINGS)
+        return self.begins_with_landing or (self.flying and self._ends_with(*ENDINGS))
+
+    @property
+    def begins_with_landing(self) -> bool:
+        """The drone is commanded to fly a file that lands where it is, and may report the landing before the file."""
+        prepared = self.phase.prepared
+        if self.state is not S.STARTING or prepared is None:
+            return False
+        leg = prepared.course.parts[0]
+        if not isinstance(leg, FlightPlanFile) or any(way_points(leg, prepared.line)):
+            return False
+        return self.mission.items[leg.origins[-1]].command == mav_enums.MAV_CMD_NAV_LAND
 
     @property
     def returning(self) -> bool:
