@@ -135,6 +135,19 @@ async def test_conf_073_landing_that_precedes_the_report_of_its_file_completes_t
         assert not w.commands("common.Mavlink.Pause")
 
 
+@both
+async def test_conf_073_landing_whose_lines_are_reported_late_completes_the_mission(flavour: str) -> None:
+    """It is taken for another one until the drone reports the last line of its plan."""
+    async with world(flavour=flavour, web=True) as w:
+        await put(w, [takeoff(6.0), way(9.0, 0.0, 6.0), LAND])
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=0)
+        mark = w.client.mark()
+        w.drone.faults.late = {common.MissionItemExecuted.NAME: 0.8, common.MavlinkFilePlayingStateChanged.NAME: 0.3}
+        await state(w, COMPLETE, since=mark)
+        await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark, timeout=40.0)
+
+
 async def test_conf_073_last_line_reported_after_the_end_completes_the_mission() -> None:
     """The drone says that its plan has ended, and only then that the last line was executed."""
     async with world(web=True) as w:

@@ -23,6 +23,7 @@ from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import FlightPlanFile
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.control import Condition
+from anafi_mav.vehicle.base.control_machine import State as ControlState
 from anafi_mav.vehicle.base.flight_task import Needs, PlainTask, TaskRules
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
@@ -619,8 +620,9 @@ class MissionFlight(PlainTask):
 
     def end(self) -> list[asyncio.Task[None]]:
         """Another flight task is active now: the mission is paused."""
-        ended = self._cancel_background()
-        if effects := self.machine.control_lost():
+        ended, vehicle = self._cancel_background(), self._vehicle
+        lands = vehicle.flying_state is FlyingState.LANDING and vehicle.control.state is not ControlState.RELEASING
+        if effects := self.machine.control_lost(lands=lands):
             self._perform(effects)
         return ended
 

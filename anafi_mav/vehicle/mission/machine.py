@@ -729,15 +729,18 @@ class MissionMachine:
             yield from self._look(report, last=True)
 
     @_on(E.CONTROL_LOST)
-    def control_lost(self) -> _Steps:
+    def control_lost(self, *, lands: bool = False) -> _Steps:
         """Another flight task, a landing or a return is active.
 
-        In TAKING_OVER it is our own acquisition. Another one cancels that work, and its end is an event.
+        In TAKING_OVER it is our own acquisition. Another one cancels that work, and its end is an event. `lands`: the
+        drone lands, and no client has commanded that. Lines of the file may be reported late: the last one shows then
+        that the landing was the plan's.
         """
         state, flew = self.state, self.flying
         yield from self._end()
         if state is S.FLYING_FILE:
-            self.phase = replace(self.phase, stops=True)
+            late = lands and self.progress.course.following is None
+            self.phase = replace(self.phase, stops=True, may_end_late=late)
         if flew or state is S.STARTING:
             yield Suspend(starting=state is S.STARTING)
 

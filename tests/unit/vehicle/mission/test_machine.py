@@ -266,6 +266,22 @@ def test_paused_mission_that_another_controller_resumes_is_shown_as_flown() -> N
     assert machine.state is S.FLYING_FILE
 
 
+def test_late_report_of_the_last_line_completes_a_mission_that_a_landing_of_the_drone_has_paused() -> None:
+    """One that a client has paused, or that goes on with another part, stays paused."""
+    machine = flying(LAST)
+    machine.control_lost(lands=True)
+    machine.executed(1)
+    assert machine.state is S.COMPLETE
+    machine = flying(LAST)
+    machine.control_lost()
+    machine.executed(1)
+    assert machine.state is S.PAUSED
+    machine = flying()
+    machine.control_lost(lands=True)
+    machine.executed(2)
+    assert machine.state is S.PAUSED
+
+
 def test_playing_that_the_drone_repeats_counts_once() -> None:
     """Of its own start, of a mission that another controller has resumed, and of another plan; a stop ends each."""
     machine, attempt = starting()
