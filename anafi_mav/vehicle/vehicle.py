@@ -831,7 +831,8 @@ class Vehicle(Aircraft):
         gps, ato = self.drone.gps.state, self.drone.piloting.state.altitude
         amsl = gps.location.altitude if gps.fixed and gps.location is not None else None
         if self.flying_state == FlyingState.LANDED:
-            self.height.on_ground(amsl, ato)
+            if not self.drone.piloting.about_to_fly:  # else it may have left the ground, and report that late
+                self.height.on_ground(amsl, ato)
             if self.origin is None:
                 self._set_origin(self.place)
         elif self.flying_state is not None and self.height.in_flight(self.drone.product.state.flight_id, amsl, ato):
