@@ -356,7 +356,10 @@ class MissionMachine:
 
     @property
     def begins_with_landing(self) -> bool:
-        """The drone is commanded to fly a file that lands where it is, and may report the landing before the file."""
+        """The drone is commanded to fly a file that lands where it is.
+
+        It may report the landing before it reports that it flies the file.
+        """
         prepared = self.phase.prepared
         if self.state is not S.STARTING or prepared is None:
             return False
