@@ -385,27 +385,10 @@ class PlanTransfer:
 
     def clear(self, peer: Peer, now: float) -> list[Effect]:
         """Handle MISSION_CLEAR_ALL, or MISSION_COUNT of 0; an empty list is acknowledged, too."""
-        if self.is_changed_over_other_link(peer, now):
-            return []
         if not self.may_clear(peer, now):
             return self._occupied(peer)
         self.begin_clear(peer, now)
         return [Commit({self.kind.mission_type: ()}, peer, self.kind.mission_type)]
-
-    def is_changed_over_other_link(self, peer: Peer, now: float) -> bool:
-        """Return True if the client's ids change this list over another link, or did a moment ago.
-
-        What clears the list may then be a late copy of what the client has sent before: it must not delete what the
-        client has uploaded since. Another program with the same ids repeats it when it gets no answer.
-        """
-        upload, done = self._upload, self._done
-        if upload is not None:
-            last, at = upload.peer, upload.heard
-        elif done is not None:
-            last, at = done.peer, done.at
-        else:
-            return False
-        return last.client != peer.client and last.has_ids_of(peer) and now - at < PATIENCE
 
     def may_clear(self, peer: Peer, now: float) -> bool:
         """Return True if no other client transfers this list."""

@@ -367,20 +367,6 @@ def test_copies_over_another_link_of_a_router_are_not_answered() -> None:
     assert replies(plans.receive(count(2), copy, 0.2 + PATIENCE))[0].seq == 0
 
 
-@pytest.mark.parametrize("late", [clear(), count(0), clear(ALL)], ids=["clear", "count 0", "clear all"])
-def test_late_copy_of_a_clearing_over_another_link_deletes_no_newer_plan(late: Any) -> None:
-    """MAVProxy clears a list before it uploads another."""
-    plans, copy = mission_protocol(), peer(channel="b")
-    plans.stored(commit_of(plans.receive(clear(), ME, 0.0)), 0.0)
-    plans.receive(count(2), ME, 0.1)
-    assert plans.receive(late, copy, 0.2) == []
-    assert uploaded_rest(plans, 0, 2) == items(2)
-    assert plans.receive(late, copy, 0.3) == []
-    assert plans.transfers[FENCE].items == items(2)
-    commit = commit_of(plans.receive(late, copy, 0.3 + PATIENCE))  # of another program with the same ids
-    assert commit.plans[FENCE] == ()
-
-
 def test_a_silent_client_gives_way_to_another() -> None:
     plans = mission_protocol()
     plans.receive(count(2), ME, 0.0)
