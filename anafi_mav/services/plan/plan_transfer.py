@@ -83,9 +83,12 @@ class Peer(msgspec.Struct, frozen=True):
     may_change: bool = True
     """False for a client that only reads plans: its downloads keep no other client away."""
 
-    def has_ids_of(self, other: Peer) -> bool:
-        """Return True for the same ids, as a client has over each link of a router with two."""
-        return (self.sysid, self.compid) == (other.sysid, other.compid)
+    def is_copy_of(self, other: Peer) -> bool:
+        """Return True for the ids of `other` over another link.
+
+        So does a router with two links to us show its clients.
+        """
+        return self.client != other.client and (self.sysid, self.compid) == (other.sysid, other.compid)
 
 
 class Reply(msgspec.Struct, frozen=True):
@@ -283,9 +286,7 @@ class PlanTransfer:
         return self._begin(_Upload(peer, items, Requests(first, last), now), now)
 
     def _begin(self, upload: _Upload, now: float) -> list[Effect]:
-        last = self._upload or self._done
-        is_other = last is not None and last.peer.client != upload.peer.client
-        if last is not None and is_other and upload.peer.has_ids_of(last.peer) and self._is_same_range(upload, now):
+        if self._is_copy(upload, now):
             return []
         if self._busy(upload.peer, now):
             return self._occupied(upload.peer)
@@ -313,17 +314,20 @@ class PlanTransfer:
         self._upload = upload
         return [*effects, self._request(upload, now)]
 
-    def _is_same_range(self, upload: _Upload, now: float) -> bool:
-        """Return True for an upload of the items that the last one, a moment ago, has or had.
+    def _is_copy(self, upload: _Upload, now: float) -> bool:
+        """Return True for an upload that its client has begun over another link a moment ago.
 
-        Over another link of the same client it is a copy, which is not answered: a refusal would end the upload for
-        the client. Another program with the same ids begins again when it gets no answer.
+        It is not answered: a refusal would end the upload for the client. Another program with the same ids begins
+        again when it gets no answer.
         """
-        first, last = upload.requests.first, upload.requests.last
         if (old := self._upload) is not None:
-            return (first, last) == (old.requests.first, old.requests.last) and now - old.heard < PATIENCE
-        done = self._done
-        return done is not None and last == done.last and now - done.at < PATIENCE
+            its, heard, peer = (old.requests.first, old.requests.last), old.heard, old.peer
+        elif (done := self._done) is not None and done.last >= 0:
+            its, heard, peer = (upload.requests.first, done.last), done.at, done.peer
+        else:
+            return False
+        is_same = its == (upload.requests.first, upload.requests.last) and upload.peer.is_copy_of(peer)
+        return is_same and now - heard < PATIENCE
 
     def item(self, message: Any, peer: Peer, now: float) -> list[Effect]:
         """MISSION_ITEM or MISSION_ITEM_INT, in whichever form it was requested.
@@ -334,8 +338,10 @@ class PlanTransfer:
         upload = self._upload
         if upload is None:
             return self._late_item(message.seq, peer, now)
+        if peer.is_copy_of(upload.peer):
+            return []
         if peer.client != upload.peer.client:
-            return [] if peer.has_ids_of(upload.peer) else [self._ack(peer, dialect.MAV_MISSION_DENIED)]
+            return [self._ack(peer, dialect.MAV_MISSION_DENIED)]
         upload.heard = now
         if message.seq != upload.requests.expected:
             upload.lossy = True
@@ -567,12 +573,11 @@ class PlanTransfer:
     def _late_item(self, seq: int, peer: Peer, now: float) -> list[Effect]:
         """Handle an item without an upload: a copy of a received item, or an error."""
         committing, done = self._committing, self._done
-        if committing is not None and committing.peer.has_ids_of(peer):
+        if committing is not None and (committing.peer.client == peer.client or peer.is_copy_of(committing.peer)):
             return []
-        is_recent = done is not None and now - done.at <= RECENT
-        if done is not None and is_recent and done.peer.client != peer.client and done.peer.has_ids_of(peer):
+        if done is not None and peer.is_copy_of(done.peer) and now - done.at <= RECENT:
             return []
-        if done is None or done.peer.client != peer.client or not is_recent:
+        if done is None or done.peer.client != peer.client or now - done.at > RECENT:
             return [self._ack(peer, dialect.MAV_MISSION_ERROR)]
         if seq != done.last:
             return []
