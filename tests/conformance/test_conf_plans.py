@@ -239,24 +239,6 @@ async def test_conf_065_a_second_client_is_refused(flavour: str, kind: int) -> N
         assert (await upload(other, wrong, kind)).type == ACCEPTED
 
 
-@both
-async def test_upload_over_two_links_of_a_router_is_answered_once(flavour: str) -> None:
-    async with world(flavour=flavour, also=flavour) as w:
-        second, plan = await w.connect(port=5761), square(PLACE, 50.0)
-        send, mark = w.client.send_raw, second.mark()
-
-        def send_twice(frame: bytes) -> None:
-            send(frame)
-            second.send_raw(frame)
-
-        w.client.send_raw = send_twice  # type: ignore[method-assign]
-        for _ in range(2):
-            assert (await upload(w.client, plan, FENCE)).type == ACCEPTED
-        w.client.send_raw = send  # type: ignore[method-assign]
-        assert [content(item) for item in await download(second, FENCE)] == [item.content for item in plan]
-        assert not [m for _, m in second.since(mark, "MISSION_ACK") + second.since(mark, "MISSION_REQUEST_INT")]
-
-
 BAD_ITEMS = [
     (FENCE, [Item(dialect.MAV_CMD_NAV_WAYPOINT, *PLACE)], UNSUPPORTED, "item 0"),
     (FENCE, [circle(PLACE, 50.0), Item(dialect.MAV_CMD_NAV_RALLY_POINT, *PLACE)], UNSUPPORTED, "item 1"),

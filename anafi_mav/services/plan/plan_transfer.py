@@ -83,14 +83,6 @@ class Peer(msgspec.Struct, frozen=True):
     may_change: bool = True
     """False for a client that only reads plans: its downloads keep no other client away."""
 
-    def is_copy_of(self, other: Peer) -> bool:
-        """Return True for the ids of `other` over another link.
-
-        So does a router with two links to us show its clients.
-        """
-        return self.client != other.client and (self.sysid, self.compid) == (other.sysid, other.compid)
-
-
 class Reply(msgspec.Struct, frozen=True):
     """Send this to one client."""
 
@@ -286,8 +278,6 @@ class PlanTransfer:
         return self._begin(_Upload(peer, items, Requests(first, last), now), now)
 
     def _begin(self, upload: _Upload, now: float) -> list[Effect]:
-        if self._is_copy(upload, now):
-            return []
         if self._busy(upload.peer, now):
             return self._occupied(upload.peer)
         effects: list[Effect] = []
@@ -314,21 +304,6 @@ class PlanTransfer:
         self._upload = upload
         return [*effects, self._request(upload, now)]
 
-    def _is_copy(self, upload: _Upload, now: float) -> bool:
-        """Return True for an upload that its client has begun over another link a moment ago.
-
-        It is not answered: a refusal would end the upload for the client. Another program with the same ids begins
-        again when it gets no answer.
-        """
-        if (old := self._upload) is not None:
-            its, heard, peer = (old.requests.first, old.requests.last), old.heard, old.peer
-        elif (done := self._done) is not None and done.last >= 0:
-            its, heard, peer = (upload.requests.first, done.last), done.at, done.peer
-        else:
-            return False
-        is_same = its == (upload.requests.first, upload.requests.last) and upload.peer.is_copy_of(peer)
-        return is_same and now - heard < PATIENCE
-
     def item(self, message: Any, peer: Peer, now: float) -> list[Effect]:
         """MISSION_ITEM or MISSION_ITEM_INT, in whichever form it was requested.
 
@@ -338,8 +313,6 @@ class PlanTransfer:
         upload = self._upload
         if upload is None:
             return self._late_item(message.seq, peer, now)
-        if peer.is_copy_of(upload.peer):
-            return []
         if peer.client != upload.peer.client:
             return [self._ack(peer, dialect.MAV_MISSION_DENIED)]
         upload.heard = now
@@ -573,9 +546,7 @@ class PlanTransfer:
     def _late_item(self, seq: int, peer: Peer, now: float) -> list[Effect]:
         """Handle an item without an upload: a copy of a received item, or an error."""
         committing, done = self._committing, self._done
-        if committing is not None and (committing.peer.client == peer.client or peer.is_copy_of(committing.peer)):
-            return []
-        if done is not None and peer.is_copy_of(done.peer) and now - done.at <= RECENT:
+        if committing is not None and committing.peer.client == peer.client:
             return []
         if done is None or done.peer.client != peer.client or now - done.at > RECENT:
             return [self._ack(peer, dialect.MAV_MISSION_ERROR)]

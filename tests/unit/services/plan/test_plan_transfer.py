@@ -348,25 +348,6 @@ def test_a_second_client_during_an_upload_is_refused() -> None:
     assert uploaded_rest(plans, 0, 2) == items(2)
 
 
-def test_copies_over_another_link_of_a_router_are_not_answered() -> None:
-    """Its client would read them as a refusal of the upload."""
-    plans, copy = mission_protocol(), peer(channel="b")
-    (request,) = replies(plans.receive(count(2), ME, 0.0))
-    assert request.seq == 0
-    assert plans.receive(count(2), copy, 0.1) == []
-    assert replies(plans.receive(count(3), copy, 0.1))[0].type == DENIED  # of another program
-    (request,) = replies(plans.receive(item(0), ME, 0.1))
-    assert request.seq == 1
-    assert plans.receive(item(0), copy, 0.1) == []
-    commit = commit_of(plans.receive(item(1), ME, 0.2))
-    assert plans.receive(item(1), copy, 0.2) == []
-    assert [m.type for m in replies(plans.stored(commit, 0.2))] == [ACCEPTED]
-    assert plans.receive(count(2), copy, 0.3) == []
-    assert plans.receive(item(1), copy, 0.3) == []
-    assert plans.transfers[FENCE].state is State.IDLE
-    assert replies(plans.receive(count(2), copy, 0.2 + PATIENCE))[0].seq == 0
-
-
 def test_a_silent_client_gives_way_to_another() -> None:
     plans = mission_protocol()
     plans.receive(count(2), ME, 0.0)
