@@ -239,6 +239,18 @@ async def test_conf_065_a_second_client_is_refused(flavour: str, kind: int) -> N
         assert (await upload(other, wrong, kind)).type == ACCEPTED
 
 
+async def test_fence_is_not_deleted_by_a_late_copy_of_its_clients_clearing() -> None:
+    """MAVProxy clears a fence before it uploads another; a router's second link to the gateway may be slow."""
+    async with world(also="px4") as w:
+        second, plan = await w.connect(port=5761), square(PLACE, 50.0)
+        frame, mark = w.client.pack(dialect.MAVLink_mission_clear_all_message(1, 1, FENCE)), w.client.mark()
+        w.client.send_raw(frame)
+        assert (await w.client.wait("MISSION_ACK", since=mark)).type == ACCEPTED
+        assert (await upload(w.client, plan, FENCE)).type == ACCEPTED
+        second.send_raw(frame)
+        assert [content(item) for item in await download(second, FENCE)] == [item.content for item in plan]
+
+
 BAD_ITEMS = [
     (FENCE, [Item(dialect.MAV_CMD_NAV_WAYPOINT, *PLACE)], UNSUPPORTED, "item 0"),
     (FENCE, [circle(PLACE, 50.0), Item(dialect.MAV_CMD_NAV_RALLY_POINT, *PLACE)], UNSUPPORTED, "item 1"),

@@ -83,6 +83,11 @@ class Peer(msgspec.Struct, frozen=True):
     may_change: bool = True
     """False for a client that only reads plans: its downloads keep no other client away."""
 
+    def is_copy_of(self, other: Peer) -> bool:
+        """Return True for the ids of `other` over another link, as of a router with two links to us."""
+        return self.client != other.client and (self.sysid, self.compid) == (other.sysid, other.compid)
+
+
 class Reply(msgspec.Struct, frozen=True):
     """Send this to one client."""
 
@@ -225,6 +230,8 @@ class PlanTransfer:
         self._upload: _Upload | None = None
         self._downloads: dict[Hashable, _Download] = {}
         self._done: _Done | None = None
+        self._cleared: tuple[Peer, float] | None = None
+        """Client that has cleared the list last, and when."""
         self._committing: _Done | None = None
 
     def put(self, items: Sequence[PlanItem]) -> None:
@@ -364,10 +371,23 @@ class PlanTransfer:
 
     def clear(self, peer: Peer, now: float) -> list[Effect]:
         """Handle MISSION_CLEAR_ALL, or MISSION_COUNT of 0; an empty list is acknowledged, too."""
+        if self.has_cleared_over_other_link(peer, now):
+            return []
         if not self.may_clear(peer, now):
             return self._occupied(peer)
         self.begin_clear(peer, now)
         return [Commit({self.kind.mission_type: ()}, peer, self.kind.mission_type)]
+
+    def has_cleared_over_other_link(self, peer: Peer, now: float) -> bool:
+        """Return True if the client's ids cleared this list over another link a moment ago.
+
+        A late copy of that must not delete what the client has uploaded since. Another program with the same ids
+        repeats it when it gets no answer.
+        """
+        if self._cleared is None:
+            return False
+        by, at = self._cleared
+        return peer.is_copy_of(by) and now - at < PATIENCE
 
     def may_clear(self, peer: Peer, now: float) -> bool:
         """Return True if no other client transfers this list."""
@@ -379,7 +399,7 @@ class PlanTransfer:
         self._downloads.pop(peer.client, None)
         self._forget_done(peer)
         self.state = TRANSITIONS[self.state][Event.CLEAR]
-        self._committing = _Done(peer, now, -1)
+        self._committing, self._cleared = _Done(peer, now, -1), (peer, now)
 
     def stored(self, items: tuple[PlanItem, ...], now: float, fault: PlanFault | None = None) -> list[Effect]:
         """Finish a `Commit`: it is stored, or has a fault.

@@ -348,6 +348,20 @@ def test_a_second_client_during_an_upload_is_refused() -> None:
     assert uploaded_rest(plans, 0, 2) == items(2)
 
 
+@pytest.mark.parametrize("late", [clear(), count(0), clear(ALL)], ids=["clear", "count 0", "clear all"])
+def test_late_copy_of_a_clearing_over_another_link_deletes_no_newer_plan(late: Any) -> None:
+    """MAVProxy clears a list before it uploads another."""
+    plans, copy = mission_protocol(), peer(channel="b")
+    plans.stored(commit_of(plans.receive(clear(), ME, 0.0)), 0.0)
+    plans.receive(count(2), ME, 0.1)
+    assert plans.receive(late, copy, 0.2) == []
+    assert uploaded_rest(plans, 0, 2) == items(2)
+    assert plans.receive(late, copy, PATIENCE - 0.1) == []
+    assert plans.transfers[FENCE].items == items(2)
+    commit = commit_of(plans.receive(late, copy, PATIENCE))  # of another program with the same ids
+    assert commit.plans[FENCE] == ()
+
+
 def test_a_silent_client_gives_way_to_another() -> None:
     plans = mission_protocol()
     plans.receive(count(2), ME, 0.0)
