@@ -21,7 +21,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support import clock
 from support.drone_events import EVENTS, random_event
 from support.fuzz import LONGEST, framed, offset, random_frames
-from support.mav import NAN
+from support.mav import CAMERA, NAN
 from support.missions import ROUND, put
 from support.setpoints import COPTER_BRAKE, COPTER_GUIDED, POSITION_ONLY, VELOCITY_ONLY, ZERO, attitude, earth, local
 from support.world import HOME, World, world
@@ -225,7 +225,7 @@ async def test_random_frames_to_the_camera_are_survived(fuzz_seed: int, mistakes
     source = random.Random(f"{fuzz_seed} camera")
     known = [newer.MAVLink_param_ext_set_message(1, 100, name, bytes(128), 6) for name in (b"CAM_MODE", b"CAM_VIDMODE")]
     async with world(model="thermal") as w:
-        frames = random_frames(source, TO_CAMERA)
+        frames = random_frames(source, TO_CAMERA, CAMERA)
         began = w.drone.log[-1].t
         with steady(w):
             for _ in range(12):

@@ -43,8 +43,11 @@ EVERY = tuple(sorted(dialect.mavlink_map.keys() - {dialect.MAVLINK_MSG_ID_SETUP_
 """Without the message that locks out a client without its key, as it should: test_signing_setup.py has random ones."""
 
 
-def random_frames(source: random.Random, ids: Sequence[int] = EVERY) -> Iterator[bytes]:
-    """Well-formed frames of these messages, two thirds of them to our system, and damaged ones."""
+def random_frames(source: random.Random, ids: Sequence[int] = EVERY, component: int | None = None) -> Iterator[bytes]:
+    """Well-formed frames of these messages, two thirds of them to our system, and damaged ones.
+
+    `component`: all of them are to it, so that none is a command to the autopilot.
+    """
     for count in itertools.count():
         id = source.choice(ids)
         kind = dialect.mavlink_map[id]
@@ -53,6 +56,8 @@ def random_frames(source: random.Random, ids: Sequence[int] = EVERY) -> Iterator
         for name, target in (("target_system", 1), ("target_component", source.choice((1, 1, 100)))):
             if name in kind.ordered_fieldnames and source.random() < 0.67:
                 payload[offset(kind, name)] = target
+        if component is not None and "target_component" in kind.ordered_fieldnames:
+            payload[offset(kind, "target_component")] = component
         frame = framed(id, bytes(payload).rstrip(b"\0") or b"\0", count % 256)
         if source.random() < 0.2:
             damaged = bytearray(frame)
