@@ -17,6 +17,7 @@ from support.setpoints import allow_speed, heard, held
 from support.world import HOME, TAKE_OFF_SPEED, World, world
 
 from anafi_mav import geo
+from anafi_mav.texts import OFFBOARD_STOPPED_HOVER
 
 SCRIPT = Path(__file__).with_name("mavsdk_offboard.py")
 
@@ -65,7 +66,7 @@ async def test_mavsdk_offboard() -> None:
         assert pose.ve > 0.8
         assert abs(pose.vn) < 0.4
         # By now it has begun again as often as it was held up, and for no other reason.
-        silences = [text for _, text in w.client.since(0, "STATUSTEXT") if "setpoints stopped" in text.text]
+        silences = [m for _, m in w.client.since(0, "STATUSTEXT") if m.text == OFFBOARD_STOPPED_HOVER]
         assert len(script.said("resumed")) == len(silences), script
         await script.line(lambda line: line.startswith("stopped"), timeout=20.0)
         assert await script.end() == 0, script

@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.sim.world.motion import Pose
+from anafi_mav.texts import OFFBOARD_STOPPED_HOVER
 from support.mav import Client
 from support.product import Process
 from support.world import HOLD, HOME, OFFBOARD, World
@@ -174,7 +175,7 @@ async def held(w: World, script: Process, name: str, calm: float = 0.0) -> Pose:
     """
     await script.line(lambda line: line == f"held {name}", timeout=60.0)
     loop = asyncio.get_running_loop()
-    disturbed = ("setpoints stopped", "Setpoint dropped", "Sticks silent")
+    disturbed = (OFFBOARD_STOPPED_HOVER, "Setpoint dropped", "Sticks silent")
     while True:
         texts_at = [at for at, m in w.client.since(0, "STATUSTEXT") if any(words in m.text for words in disturbed)]
         left = max(texts_at, default=-calm) + calm - loop.time()
