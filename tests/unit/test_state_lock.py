@@ -113,7 +113,7 @@ def test_state_folder_that_cannot_be_read_is_an_error_of_the_option(
     assert capsys.readouterr().err.strip() == expected
 
 
-@pytest.mark.skipif(os.name != "posix", reason="Windows deletes no open file")
+@pytest.mark.skipif(os.name != "posix", reason="deletes a file that is open, which Windows refuses")
 @pytest.mark.parametrize("words", [["info", "127.0.0.1", "--take"], ["doctor", "127.0.0.1", "--take"], ["keygen", "k"]])
 def test_gateway_whose_lock_file_was_deleted_keeps_its_drones_and_keys(
     words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -128,7 +128,7 @@ def test_gateway_whose_lock_file_was_deleted_keeps_its_drones_and_keys(
     lock.release()
 
 
-@pytest.mark.skipif(os.name != "posix", reason="Windows deletes no open file")
+@pytest.mark.skipif(os.name != "posix", reason="deletes a file that is open, which Windows refuses")
 def test_state_lock_whose_file_was_deleted_is_still_held(tmp_path: Path) -> None:
     first, second = StateLock(tmp_path), StateLock(tmp_path)
     assert first.acquire() is None
@@ -145,7 +145,7 @@ def test_state_lock_whose_file_was_deleted_is_still_held(tmp_path: Path) -> None
     second.release()
 
 
-@pytest.mark.skipif(os.name != "posix", reason="Windows has no shared locks")
+@pytest.mark.skipif(os.name != "posix", reason="shares a lock by fcntl.flock, which Windows does not have")
 @pytest.mark.parametrize("is_deleted", [False, True])
 def test_two_programs_that_look_at_the_same_moment_find_no_holder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_deleted: bool

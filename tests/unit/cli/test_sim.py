@@ -118,7 +118,7 @@ async def test_three_drones_in_one_process() -> None:
         assert len({device["name"] for device in devices}) == 3
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such limit")
+@pytest.mark.skipif(sys.platform == "win32", reason="sets a limit by ulimit of sh, which Windows does not have")
 async def test_fleet_that_needs_more_open_files_than_a_shell_allows_is_ready() -> None:
     """Each drone has four sockets, and a shell usually allows 1024 files."""
     words = (sys.executable, "-m", "anafi_mav", "sim", "--address", loopback(), "--count", "20")

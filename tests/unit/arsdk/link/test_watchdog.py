@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import socket
-import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
@@ -14,7 +13,9 @@ from anafi_mav.arsdk.link.frame import FrameType, encode_frame
 from anafi_mav.arsdk.link.watchdog import Watchdog
 from anafi_mav.cli import open_files
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the watchdog runs on POSIX only")
+pytestmark = pytest.mark.skipif(
+    os.name != "posix", reason="a process gets pipes of its parent by pass_fds, which subprocess has on POSIX alone"
+)
 
 SELECTABLE = 1024
 """Descriptors that select(2) knows."""
