@@ -1,4 +1,4 @@
-"""Conversions between ARSDK's units, MAVLink's and ours. No I/O.
+"""Conversions between ARSDK's units, MAVLink's and ours, and numbers in words. No I/O.
 
 Pure functions of plain numbers. Angles wrap here and nowhere else. MAVLink integers saturate instead of wrapping
 round: a value the field cannot hold is reported as the nearest it can.
