@@ -354,6 +354,7 @@ class SimulatedDrone:
         return WebServer(
             firmware.payload.media,
             firmware.plans,
+            firmware.flight_logs,
             properties,
             lambda: calendar.date(firmware.time),
             lambda: Quirk.NO_HTTP_RANGE not in self.faults.quirks,

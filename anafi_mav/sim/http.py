@@ -1,6 +1,7 @@
-"""The drone's web server: its media, their notifications, and the upload of flight plans.
+"""The drone's web server: media, their notifications, flight logs, and the upload of flight plans.
 
-Parrot's REST API as developer.parrot.com and Olympe have it (ANAFI media, ``/api/v1/media``; ``/api/v1/upload``).
+Parrot's REST API as developer.parrot.com and Olympe have it (ANAFI media, ``/api/v1/media``; ``/api/v1/upload``), and
+GroundSDK (flight logs, ``/api/v1/fdr/lite_records``: HttpFdrClient.java and FlightLogRestApi.swift).
 Parrot publishes no answers to mistakes but 541; ours are the plain ones of HTTP with ``{"error": "…"}``.
 """
 
@@ -10,12 +11,13 @@ import asyncio
 import contextlib
 import json
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from aiohttp import WSCloseCode, web
 from aiohttp.typedefs import Handler
 
+from anafi_mav.sim.payload.flight_log_store import FlightLogStore
 from anafi_mav.sim.payload.media import PART, MediaKind, MediaStore
 from anafi_mav.sim.plan.plan_store import FlightPlanStore
 
@@ -53,12 +55,14 @@ class WebServer:
         self,
         media: MediaStore,
         plans: FlightPlanStore,
+        flight_logs: FlightLogStore,
         properties: Mapping[str, str],
         date: Callable[[], str],
         has_ranges: Callable[[], bool] = lambda: True,
     ) -> None:
         self._media = media
         self._plans = plans
+        self._flight_logs = flight_logs
         self._properties = dict(properties)
         self._date = date
         self.has_ranges = has_ranges
@@ -87,6 +91,9 @@ class WebServer:
                 web.get(f"{api}/upload/flightplans", self._list_plans),
                 web.get(f"{api}/upload/flightplan/{{id}}", self._plan),
                 web.delete(f"{api}/upload/flightplan/{{id}}", self._delete_plan),
+                web.get(f"{api}/fdr/lite_records", self._list_flight_logs),
+                web.delete(f"{api}/fdr/lite_records/{{name}}", self._delete_flight_log),
+                web.get("/data/fdr/{name}", self._flight_log),
             ]
         )
         app.on_shutdown.append(lambda app: self.close_sockets())
@@ -189,31 +196,36 @@ class WebServer:
         return web.json_response({"resource_id": resource.id, "media_id": resource.media_id, "md5": md5})
 
     async def _file(self, request: web.Request) -> web.StreamResponse:
+        resource = self._media.resource(request.match_info["id"]) if self._media.indexed else None
+        if resource is None:
+            return _unknown("file")
+        return await self._send(request, resource.size, resource.parts, _TYPES[resource.kind])
+
+    async def _send(
+        self, request: web.Request, size: int, parts: Callable[[int, int, int], Iterator[bytes]], content_type: str
+    ) -> web.StreamResponse:
         """Send a file part by part.
 
         All of it, or the one range that the client wants (RFC 9110 §14).
         """
-        resource = self._media.resource(request.match_info["id"]) if self._media.indexed else None
-        if resource is None:
-            return _unknown("file")
-        first, end = 0, resource.size
+        first, end = 0, size
         headers = {"Accept-Ranges": "bytes"} if self.has_ranges() else {}
         status = 200
         if self.has_ranges() and "Range" in request.headers:
             try:
-                first, end, _ = request.http_range.indices(resource.size)
+                first, end, _ = request.http_range.indices(size)
             except ValueError:  # a range that cannot be read is none (RFC 9110 §14.2)
                 pass
             else:
                 if first >= end:
-                    return web.Response(status=416, headers={"Content-Range": f"bytes */{resource.size}"})
-                status, headers["Content-Range"] = 206, f"bytes {first}-{end - 1}/{resource.size}"
+                    return web.Response(status=416, headers={"Content-Range": f"bytes */{size}"})
+                status, headers["Content-Range"] = 206, f"bytes {first}-{end - 1}/{size}"
         response = web.StreamResponse(status=status, headers=headers)
-        response.content_type = _TYPES[resource.kind]
+        response.content_type = content_type
         response.content_length = end - first
         await response.prepare(request)
         with contextlib.suppress(ConnectionError):  # the client has left
-            for part in resource.parts(first, end, SENT_PART):
+            for part in parts(first, end, SENT_PART):
                 await self._audible.wait()
                 await response.write(part)
             await response.write_eof()
@@ -295,6 +307,21 @@ class WebServer:
 
     async def _delete_plan(self, request: web.Request) -> web.Response:
         return web.Response() if self._plans.remove(request.match_info["id"]) else _unknown("flight plan")
+
+    # -- flight logs
+
+    async def _list_flight_logs(self, request: web.Request) -> web.Response:
+        self.served["flight logs"] += 1
+        return web.json_response([log.describe() for log in self._flight_logs])
+
+    async def _flight_log(self, request: web.Request) -> web.StreamResponse:
+        log = self._flight_logs.find(request.match_info["name"])
+        if log is None:
+            return _unknown("file")
+        return await self._send(request, log.size, log.parts, "application/octet-stream")
+
+    async def _delete_flight_log(self, request: web.Request) -> web.Response:
+        return web.Response() if self._flight_logs.remove(request.match_info["name"]) else _unknown("flight log")
 
 
 async def _write(socket: web.WebSocketResponse, queue: asyncio.Queue[str], audible: asyncio.Event) -> None:

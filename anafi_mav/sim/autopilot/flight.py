@@ -33,6 +33,7 @@ from anafi_mav.sim.autopilot.power import Battery
 from anafi_mav.sim.autopilot.safety import Alarms, Warnings, check_changed, checklist
 from anafi_mav.sim.features.settings import DroneSettings
 from anafi_mav.sim.payload.camera_operator import CameraOperator
+from anafi_mav.sim.payload.flight_log_store import FlightLogStore
 from anafi_mav.sim.payload.gimbal import Gimbals
 from anafi_mav.sim.payload.jpeg_scene import Scene
 from anafi_mav.sim.payload.payload import Payload
@@ -86,6 +87,7 @@ class Autopilot:
         self.settings = DroneSettings(model, identity.name)
         self.battery = Battery(model)
         self.payload = Payload(model, identity.name, identity.run_id, emit, self._scene)
+        self.flight_logs = FlightLogStore()
         self.plans = FlightPlanStore()
         self.plans.refuses = lambda: (
             Quirk.UPLOAD_REFUSED_WHILE_PAUSED in faults.quirks and self.flight_plan.state is common.PlayingState.PAUSED
@@ -148,6 +150,7 @@ class Autopilot:
         if factory:
             self.settings.reset()
             self.plans.clear()
+            self.flight_logs.clear()
         self._body.off()
         self._wake()
 
@@ -471,6 +474,7 @@ class Autopilot:
         self._flights += 1
         self._last_flight = self.time - self._took_off_at
         self._flown += self._last_flight
+        self.flight_logs.add(self.payload.calendar.date(self.time), self._last_flight)
         self._took_off_at = None
         self.flight_id = ""
         self._emit(common.FlightId(""))

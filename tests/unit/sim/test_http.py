@@ -12,6 +12,7 @@ import aiohttp
 import pytest
 
 from anafi_mav.sim.http import MAX_BODY, MAX_UNREAD, WebServer
+from anafi_mav.sim.payload.flight_log_store import BLOCK, FlightLogStore
 from anafi_mav.sim.payload.jpeg_scene import Scene
 from anafi_mav.sim.payload.media import Media, MediaKind, MediaStore
 from anafi_mav.sim.plan.plan_store import FlightPlanStore
@@ -27,7 +28,8 @@ class Site:
     def __init__(self) -> None:
         self.media = MediaStore("run", "ANAFI", 0, lambda message: None)
         self.plans = FlightPlanStore()
-        self.server = WebServer(self.media, self.plans, {"model": "4k"}, lambda: DATE)
+        self.flight_logs = FlightLogStore()
+        self.server = WebServer(self.media, self.plans, self.flight_logs, {"model": "4k"}, lambda: DATE)
         self.client: aiohttp.ClientSession
 
     def photo(self, *kinds: MediaKind) -> Media:
@@ -321,3 +323,25 @@ async def test_server_without_ranges_sends_the_whole_file(site: Site) -> None:
     async with site.client.get(f"/data/media/{file.id}", headers={"Range": "bytes=5-"}) as answer:
         assert (answer.status, "Accept-Ranges" in answer.headers) == (200, False)
         assert await answer.read() == file.content()
+
+
+async def test_flight_logs_are_listed_read_and_deleted(site: Site) -> None:
+    assert await site.ask("GET", f"{API}/fdr/lite_records") == (200, [])
+    for seconds in (3.4, 100.0):
+        site.flight_logs.add(DATE, seconds)
+    status, (first, second) = await site.ask("GET", f"{API}/fdr/lite_records")
+    assert (status, first) == (
+        200,
+        {"name": "log-1.bin", "date": DATE, "size": 3 * BLOCK, "url": "/data/fdr/log-1.bin"},
+    )
+    status, whole = await site.ask("GET", second["url"])
+    assert (status, len(whole)) == (200, 100 * BLOCK)
+    assert whole[BLOCK * 70 :].startswith(f"log-2.bin {DATE} second 70 .".encode())
+    for first_byte, end in ((0, 1), (1000, 70_000), (65_536, 65_537), (1, 102_400)):
+        wanted = {"Range": f"bytes={first_byte}-{end - 1}"}
+        assert await site.ask("GET", second["url"], headers=wanted) == (206, whole[first_byte:end])
+    for path in (f"{API}/fdr/lite_records/log-3.bin", "/data/fdr/log-3.bin"):
+        assert (await site.ask("DELETE" if "api" in path else "GET", path))[0] == 404
+    assert (await site.ask("DELETE", f"{API}/fdr/lite_records/log-1.bin"))[0] == 200
+    status, left = await site.ask("GET", f"{API}/fdr/lite_records")
+    assert [log["name"] for log in left] == ["log-2.bin"]
