@@ -43,6 +43,7 @@ from anafi_mav.drone.element import Element, Reducer, defer
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time, require_number
 from anafi_mav.drone.features import Feature, Support, features
 from anafi_mav.drone.payload.camera import Camera
+from anafi_mav.drone.payload.flight_logs import FlightLogs
 from anafi_mav.drone.payload.gimbal import Gimbal
 from anafi_mav.drone.payload.media import Media
 from anafi_mav.drone.payload.storage import Storage
@@ -153,6 +154,9 @@ class Drone:
         self.home = Home(self._commander)
         self.link = Link()
         self.media = Media(self._commander, self._rest, lambda: self.piloting.state.flying not in MOTORS_OFF)
+        self.flight_logs = FlightLogs(
+            self._commander, self._rest, self.media.reader, lambda: self.piloting.state.flying
+        )
         self.poi = Poi(self._commander)
         self.product = Product()
         self.sound = Sound(self._commander)

@@ -262,7 +262,8 @@ class Media(Commanding[MediaState]):
         """While `is_flying`, files are read at `FLIGHT_RATE`: the radio carries the controls."""
         super().__init__(commander)
         self._client = MediaClient(rest)
-        self._reader = MediaReader(self._client, is_flying)
+        self.reader = MediaReader(self._client, is_flying)
+        """Reads all files of the drone's web server, also those that are no media."""
         self._index = MediaIndex(self._client)
 
     # -- what there is
@@ -296,7 +297,7 @@ class Media(Commanding[MediaState]):
     async def thumbnail(self, of: MediaItem | Resource) -> bytes:
         """Return a small JPEG. Raises `CommandRejected` when the drone has none."""
         client = self._available()
-        async with self._reader.turn():
+        async with self.reader.turn():
             return await client.thumbnail(of)
 
     # -- files
@@ -304,12 +305,12 @@ class Media(Commanding[MediaState]):
     async def read(self, resource: Resource, offset: int, size: int) -> bytes:
         """Return these bytes of a file. At most two files are read from the drone at a time."""
         self._available()
-        return await self._reader.read(resource, offset, size)
+        return await self.reader.read(resource, offset, size)
 
     async def read_from(self, resource: Resource, offset: int = 0) -> AsyncGenerator[bytes, None]:
         """Iterate over the bytes of a file from `offset` on."""
         self._available()
-        async for piece in self._reader.read_from(resource, offset):
+        async for piece in self.reader.read_from(resource, offset):
             yield piece
 
     async def download(
@@ -322,7 +323,7 @@ class Media(Commanding[MediaState]):
         """
         client = self._available()
         md5 = await client.md5(resource)
-        return await fetch(resource, directory, self._reader.read_from, md5, progress)
+        return await fetch(resource, directory, self.reader.read_from, md5, progress)
 
     async def download_media(self, media_id: str, directory: Path) -> tuple[Path, ...]:
         """Download every file of a media; return their paths."""
@@ -332,7 +333,7 @@ class Media(Commanding[MediaState]):
     async def close(self) -> None:
         """End the reads of files and lists."""
         await self._index.close()
-        await self._reader.close()
+        await self.reader.close()
 
     # -- away with them
 
