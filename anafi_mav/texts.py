@@ -647,6 +647,13 @@ MEDIA_NOT_COPIED = Template("Media not copied: {error}", error=BELOW)
 DELETE = Subject("Delete")
 CAMERA_SAVING = Reason("camera is saving photos")
 
+# == Flight logs ==
+
+LOGS_UNAVAILABLE = Template("Flight logs unavailable: {error}", error=BELOW)
+LOG_TOO_LARGE = OperatorText("Flight log too large for FTP")
+LOGS_ERASED = Template("Flight logs erased: {count}", count=99999)
+ERASE_LOGS = Subject("Erase logs")
+
 # == Ground stations ==
 
 STATION_BACK = OperatorText("Ground station is back")

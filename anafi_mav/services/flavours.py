@@ -118,6 +118,8 @@ class Flavour:
     request 1154 says; dronekit sends them so); otherwise they are above mean sea level."""
     base_mode_in_custom0: bool = False
     """HIGH_LATENCY2.custom0 is HEARTBEAT.base_mode, as a signed byte."""
+    first_log_id: int = 0
+    """Id of the oldest flight log. QGroundControl and Mission Planner count an ArduPilot's logs from 1."""
     title: str = ""
     """Name of the autopilot in its banner; empty: none."""
 
@@ -285,6 +287,7 @@ ARDUPILOT = Flavour(
     loiter_command=True,
     relative_long_regions=True,
     base_mode_in_custom0=True,
+    first_log_id=1,
     # ArduCopter sends home when it is set; programs take one that arrives later for news (dronekit2's own tests).
     unstreamed=frozenset({dialect.MAVLINK_MSG_ID_HOME_POSITION}),
     title="ArduCopter V4.5.7",

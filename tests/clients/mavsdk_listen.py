@@ -11,8 +11,10 @@ import json
 import math
 import statistics
 import sys
+import tempfile
 from collections.abc import Awaitable, Callable
 from enum import Enum
+from pathlib import Path
 from typing import Any
 
 from mavsdk.asyncio.plugins.action import ActionAsync
@@ -116,6 +118,22 @@ async def rate(telemetry: TelemetryAsync, name: str, count: int = 60) -> float:
     return 1.0 / statistics.median(b - a for a, b in itertools.pairwise(times))
 
 
+async def download(logs: LogFilesAsync, entry: Any, path: str) -> None:
+    async for _ in logs.download_log_file(entry, path):
+        pass
+
+
+async def flight_logs(logs: LogFilesAsync) -> Any:
+    """Download the only log, then erase all: its date and size, the copy's bytes, and the list after it."""
+    (entry,) = await logs.get_entries()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "log"
+        await asyncio.wait_for(download(logs, entry, str(path)), 30.0)
+        copy = path.read_bytes().decode()
+    await logs.erase_all_log_files()
+    return [entry.date, entry.size_bytes, copy, await result(logs.get_entries)]
+
+
 async def main(url: str) -> None:
     async with connected(url) as drone:
         telemetry, info, action = TelemetryAsync(drone), InfoAsync(drone), ActionAsync(drone)
@@ -151,6 +169,7 @@ async def main(url: str) -> None:
         say("speed_factor", await result(info.get_speed_factor))
         await action.land()
         await asyncio.wait_for(first(telemetry, "armed", lambda armed: not armed), 30.0)
+        say("flight logs", await flight_logs(LogFilesAsync(drone)))
         say("end", True)
 
 

@@ -83,6 +83,12 @@ async def test_telemetry_and_info(tmp_path: Path) -> None:
         assert observed["flying distance_sensor"]["current_distance_m"] == pytest.approx(3.0, abs=0.8)
         for name in ("attitude_quaternion", "odometry"):  # the pictures' pace; events would be at 5 Hz
             assert observed[f"hz {name}"] > 20.0, name
+        date, size, copy, after = observed["flight logs"]
+        lines = copy.splitlines()
+        assert (len(copy), date[:4]) == (size, str(time.gmtime().tm_year))
+        assert {line.split()[0] for line in lines} == {"log-1.bin"}
+        assert [int(line.split()[3]) for line in lines] == list(range(len(lines)))  # none missing, none twice
+        assert after == "NO_LOGFILES"
         flight = observed["flight_information"]
         assert flight["flight_uid"] > 0
         assert 0 < flight["duration_since_takeoff_ms"] <= flight["duration_since_arming_ms"]

@@ -250,7 +250,7 @@ async def test_conf_041_velocity_signs(flavour: str) -> None:
 
 @both
 async def test_conf_131_no_logs(flavour: str) -> None:
-    async with world(flavour=flavour) as w:
+    async with world(flavour=flavour, web=True) as w:
         mark = w.client.mark()
         w.client.send(dialect.MAVLink_log_request_list_message(1, 1, 0, 0xFFFF))
         entry = await w.client.wait("LOG_ENTRY", since=mark, timeout=0.5)

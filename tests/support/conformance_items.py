@@ -150,7 +150,7 @@ ITEMS: dict[int, Item] = {
     128: Item("COMPONENT_INFORMATION_BASIC of the camera"),
     129: Item("COMMAND_CANCEL of a calibration, and of a format, which goes on", NEITHER),
     130: Item("calibration with progress texts, refused in flight"),
-    131: Item("log list, empty but correct", NEITHER),
+    131: Item("flight logs: list, download, erase; over FTP too"),
     132: Item("FLIGHT_INFORMATION", NEITHER),
     133: Item("DISTANCE_SENSOR, WIND_COV, VIBRATION only with real data", NEITHER),
     134: Item("RC_CHANNELS rssi in the flavour's scale"),

@@ -1,1 +1,1 @@
-"""MAVLink FTP: the server, its files, and the empty flight logs."""
+"""MAVLink FTP: the server and its files; the drone's flight logs."""
