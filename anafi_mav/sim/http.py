@@ -1,4 +1,4 @@
-"""The drone's web server: media, their notifications, flight logs, and the upload of flight plans.
+"""The drone's web server: media, notifications, flight logs and flight plans.
 
 Parrot's REST API as developer.parrot.com and Olympe have it (ANAFI media, ``/api/v1/media``; ``/api/v1/upload``), and
 GroundSDK (flight logs, ``/api/v1/fdr/lite_records``: HttpFdrClient.java and FlightLogRestApi.swift).
