@@ -269,7 +269,7 @@ class FeedReader:
             extra = self._feed.parameters(picture.sequence + self._shift & _WRAP16, picture.timestamp)
             self._shift += len(extra)
         self.counts["pictures"] += 1
-        if not self._shift & _WRAP16:
+        if not extra and not self._shift & _WRAP16:
             return self._sent(picture.datagrams)
         return self._sent([*extra, *(_renumbered(one, self._shift, picture.timestamp) for one in picture.datagrams)])
 

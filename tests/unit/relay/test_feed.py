@@ -170,6 +170,22 @@ def test_viewer_of_a_stream_without_entries_begins_after_a_wait() -> None:
     assert numbers == [(numbers[0] + n) & 0xFFFF for n in range(len(got))]
 
 
+def test_viewer_that_missed_one_packet_begins_with_the_parameter_sets() -> None:
+    """The packet of the parameter sets then has the number of the one that it missed."""
+    feed = Feed(1, 0, 0)
+    feed.set_parameters(SPS, PPS)
+    viewer = FeedReader(feed)
+    viewer.begin(10.0)
+    first = feed.add(picture(0, SLICE), 10.0)
+    assert first is not None
+    assert viewer.take(first, 0, 10.0) == ()
+    later = feed.add(picture(90 * STEP, SLICE), 13.0)
+    assert later is not None
+    got = viewer.take(later, 0, 13.0)
+    assert units(got) == [(SPS, PPS, SLICE)]
+    assert [one.sequence for one in packets(got)] == [0, 1]
+
+
 def test_sender_report_names_the_time_of_the_stream() -> None:
     feed, _ = playing(31)
     report = feed.report(11.0 + 0.5, 1_700_000_000.25, packets=(1 << 32) + 7, octets=9)
