@@ -71,7 +71,7 @@ NAME = "anafi-mav"
 """Our CNAME in RTCP reports."""
 
 CLOSE_WAIT = 1.0
-"""s that closing waits for connections to end."""
+"""s that a closed connection has for what it still has to send, and that closing the server waits for all of them."""
 
 
 class RelayServer:
@@ -426,7 +426,12 @@ class _Connection:
         self._stream = self._feed = None
 
     def close(self) -> None:
-        """End session and connection. Idempotent."""
+        """End session and connection. Idempotent.
+
+        A viewer that does not read what waits for it would keep the connection open, and its place: it is aborted.
+        """
         self._end_session()
         self._dialogue.state = DialogueState.INIT
-        self._writer.close()
+        if not self._writer.is_closing():
+            self._writer.close()
+            asyncio.get_running_loop().call_later(CLOSE_WAIT, self._writer.transport.abort)

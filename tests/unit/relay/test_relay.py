@@ -274,6 +274,21 @@ async def test_playing_viewer_that_reads_no_responses_is_aborted(
         assert held.relay.viewers == 0
 
 
+async def test_viewer_that_stops_reading_frees_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A suspended player answers the probes of TCP for ever, and the pictures that wait for it never leave."""
+    monkeypatch.setattr("support.video_server.SLICE", SLICE[:1] + bytes(60_000))
+    monkeypatch.setattr(server_module, "STUCK", 1.0)
+    async with studio() as held, viewer(held.relay.port) as stuck:
+        await stuck.describe(LIVE)
+        response = await stuck.ask("SETUP", f"{LIVE}/video", Transport="RTP/AVP/TCP;interleaved=0-1")
+        session = response.header("Session") or ""
+        stuck.writer.transport.pause_reading()
+        stuck.writer.write(f"PLAY {stuck.base}{LIVE} RTSP/1.0\r\nCSeq: 9\r\nSession: {session}\r\n\r\n".encode())
+        (connection,) = held.relay._connections
+        await asyncio.wait({connection}, timeout=6 * LIMIT)
+        assert not held.relay._connections
+
+
 async def test_viewer_with_too_many_requests_is_aborted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(server_module, "TICK", 3600.0)
     async with studio() as held, viewer(held.relay.port) as client:
