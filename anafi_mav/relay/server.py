@@ -326,18 +326,19 @@ class _Connection:
             raise NotShown(reason)
         if self._outlet is None and self._server.sessions >= MAX_VIEWERS:
             return self._dialogue.refused(request, Status.NOT_ENOUGH_BANDWIDTH, "too many viewers")
-        self._end_session()
         offer = wanted.offers[0]
-        if offer.channels is not None:
-            self._outlet = TcpOutlet(self._writer.transport, offer.channels)
-        else:
-            assert offer.client_ports is not None
+        outlet: Outlet
+        if offer.client_ports is not None:
             try:
-                self._outlet = await UdpOutlet.open(self._here, self._there, offer.client_ports, self._on_report)
+                outlet = await UdpOutlet.open(self._here, self._there, offer.client_ports, self._on_report)
             except OSError as error:
                 return self._dialogue.refused(request, Status.INTERNAL_ERROR, error.strerror or str(error))
-        self._stream = found
-        return self._dialogue.set_up(request, self._outlet.transport)
+        else:
+            assert offer.channels is not None
+            outlet = TcpOutlet(self._writer.transport, offer.channels)
+        self._end_session()  # not before: a refused SETUP changes nothing
+        self._outlet, self._stream = outlet, found
+        return self._dialogue.set_up(request, outlet.transport)
 
     async def _play(self, request: RtspRequest) -> None:
         if self._watch is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import resource
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
@@ -287,6 +288,21 @@ async def test_viewer_that_stops_reading_frees_its_place(monkeypatch: pytest.Mon
         (connection,) = held.relay._connections
         await asyncio.wait({connection}, timeout=6 * LIMIT)
         assert not held.relay._connections
+
+
+async def test_set_up_without_room_for_sockets_keeps_the_former_transport() -> None:
+    async with studio() as held, viewer(held.relay.port) as client:
+        await client.describe(LIVE)
+        eye = await client.setup(f"{LIVE}/video")
+        limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (3, limits[1]))
+        try:
+            answer = await client.ask("SETUP", f"{LIVE}/video", Transport="RTP/AVP;unicast;client_port=5004-5005")
+        finally:
+            resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+        assert answer.status == 500
+        await client.play(LIVE)
+        await eye.first(3)
 
 
 async def test_viewer_with_too_many_requests_is_aborted(monkeypatch: pytest.MonkeyPatch) -> None:
