@@ -83,7 +83,7 @@ class MediaReader:
         One of unknown size is read as it arrives.
         """
         if not resource.size:
-            async with self._client.open(resource, offset) as (_, chunks):
+            async with self.turn(), self._client.open(resource, offset) as (_, chunks):
                 async for chunk in chunks:
                     yield chunk
                     await self.pace(len(chunk))

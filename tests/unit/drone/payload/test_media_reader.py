@@ -9,6 +9,7 @@ from contextlib import aclosing, asynccontextmanager
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from anafi_mav.drone.payload import media_reader
 from anafi_mav.drone.payload.media_file import Resource, fetch
@@ -116,8 +117,10 @@ async def test_read_stays_a_few_pieces_ahead(server: Server) -> None:
     assert server.open_now == 0
 
 
-async def test_third_file_waits_for_its_turn(server: Server) -> None:
-    wanted = [server.add(name) for name in "abcd"]
+@pytest.mark.parametrize("size", [SIZE, 0], ids=["sized", "unsized"])
+async def test_third_file_waits_for_its_turn(server: Server, size: int) -> None:
+    """Also among files whose size the drone does not report."""
+    wanted = [replace(server.add(name), size=size) for name in "abcd"]
     reader = MediaReader(server)
 
     async def whole(one: Resource) -> bytes:
