@@ -83,7 +83,10 @@ UNENDABLE = (
 """Why a landing or a return is not ended."""
 
 POSITION_OLD = 3.0
-"""s without a GPS location, which an ANAFI reports once a second, after which the last one is no position in flight."""
+"""s without a GPS location, which an ANAFI reports once a second, after which the last one is no position in flight.
+
+Nor after the landing, until the drone reports the next one.
+"""
 
 LOCATIONS_MISSED = 3
 """A drone that reports its location more rarely (a slowed simulator) may miss as many."""
@@ -162,6 +165,8 @@ class LinkFacts:
     """When the newest GPS location arrived (s)."""
     location_every: float = 0.0
     """s between it and the one before."""
+    landed_at: float = -math.inf
+    """When the last flight ended (s)."""
     lands_next: tuple[int, float] | None = None
     """A return has finished that the drone ends by landing: the epoch then, and until when it is due."""
     own_return: ReturnReason | None = None
@@ -259,12 +264,13 @@ class Vehicle(Aircraft):
     def _position_expiry(self) -> float:
         """When the newest location becomes old, if no other follows (s).
 
-        `NEVER` on the ground and without a location.
+        `NEVER` without a location. On the ground, where nothing moves, the newest one stays what it was at the landing.
         """
         gps, facts, flying = self.drone.gps.state, self.link_facts, self.flying_state
-        if not gps.fixed or gps.location is None or flying is None or flying in ON_GROUND:
+        if not gps.fixed or gps.location is None or flying is None:
             return NEVER
-        return facts.located_at + max(POSITION_OLD, LOCATIONS_MISSED * facts.location_every)
+        expiry = facts.located_at + max(POSITION_OLD, LOCATIONS_MISSED * facts.location_every)
+        return NEVER if flying in ON_GROUND and expiry >= facts.landed_at else expiry
 
     def position_expires_at(self, now: float) -> float:
         """Return when `position_is_old` becomes true by itself (s); `NEVER` when it is."""
@@ -785,6 +791,8 @@ class Vehicle(Aircraft):
         takeoff = self.drone.home.state.takeoff_location
         self._note_landing(before)
         if state in ON_GROUND and before is not None:
+            if before not in ON_GROUND:
+                self.link_facts = replace(self.link_facts, landed_at=self._clock.monotonic())
             self.commanded_speeds = CommandedSpeeds()
             self.return_end.on_ground()
             self.takeoff.came_down()

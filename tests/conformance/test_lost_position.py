@@ -6,7 +6,8 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.cameras import PHOTO, enter, request
 from support.fault_scenarios import ACCEPTED
 from support.mav import NAN, Client
-from support.world import HOME, World, loopback, world
+from support.setpoints import streaming
+from support.world import ARMED, HOME, World, loopback, world
 
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.config import Config, DroneConfig
@@ -35,6 +36,47 @@ async def test_fix_is_gone_while_locations_are_missing() -> None:
         await late.wait("GPS_RAW_INT", lambda m: m.fix_type < dialect.GPS_FIX_TYPE_2D_FIX, since=0, timeout=10.0)
         w.drone.faults.unreported = frozenset()
         await w.client.wait("GPS_RAW_INT", lambda m: m.fix_type == dialect.GPS_FIX_TYPE_3D_FIX, timeout=10.0)
+
+
+async def test_position_lost_in_flight_is_unknown_after_the_landing() -> None:
+    """The last location is of another place; the next one tells where the drone stands."""
+    async with world() as w:
+        await w.take_off(5.0)
+        ack = await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 3)  # Position
+        assert ack.result == ACCEPTED
+        await position_unknown(w)
+        async with streaming(w.client, dialect.MAVLink_manual_control_message(1, 1000, 0, 500, 0, 0)):
+            while w.drone.pose.north < 20.0:
+                await w.client.wait("ATTITUDE")
+        mark = w.client.mark()
+        assert (await w.client.command(dialect.MAV_CMD_NAV_LAND, timeout=20.0)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark, timeout=20.0)
+        landed = w.client.mark()
+        for _ in range(3):
+            await w.client.wait("SYS_STATUS")
+        assert not w.client.since(landed, "GLOBAL_POSITION_INT")
+        assert {m.fix_type for _, m in w.client.since(mark, "GPS_RAW_INT")} == {dialect.GPS_FIX_TYPE_NO_FIX}
+        assert not [m for _, m in w.client.since(mark, "STATUSTEXT") if "Position known" in m.text]
+        w.drone.faults.unreported = frozenset()
+        place = await w.client.wait("GLOBAL_POSITION_INT")
+        assert (place.lat / 1e7 - HOME[0]) * 111_000 > 20.0
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Position known again", since=landed)
+
+
+async def test_position_is_not_called_known_when_the_fix_is_lost_too() -> None:
+    async with world() as w:
+        await w.take_off(5.0)
+        await position_unknown(w)
+        mark = w.client.mark()
+        w.drone.faults.gps = False
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Sensor failed: gps", since=mark)
+        for _ in range(3):
+            await w.client.wait("SYS_STATUS")
+        assert not [m for _, m in w.client.since(mark, "STATUSTEXT") if "Position" in m.text]
+        w.drone.faults.gps = True
+        w.drone.faults.unreported = frozenset()
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Position known again", since=mark)
+        await w.client.wait("GLOBAL_POSITION_INT")
 
 
 async def test_place_of_the_camera_is_unknown_while_locations_are_missing() -> None:

@@ -46,7 +46,8 @@ class TelemetryService(Service):
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._position_is_old = False
+        self._is_lost = False
+        """The clients have the text that the position is unknown, and not yet that it is known again."""
 
     def messages(self) -> Mapping[int, MessageHandler]:
         return {dialect.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN: self._keep_origin}
@@ -63,13 +64,13 @@ class TelemetryService(Service):
             host.send(origin, inbound.channel)
 
     def link_down(self) -> None:
-        self._position_is_old = False
+        self._is_lost = False
 
     def subscriptions(self) -> Subscriptions:
         return {events.GpsLocationChanged: self._on_location}
 
     def _on_location(self, message: Message, now: float) -> None:
-        if self._position_is_old:
+        if self._is_lost:
             self.host.look_soon()
 
     def tick(self, now: float) -> float:
@@ -77,17 +78,18 @@ class TelemetryService(Service):
 
         Without positions a station keeps showing the last one.
         """
-        is_old = self.host.vehicle.position_is_old
-        if is_old or self._position_is_old:
+        vehicle = self.host.vehicle
+        is_old = vehicle.position_is_old
+        if is_old or self._is_lost:
             # No event reports that the fix of GPS_RAW_INT is gone; repeated for clients that connect later.
             self.host.mark_updated(dialect.MAVLINK_MSG_ID_GPS_RAW_INT, now)
-        if is_old != self._position_is_old:
-            self._position_is_old = is_old
-            if is_old:
-                self.host.text(Severity.WARNING, texts.POSITION_LOST.fill(seconds=POSITION_OLD))
-            else:
-                self.host.text(Severity.NOTICE, texts.POSITION_FOUND)
-        return self.host.vehicle.position_expires_at(now)
+        if is_old and not self._is_lost:
+            self._is_lost = True
+            self.host.text(Severity.WARNING, texts.POSITION_LOST.fill(seconds=POSITION_OLD))
+        elif self._is_lost and vehicle.place is not None:  # else the drone has lost its fix, too
+            self._is_lost = False
+            self.host.text(Severity.NOTICE, texts.POSITION_FOUND)
+        return vehicle.position_expires_at(now)
 
     def streams(self) -> Mapping[int, MessageStream]:
         return {

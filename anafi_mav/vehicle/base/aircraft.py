@@ -193,11 +193,14 @@ class Aircraft(Conditions):
     @property
     @abstractmethod
     def position_is_old(self) -> bool:
-        """True in flight when GPS locations have stopped although the drone reports a fix."""
+        """True when GPS locations have stopped in flight although the drone reports a fix.
+
+        It stays true after the landing, until the drone reports where it stands.
+        """
 
     @property
     def place(self) -> GeoPoint | None:
-        """Position of the drone; None without a fix, and in flight while the newest location is old."""
+        """Position of the drone; None without a fix, and while the newest location is old."""
         gps = self.drone.gps.state
         if not gps.fixed or gps.location is None or self.position_is_old:
             return None
