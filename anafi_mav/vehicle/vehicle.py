@@ -163,8 +163,8 @@ class LinkFacts:
     """Newest flying state that was handled."""
     located_at: float = -math.inf
     """When the newest GPS location arrived (s)."""
-    location_every: float = 0.0
-    """s between it and the one before."""
+    location_gaps: tuple[float, ...] = ()
+    """s between the newest three locations, or fewer."""
     landed_at: float = -math.inf
     """When the last flight ended (s)."""
     lands_next: tuple[int, float] | None = None
@@ -269,7 +269,9 @@ class Vehicle(Aircraft):
         gps, facts, flying = self.drone.gps.state, self.link_facts, self.flying_state
         if not gps.fixed or gps.location is None or flying is None:
             return NEVER
-        expiry = facts.located_at + max(POSITION_OLD, LOCATIONS_MISSED * facts.location_every)
+        # The shorter one: a gap in which locations were missing is not how often they are reported.
+        every = min(facts.location_gaps, default=0.0)
+        expiry = facts.located_at + max(POSITION_OLD, LOCATIONS_MISSED * every)
         return NEVER if flying in ON_GROUND and expiry >= facts.landed_at else expiry
 
     def position_expires_at(self, now: float) -> float:
@@ -830,8 +832,8 @@ class Vehicle(Aircraft):
     def on_location(self) -> None:
         """A new GPS location."""
         now, facts = self._clock.monotonic(), self.link_facts
-        every = now - facts.located_at if facts.located_at > -math.inf else facts.location_every
-        self.link_facts = replace(facts, located_at=now, location_every=every)
+        gaps = (*facts.location_gaps[-1:], now - facts.located_at) if facts.located_at > -math.inf else ()
+        self.link_facts = replace(facts, located_at=now, location_gaps=gaps)
         self.on_position()
 
     def on_position(self) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.cameras import PHOTO, enter, request
 from support.fault_scenarios import ACCEPTED
@@ -13,6 +15,7 @@ from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, Simulator
+from anafi_mav.sim.world.quirks import Quirk
 
 HIGH_LATENCY, HL_FAILURE_GPS = dialect.MAV_CMD_CONTROL_HIGH_LATENCY, dialect.HL_FAILURE_FLAG_GPS
 UNKNOWN = 2**31 - 1
@@ -77,6 +80,19 @@ async def test_position_is_not_called_known_when_the_fix_is_lost_too() -> None:
         w.drone.faults.unreported = frozenset()
         await w.client.wait("STATUSTEXT", lambda m: m.text == "Position known again", since=mark)
         await w.client.wait("GLOBAL_POSITION_INT")
+
+
+async def test_single_location_after_a_long_gap_is_not_current_for_long() -> None:
+    async with world() as w:
+        await w.take_off(5.0)
+        mark = w.client.mark()
+        w.drone.faults.quirks = frozenset({Quirk.GPS_LOCATION_STOPS})
+        await w.client.wait("STATUSTEXT", lambda m: "Position unknown" in m.text, since=mark, timeout=10.0)
+        await asyncio.sleep(20.0)  # without a location
+        mark = w.client.mark()
+        w.drone.inject(ardrone3.GpsLocationChanged(*HOME, 1, 1, 1))
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Position known again", since=mark)
+        await w.client.wait("STATUSTEXT", lambda m: "Position unknown" in m.text, since=mark, timeout=6.0)
 
 
 async def test_place_of_the_camera_is_unknown_while_locations_are_missing() -> None:
