@@ -117,8 +117,10 @@ class DroneSource:
             await self._wait(min(PARAMETERS_WAIT, give_up - loop.time()))
 
     def _is_ready(self, feed: Feed, now: float) -> bool:
+        """True when pictures arrive now: those that are kept from before a pause would look live."""
         first = self._first_picture
-        return first is not None and (bool(feed.sps) or now - first >= PARAMETERS_WAIT)
+        is_described = first is not None and (bool(feed.sps) or now - first >= PARAMETERS_WAIT)
+        return is_described and self._drone.video.state.playing
 
     def join(self, viewer: FeedViewer) -> None:
         """Show pictures to this viewer from now on."""

@@ -20,6 +20,7 @@ from anafi_mav.arsdk.video import rtcp
 from anafi_mav.arsdk.video.rtcp import Goodbye, SenderReport
 from anafi_mav.clock import SystemClock
 from anafi_mav.drone import Drone
+from anafi_mav.drone.video.video import STALE
 from anafi_mav.errors import ConfigError
 from anafi_mav.relay import server as server_module
 from anafi_mav.relay import source as source_module
@@ -134,6 +135,25 @@ async def test_new_viewer_gets_pictures_since_the_last_key_at_once() -> None:
         kept = await other.first(10)
         assert kept[0].units == (SPS, PPS, KEY)
         assert kept[-1].timestamp - kept[0].timestamp == (len(kept) - 1) * 90
+
+
+async def test_new_viewer_gets_no_old_pictures_while_the_video_pauses() -> None:
+    """What was kept before the pause would look live."""
+    async with studio() as held, viewer(held.relay.port) as first, viewer(held.relay.port) as second:
+        await first.describe(LIVE)
+        eye = await first.setup(f"{LIVE}/video")
+        await first.play(LIVE)
+        await eye.first(10)
+        held.server.quiet = True
+        await asyncio.sleep(STALE + 0.1)  # of silence
+        other = await second.setup_inside(f"{LIVE}/video")
+        answer = await second.ask("PLAY", LIVE)
+        assert answer.status == 503
+        assert "a picture" in answer.reason
+        assert not other.pictures
+        held.server.quiet = False
+        await second.play(LIVE)
+        await other.first(3)
 
 
 async def test_slow_viewer_does_not_delay_others(monkeypatch: pytest.MonkeyPatch) -> None:
