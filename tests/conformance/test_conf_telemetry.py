@@ -12,7 +12,7 @@ from support.mav import NAN, Client
 from support.world import HOME, World, world
 
 from anafi_mav import geo
-from anafi_mav.arsdk.messages import ardrone3, battery, common, wifi
+from anafi_mav.arsdk.messages import alarms, ardrone3, battery, common, wifi
 from anafi_mav.mavlink import dialect as newer
 from anafi_mav.sim import SimulatedDrone
 
@@ -130,6 +130,40 @@ async def test_conf_037_low_charge_is_reported_by_either_alert(unreported: list[
         assert not status.onboard_control_sensors_health & dialect.MAV_SYS_STATUS_SENSOR_BATTERY
         texts = [m.text for _, m in w.client.since(0, "STATUSTEXT") if "attery" in m.text]
         assert texts == ["Battery low (19 %)", "Battery critical (9 %)"]
+
+
+async def test_conf_037_low_charge_outlasts_another_alert() -> None:
+    """AlertStateChanged has one alert at a time; only its NONE ends that of the battery (GroundSDK, AnafiAlarms)."""
+
+    def reports(drone: SimulatedDrone) -> None:
+        drone.faults.unreported = frozenset({battery.Alert.NAME, alarms.TakeoffChecklist.NAME})
+
+    async with world(model="thermal", before=reports) as w:
+        w.drone.faults.battery = 9
+        critical = dialect.MAV_BATTERY_CHARGE_STATE_CRITICAL
+        await w.client.wait("BATTERY_STATUS", lambda m: m.charge_state == critical)
+        for alert in (ardrone3.AlertState.MAGNETO_PERTUBATION, ardrone3.AlertState.USER):
+            w.drone.inject(ardrone3.AlertStateChanged(alert))
+            mark = w.client.mark()
+            for _ in range(2):
+                assert (await w.client.wait("BATTERY_STATUS")).charge_state == critical
+            await w.client.heartbeat(lambda beat: beat.system_status == dialect.MAV_STATE_CRITICAL, since=mark)
+            ack = await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+            assert ack.result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
+        w.drone.inject(ardrone3.AlertStateChanged(ardrone3.AlertState.NONE))
+        await w.client.wait("BATTERY_STATUS", lambda m: m.charge_state == dialect.MAV_BATTERY_CHARGE_STATE_OK)
+
+
+async def test_conf_037_charge_state_without_an_alert_is_undefined() -> None:
+    """Stations then judge the percentage."""
+
+    def reports(drone: SimulatedDrone) -> None:
+        drone.faults.unreported = frozenset({battery.Alert.NAME, ardrone3.AlertStateChanged.NAME})
+        drone.faults.battery = 5
+
+    async with world(before=reports) as w:
+        status = await w.client.wait("BATTERY_STATUS", lambda m: m.battery_remaining == 5)
+        assert status.charge_state == dialect.MAV_BATTERY_CHARGE_STATE_UNDEFINED
 
 
 @both

@@ -150,8 +150,11 @@ def takeoff_blockers(alerts: AlertsState, battery: BatteryState, calibration: Ca
         reasons += [Blocker(BlockerKind.SENSOR, sensor) for sensor in failed]
     critical = [alert for alert, level in battery.alerts.items() if level == AlertLevel.CRITICAL]
     reasons += [Blocker(BlockerKind.BATTERY, alert) for alert in critical]
-    if not alerts.checklist and alerts.alert not in _HARMLESS:
-        reasons.append(Blocker(BlockerKind.ALERT, alerts.alert))
+    if not alerts.checklist:
+        if alerts.alert not in _HARMLESS:
+            reasons.append(Blocker(BlockerKind.ALERT, alerts.alert))
+        if BatteryAlert.POWER_LEVEL not in battery.alerts and battery.charge_level == AlertLevel.CRITICAL:
+            reasons.append(Blocker(BlockerKind.BATTERY, BatteryAlert.POWER_LEVEL))
     if alerts.motor_error not in (None, MotorError.NO_ERROR):
         reasons.append(Blocker(BlockerKind.MOTOR, alerts.motor_error))
     charge = [reason for reason in reasons if reason.is_charge]

@@ -15,10 +15,12 @@ from anafi_mav.arsdk.messages.battery import AlertLevel, BatteryAlert
 from anafi_mav.drone.element import Element, Reducer, with_item
 
 _CHARGE_LEVELS: Mapping[AlertState, AlertLevel] = {
+    AlertState.NONE: AlertLevel.NONE,
     AlertState.LOW_BATTERY: AlertLevel.WARNING,
     AlertState.CRITICAL_BATTERY: AlertLevel.CRITICAL,
     AlertState.ALMOST_EMPTY_BATTERY: AlertLevel.CRITICAL,
 }
+"""The other alerts take the place of the battery's without ending it (GroundSDK AnafiAlarms)."""
 
 
 class BatteryState(msgspec.Struct, frozen=True):
@@ -43,8 +45,8 @@ class BatteryState(msgspec.Struct, frozen=True):
     """By cell index; empty on models that do not report single cells."""
     alerts: Mapping[BatteryAlert, AlertLevel] = {}
     """Those of the battery alone; `levels` has the charge of every model."""
-    charge_level: AlertLevel = AlertLevel.NONE
-    """Level of a low charge by the drone's one alert (AlertStateChanged)."""
+    charge_level: AlertLevel | None = None
+    """Level of a low charge by the drone's one alert (AlertStateChanged); None: not reported."""
 
     def levels(self) -> Mapping[BatteryAlert, AlertLevel]:
         """Return the level of each alert.
@@ -52,15 +54,16 @@ class BatteryState(msgspec.Struct, frozen=True):
         Parrot names the 4K and the Ai as models that report a battery's alerts, and that only when a level changes
         (battery.xml 149-0-1). Without a report the charge has the level of the drone's one alert, as in GroundSDK.
         """
-        return {BatteryAlert.POWER_LEVEL: self.charge_level, **self.alerts}
+        charge = {} if self.charge_level is None else {BatteryAlert.POWER_LEVEL: self.charge_level}
+        return {**charge, **self.alerts}
 
-    def charge_alert(self) -> AlertLevel:
-        """Return the level of a low charge."""
-        return self.levels()[BatteryAlert.POWER_LEVEL]
+    def charge_alert(self) -> AlertLevel | None:
+        """Return the level of a low charge; None: not reported."""
+        return self.levels().get(BatteryAlert.POWER_LEVEL)
 
-    def worst_alert(self) -> AlertLevel:
-        """Return the most serious level of the alerts."""
-        return max(self.levels().values())
+    def worst_alert(self) -> AlertLevel | None:
+        """Return the most serious level of the alerts; None: none is reported."""
+        return max(self.levels().values(), default=None)
 
 
 def _alert(state: BatteryState, message: battery.Alert) -> BatteryState:
@@ -94,7 +97,7 @@ class Battery(Element[BatteryState]):
         ),
         battery.Alert: _alert,
         ardrone3.AlertStateChanged: lambda state, message: replace(
-            state, charge_level=_CHARGE_LEVELS.get(message.state, AlertLevel.NONE)
+            state, charge_level=_CHARGE_LEVELS.get(message.state, state.charge_level)
         ),
     }
 

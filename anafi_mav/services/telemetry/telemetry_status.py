@@ -49,7 +49,7 @@ def _voltages(state: BatteryState) -> tuple[list[int], list[int]]:
     return first, more + [0] * (MORE_CELLS - len(more))
 
 
-_CHARGE_STATES = {
+_CHARGE_STATES: Mapping[AlertLevel | None, int] = {
     AlertLevel.NONE: dialect.MAV_BATTERY_CHARGE_STATE_OK,
     AlertLevel.WARNING: dialect.MAV_BATTERY_CHARGE_STATE_LOW,
     AlertLevel.CRITICAL: dialect.MAV_BATTERY_CHARGE_STATE_CRITICAL,
