@@ -9,6 +9,7 @@ import struct
 import zlib
 from typing import Any
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.flavours import both
 from support.ftp import Ftp
@@ -18,7 +19,9 @@ from support.plans import circle, upload
 from support.world import HOME, world
 
 from anafi_mav import geo
+from anafi_mav.arsdk.messages.ardrone3 import FlyingState, FlyingStateChanged
 from anafi_mav.mavlink import dialect as newer  # the stock dialect has never heard of events
+from anafi_mav.sim import SimulatedDrone
 
 ACCEPTED, TEMPORARILY_REJECTED = 0, 1
 RUN_PREARM_CHECKS, ARM = dialect.MAV_CMD_RUN_PREARM_CHECKS, dialect.MAV_CMD_COMPONENT_ARM_DISARM
@@ -241,6 +244,28 @@ async def test_conf_126_flight_events_are_sent_in_sequence() -> None:
             "landing_detected",
             "disarmed",
         ]
+
+
+@pytest.mark.parametrize("before", [FlyingState.EMERGENCY, None], ids=["motors cut", "not reported"])
+async def test_conf_126_landed_state_without_a_flight_is_no_landing(before: FlyingState | None) -> None:
+    """The state on the ground may be reported late, or again after an emergency stop on the ground."""
+
+    def reports(drone: SimulatedDrone) -> None:
+        drone.faults.unreported = frozenset({FlyingStateChanged.NAME} if before is None else ())
+
+    async with world(before=reports) as w:
+        events = await reader(w.client)
+        mark = w.client.mark()
+        if before is not None:
+            w.drone.inject(FlyingStateChanged(before))
+            await w.client.wait("EVENT", lambda m: events.read(m)[0] == "check_emergency", since=mark)
+            mark = w.client.mark()
+        w.drone.faults.unreported = frozenset()
+        w.drone.inject(FlyingStateChanged(FlyingState.LANDED))
+        on_ground = dialect.MAV_LANDED_STATE_ON_GROUND
+        await w.client.wait("EXTENDED_SYS_STATE", lambda m: m.landed_state == on_ground, since=mark)
+        await w.client.wait("EVENT", lambda m: events.read(m)[0] == "health_summary", since=mark)
+        assert "landing_detected" not in [events.read(m)[0] for _, m in w.client.since(mark, "EVENT")]
 
 
 @both

@@ -76,7 +76,8 @@ class EventService(Service):
         self._observed_at = -math.inf
         """When an observer last got a report."""
         self._armed: bool | None = None
-        self._landed: Landed | None = None
+        self._landed = Landed.UNKNOWN
+        """The last known one of this connection."""
         self._reset_until: float | None = None
 
     def messages(self) -> Mapping[int, MessageHandler]:
@@ -135,13 +136,14 @@ class EventService(Service):
         self._report_landed()
 
     def _report_landed(self) -> None:
-        landed = self.host.vehicle.landed
-        if landed is not self._landed:
-            if landed is Landed.IN_AIR and self._landed is Landed.TAKEOFF:
-                self._send(table.TAKEOFF)
-            elif landed is Landed.ON_GROUND:
-                self._send(table.LANDED)
-            self._landed = landed
+        landed, before = self.host.vehicle.landed, self._landed
+        if landed in (before, Landed.UNKNOWN):
+            return
+        self._landed = landed
+        if landed is Landed.IN_AIR and before is Landed.TAKEOFF:
+            self._send(table.TAKEOFF)
+        elif landed is Landed.ON_GROUND and before is not Landed.UNKNOWN:  # else no flight is known to end
+            self._send(table.LANDED)
 
     def _send(self, event: Event, arguments: bytes | None = None) -> None:
         self.host.send(self._log.add(event, event.pack() if arguments is None else arguments, self._boot_ms()))

@@ -52,7 +52,7 @@ def attitude_quaternion(vehicle: Vehicle, times: Times) -> dialect.MAVLink_messa
 def global_position_int(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
     """Return GLOBAL_POSITION_INT; None without position, height or speed.
 
-    The position is unknown without a GPS fix, and in flight while the newest location is old.
+    The position is unknown without a GPS fix, and while the newest location is old.
 
     0/0 is no substitute for an unknown position: it is a place.
     """
