@@ -287,6 +287,17 @@ async def test_conf_127_run_prearm_checks(flavour: str) -> None:
         assert (await w.client.command(RUN_PREARM_CHECKS)).result == TEMPORARILY_REJECTED
 
 
+async def test_conf_127_station_that_connects_in_flight_gets_the_health_report() -> None:
+    """The command is for a vehicle that is not armed (common.xml); PX4 sends the report in flight, too."""
+    async with world() as w:
+        events = await reader(w.client)
+        await w.take_off(3.0)
+        late = await w.connect(sysid=200)
+        assert (await late.command(RUN_PREARM_CHECKS)).result == TEMPORARILY_REJECTED
+        await late.wait("EVENT", lambda m: events.read(m)[0] == "health_summary", since=0)
+        assert not [m for _, m in late.since(0, "STATUSTEXT") if m.text.startswith("PreArm")]
+
+
 async def test_a_write_does_not_make_the_metadata_stale() -> None:
     """Ranges are reported once for a connection: a client's cache stays good while values change."""
     async with world() as w:

@@ -162,19 +162,22 @@ class EventService(Service):
             self.host.send(answer, inbound.channel)
 
     def _run_checks(self, inbound: Inbound, command: Command) -> int:
-        """MAV_CMD_RUN_PREARM_CHECKS: send the report again, and a text for each reason not to arm."""
+        """MAV_CMD_RUN_PREARM_CHECKS: send the report again, and a text for each reason not to arm.
+
+        An armed vehicle has no checks to run and answers so (common.xml), but a station that connects in flight has no
+        other way to the report, which is sent when it changes.
+        """
         vehicle = self.host.vehicle
-        if vehicle.armed:
-            return dialect.MAV_RESULT_TEMPORARILY_REJECTED
-        observes = inbound.channel.access is Access.OBSERVE
-        for problem in vehicle.prearm_problems():
-            self.host.text(Severity.WARNING, texts.PREARM.fill(reason=problem), inbound.channel if observes else None)
-        if observes and inbound.now - self._observed_at < OBSERVED_EVERY:
-            return dialect.MAV_RESULT_ACCEPTED
-        if observes:
-            self._observed_at = inbound.now
-        self._tell(report(vehicle))
-        return dialect.MAV_RESULT_ACCEPTED
+        is_armed, observes = vehicle.armed, inbound.channel.access is Access.OBSERVE
+        if not is_armed:
+            to = inbound.channel if observes else None
+            for problem in vehicle.prearm_problems():
+                self.host.text(Severity.WARNING, texts.PREARM.fill(reason=problem), to)
+        if not observes or inbound.now - self._observed_at >= OBSERVED_EVERY:
+            if observes:
+                self._observed_at = inbound.now
+            self._tell(report(vehicle))
+        return dialect.MAV_RESULT_TEMPORARILY_REJECTED if is_armed else dialect.MAV_RESULT_ACCEPTED
 
     def _described(self, flavour: Flavour, query: FileQuery) -> bytes:
         return to_json(events_file(flavour))
