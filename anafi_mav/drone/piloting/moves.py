@@ -25,7 +25,7 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.arsdk.messages.ardrone3 import MoveByError, MoveToStatus
 from anafi_mav.arsdk.messages.rth import StateReason
-from anafi_mav.drone.element import Position, position
+from anafi_mav.drone.element import Position, finite, position
 from anafi_mav.drone.expectation import Expectation
 from anafi_mav.drone.piloting.state import MOTORS_OFF
 from anafi_mav.drone.status.home import Home
@@ -192,14 +192,16 @@ _MOVE_BY_REFUSALS = {
 
 
 def _axes(message: ardrone3.MoveByEnd, offset: Displacement) -> list[tuple[float, float, float]]:
-    """Return the flown, the commanded and the tolerated value of each axis."""
-    (length, angle), turn = _SHORT, math.remainder(message.dPsi - offset.turn, 2.0 * math.pi) + offset.turn
-    return [
+    """Return the flown, the commanded and the tolerated value of each axis that is reported as a number."""
+    length, angle = _SHORT
+    axes = [
         (message.dX, offset.front, length),
         (message.dY, offset.right, length),
         (message.dZ, offset.down, length),
-        (turn, offset.turn, angle),
     ]
+    if (turn := finite(message.dPsi)) is not None:
+        axes.append((math.remainder(turn - offset.turn, 2.0 * math.pi) + offset.turn, offset.turn, angle))
+    return [axis for axis in axes if finite(axis[0]) is not None]
 
 
 def _is_short(message: ardrone3.MoveByEnd, offset: Displacement | None) -> bool:

@@ -398,6 +398,19 @@ async def test_move_by_refused(drone: Drone, device: ScriptedDevice, error: Move
     assert caught.value.reason == reason
 
 
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("axis", range(4))
+async def test_move_by_end_without_a_number_ends_the_move(
+    drone: Drone, device: ScriptedDevice, axis: int, number: float
+) -> None:
+    flown = [5.0, 0.0, 0.0, 0.0]
+    flown[axis] = number
+    device.script[ardrone3.MoveBy] = lambda _: [ardrone3.MoveByEnd(*flown, MoveByError.OK)]
+    done = await drone.piloting.move_by(5.0, 0.0, 0.0, 0.0)
+    assert (done.front, done.right, done.down, done.turn) == pytest.approx(tuple(flown), nan_ok=True)
+    assert drone.piloting.move is None
+
+
 async def test_a_newer_move_by_interrupts_the_older(drone: Drone, device: ScriptedDevice) -> None:
     older = asyncio.ensure_future(drone.piloting.move_by(10.0, 0.0, 0.0, 0.0))
     await device.until(ardrone3.MoveBy)
