@@ -538,9 +538,9 @@ class Drone:
             self._session.end(reason)
 
     def _end_behind_controller(self) -> str | None:
-        """Return why a connection through the Skycontroller is at its end; None: it goes on."""
+        """Return why the Skycontroller has ended the connection; None: it goes on, or is direct."""
         state = self.controller.state
-        if state.link is None:
+        if not self.controller.present or state.link is None:
             return None
         if state.link != Connection.CONNECTED:
             return f"the Skycontroller lost the drone: {spoken(state.link)}"

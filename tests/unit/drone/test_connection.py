@@ -10,6 +10,10 @@ import msgspec
 import pytest
 from support.world import loopback
 
+from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.messages import drone_manager
+from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState
+from anafi_mav.arsdk.messages.proto import device_manager
 from anafi_mav.drone import CommandTimeout, Drone, FlyingState, LinkLost, LocalProtocolError, connect
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 
@@ -188,6 +192,25 @@ async def test_lost_link_ends_the_block_without_another_error(simulator: Simulat
         await simulator.close()
         with pytest.raises(LinkLost):
             await drone.wait_for(FlyingState.LANDED)
+
+
+@pytest.mark.parametrize(
+    "report",
+    [
+        drone_manager.ConnectionState(DroneManagerConnectionState.IDLE, "", 0, ""),
+        drone_manager.ConnectionState(DroneManagerConnectionState.CONNECTED, "PI040416DA9H000009", 0x0914, "other"),
+        device_manager.State(idle=device_manager.ConnectionStateIdle()),
+    ],
+    ids=["idle", "another", "protobuf"],
+)
+async def test_direct_link_survives_a_report_of_a_skycontroller(real: SimulatedDrone, report: Message) -> None:
+    async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
+        heard = asyncio.ensure_future(drone.expect(type(report), lambda message: message == report))
+        await asyncio.sleep(0)
+        real.inject(report)
+        await heard
+        await lift(drone)
+        assert drone.connected
 
 
 async def test_log_line_of_a_connection_names_model_serial_and_firmware(
