@@ -13,7 +13,7 @@ from anafi_mav.drone.payload.gimbal import MAIN
 from anafi_mav.drone.values import ValueLayout, Values
 from anafi_mav.drone.video.video import VideoFrame
 from anafi_mav.services.camera.pose_track import DEGREES, CameraPose, PoseSource, PoseTrack, ValueTrack
-from anafi_mav.units import RAD_PER_DEG
+from anafi_mav.units import LARGEST, RAD_PER_DEG
 from anafi_mav.vehicle.vehicle import Vehicle
 
 Sample: TypeAlias = tuple[float, ...]
@@ -95,7 +95,7 @@ class _EventTrack(ValueTrack):
         for at, values in reversed(self._kept):
             if self._kind in values:
                 sample = self._read(values.message(self._kind))
-                if sample is not None and math.isfinite(sum(sample)):
+                if sample is not None and sum(map(abs, sample)) <= LARGEST:
                     yield at, sample
 
 

@@ -150,6 +150,13 @@ def test_events_without_values_are_no_samples() -> None:
     assert not PoseTrack(samples).is_complete(1.2)
 
 
+def test_heights_that_no_measure_has_are_no_samples() -> None:
+    samples = EventSamples()
+    samples.add(arrived(events.AltitudeChanged(1.7e308)), 1.0)
+    samples.add(arrived(events.AltitudeChanged(-1.7e308)), 1.2)
+    assert samples.heights.value(1.1) is None
+
+
 def test_events_closer_than_the_spacing_are_left_out() -> None:
     samples = EventSamples()
     for number in range(4):
