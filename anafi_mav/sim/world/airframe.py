@@ -77,6 +77,9 @@ _YAW_GAIN = 2.0
 _ALIGNED = 3.0 * RAD_PER_DEG
 """A turn that has to come first is done when this close."""
 
+_TURNED_OUT = 2.0 * RAD_PER_DEG
+"""rad/s: a faster turn passes its end, the Ai's by a dozen degrees."""
+
 _REACHED = 0.1
 """m from its target: a move is over when it is this close and still."""
 _STILL = 0.15
@@ -417,7 +420,9 @@ class Airframe:
                 return False
             north, east, down = self._target
             gap = (self.north - north) ** 2 + (self.east - east) ** 2 + (self.down - down) ** 2
-            is_aligned = self._turn is Turn.STICK or abs(self._target_yaw - self.heading) < _ALIGNED / 2.0
+            off = self._target_yaw - self.heading
+            is_aligned = abs(off) < _ALIGNED / 2.0 and abs(self._yaw_rate) < _TURNED_OUT
+            is_aligned = is_aligned or self._turn is Turn.STICK
             return is_aligned and gap < (_REACHED + self._unrest()) ** 2
         if mode is Mode.TAKE_OFF:
             return self.down <= 0.05 - TAKE_OFF_HEIGHT and self.is_still

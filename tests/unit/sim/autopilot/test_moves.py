@@ -84,6 +84,20 @@ def test_move_by_of_two_turns_makes_two(bench: Bench) -> None:
     assert bench.of(ardrone3.MoveByEnd)[0].dPsi == pytest.approx(4.0 * math.pi, abs=0.05)
 
 
+@pytest.mark.parametrize("model", ["4k", "ai"])
+@pytest.mark.parametrize("rate", [20.0, 60.0, 200.0])
+def test_turn_of_a_move_by_ends_where_it_is_reported(model: str, rate: float) -> None:
+    bench = Bench(model)
+    bench.take_off()
+    bench.send(move.ExtendedMoveBy(0.0, 0.0, 0.0, math.pi / 2, 0.0, 0.0, rate))
+    bench.run_until(lambda: bool(ends(bench)))
+    bench.rest()
+    bench.run(1.0)
+    reported = bench.of(ardrone3.MoveByEnd)[0].dPsi
+    assert math.degrees(reported) == pytest.approx(90.0, abs=1.5)
+    assert math.degrees(bench.pose.yaw) == pytest.approx(math.degrees(reported), abs=1.0)
+
+
 def test_a_newer_move_by_interrupts_the_older(bench: Bench) -> None:
     bench.send(ardrone3.MoveBy(50.0, 0.0, 0.0, 0.0))
     bench.run(3.0)
