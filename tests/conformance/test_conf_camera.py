@@ -771,6 +771,15 @@ async def test_conf_092_each_storage_is_reported(flavour: str, model: str) -> No
         assert await command(w.client, dialect.MAV_CMD_REQUEST_MESSAGE, 261, count + 1) == DENIED
 
 
+async def test_storage_name_ends_with_a_whole_character() -> None:
+    """The label of a card may have eleven characters of three bytes: one byte more than the field has."""
+    async with world() as w:
+        name = "照" * 10
+        w.drone.inject(user_storage.Info(name + "照", 64_000_000_000))
+        message = await w.client.wait("STORAGE_INFORMATION", lambda m: name.encode() in bytes(m.get_msgbuf()))
+        assert name.encode() + b"\0" in bytes(message.get_msgbuf())
+
+
 PROBLEMS = [
     (PhyState.UNDETECTED, FsState.UNKNOWN, dialect.STORAGE_STATUS_EMPTY, DENIED),
     (PhyState.TOO_SLOW, FsState.UNKNOWN, dialect.STORAGE_STATUS_NOT_SUPPORTED, DENIED),

@@ -16,6 +16,7 @@ from anafi_mav.drone.payload.camera_state import CameraState
 from anafi_mav.mavlink import dialect
 from anafi_mav.models import Model, PayloadSensor
 from anafi_mav.services.camera.pose_track import CameraPose
+from anafi_mav.services.char_field import char_field
 from anafi_mav.services.stream import Times
 from anafi_mav.services.version_numbers import version_numbers
 from anafi_mav.vehicle.vehicle import Vehicle
@@ -104,7 +105,7 @@ def information(drone: Drone, times: Times, extra_flags: int, uri: str, version:
 
 
 def _characters(text: str) -> list[int]:
-    return list(text.encode()[:31].ljust(32, b"\0"))
+    return list(char_field(text, 31).ljust(32, b"\0"))
 
 
 def zoom_percent(camera: CameraState) -> float:

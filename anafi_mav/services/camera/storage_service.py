@@ -22,6 +22,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.camera.camera_messages import MEBIBYTE
 from anafi_mav.services.camera.camera_targets import PASSING, media_storage, require_idle, storage_problem
+from anafi_mav.services.char_field import char_field
 from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.service import Answer, Host, Request, Service
 from anafi_mav.texts import Reason
@@ -155,7 +156,7 @@ class StorageService(Service):
             math.nan,
             math.nan,
             dialect.STORAGE_TYPE_MICROSD if removable else dialect.STORAGE_TYPE_OTHER,
-            (state.name or "").encode()[:31],
+            char_field(state.name, 31),
             usage,
         )
 

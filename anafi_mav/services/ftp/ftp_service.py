@@ -16,6 +16,7 @@ from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services import component_metadata
 from anafi_mav.services.capabilities import capability_bits
+from anafi_mav.services.char_field import char_field
 from anafi_mav.services.checksum import crc32
 from anafi_mav.services.commands import Command
 from anafi_mav.services.component_metadata import COMPRESSED, GENERAL
@@ -206,9 +207,9 @@ class FtpService(Service):
             0,
             b"Parrot",
             identity.model.title.encode()[:31],
-            (identity.firmware or "").encode()[:23],
-            (identity.hardware or "").encode()[:23],
-            identity.serial.encode()[:31],
+            char_field(identity.firmware, 23),
+            char_field(identity.hardware, 23),
+            char_field(identity.serial, 31),
         )
 
 

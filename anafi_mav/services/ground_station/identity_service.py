@@ -10,6 +10,7 @@ from anafi_mav.drone import Drone
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.capabilities import capability_bits
+from anafi_mav.services.char_field import char_field
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import MessageHandler, Request, Service
@@ -25,7 +26,7 @@ def _version(text: str) -> int:
 def _custom_version(firmware: str, flavour: Flavour) -> bytes:
     """The ANAFI's firmware as the stations of a flavour read flight_custom_version."""
     if flavour.text_version:
-        return firmware.encode(errors="replace")[:8].ljust(8, b"\0")
+        return char_field(firmware, 8).ljust(8, b"\0")
     return _version(firmware).to_bytes(4, "little")[1:] + hashlib.sha256(__version__.encode()).digest()[:5]
 
 

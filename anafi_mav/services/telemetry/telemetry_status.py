@@ -14,6 +14,7 @@ from anafi_mav.drone import events
 from anafi_mav.drone.events import AlertLevel, BatteryAlert, MotorError, Sensor
 from anafi_mav.drone.status.battery import BatteryState
 from anafi_mav.mavlink import dialect
+from anafi_mav.services.char_field import char_field
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.vehicle import Vehicle
 
@@ -132,7 +133,7 @@ def battery_info(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | No
         design_capacity=thousandth(state.design_mah),
         full_charge_capacity=thousandth(state.full_charge_mah, NAN),
         manufacture_date=b"",
-        serial_number=(state.serial or "").encode()[:32],
+        serial_number=char_field(state.serial, 32),
         name=b"",
     )
 
