@@ -204,6 +204,15 @@ async def test_conf_037_the_cells_of_an_ai() -> None:
         assert info.serial_number == "BAT1"
 
 
+async def test_battery_temperature_of_zero_kelvin_is_unknown() -> None:
+    async with world(model="ai") as w:
+        w.drone.inject(battery.Temperature(303))
+        await w.client.wait("BATTERY_STATUS", lambda m: m.temperature == 2985)
+        w.drone.inject(battery.Temperature(0))
+        status = await w.client.wait("BATTERY_STATUS", lambda m: m.temperature != 2985)
+        assert status.temperature == 0x7FFF
+
+
 @both
 async def test_conf_038_health_bits(flavour: str) -> None:
     async with world(flavour=flavour) as w:

@@ -12,7 +12,7 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3, battery, common
 from anafi_mav.arsdk.messages.ardrone3 import AlertState
 from anafi_mav.arsdk.messages.battery import AlertLevel, BatteryAlert
-from anafi_mav.drone.element import Element, Reducer, with_item
+from anafi_mav.drone.element import REMOVE, Element, Reducer, with_item
 
 _CHARGE_LEVELS: Mapping[AlertState, AlertLevel] = {
     AlertState.NONE: AlertLevel.NONE,
@@ -70,14 +70,24 @@ def _alert(state: BatteryState, message: battery.Alert) -> BatteryState:
     return replace(state, alerts=with_item(state.alerts, message.alert, message.level, message.list_flags))
 
 
+def _cell(state: BatteryState, message: battery.CellVoltage) -> BatteryState:
+    flags = 0 if message.cell_voltage else REMOVE
+    return replace(
+        state, cell_voltages_mv=with_item(state.cell_voltages_mv, message.index, message.cell_voltage, flags)
+    )
+
+
 class Battery(Element[BatteryState]):
-    """The battery. No verbs."""
+    """The battery. No verbs.
+
+    A voltage or a temperature of zero is none that a gauge measures: unknown.
+    """
 
     NOTHING = BatteryState()
     REDUCERS: ClassVar[Mapping[type[Message], Reducer]] = {
         common.BatteryStateChanged: lambda state, message: replace(state, percent=message.percent),
-        battery.Voltage: lambda state, message: replace(state, voltage_mv=message.voltage),
-        battery.Temperature: lambda state, message: replace(state, temperature_k=message.temperature),
+        battery.Voltage: lambda state, message: replace(state, voltage_mv=message.voltage or None),
+        battery.Temperature: lambda state, message: replace(state, temperature_k=message.temperature or None),
         battery.Health: lambda state, message: replace(state, health_percent=message.state_of_health),
         battery.CycleCount: lambda state, message: replace(state, cycles=message.count),
         battery.Serial: lambda state, message: replace(state, serial=message.serial),
@@ -92,9 +102,7 @@ class Battery(Element[BatteryState]):
         battery.Capacity: lambda state, message: replace(
             state, full_charge_mah=message.full_charge, remaining_mah=message.remaining
         ),
-        battery.CellVoltage: lambda state, message: replace(
-            state, cell_voltages_mv=with_item(state.cell_voltages_mv, message.index, message.cell_voltage, 0)
-        ),
+        battery.CellVoltage: _cell,
         battery.Alert: _alert,
         ardrone3.AlertStateChanged: lambda state, message: replace(
             state, charge_level=_CHARGE_LEVELS.get(message.state, state.charge_level)

@@ -119,6 +119,12 @@ CASES: list[tuple[type[Element[Any]], list[wire.Message], dict[str, Any]]] = [
     (Battery, [battery.Description("B2", "2023", 6800, 3, 3000, 4400)], {"serial": "B2", "cell_count": 3}),
     (Battery, [battery.Capacity(2700, 2100)], {"full_charge_mah": 2700, "remaining_mah": 2100}),
     (Battery, [battery.CellVoltage(0, 4100), battery.CellVoltage(2, 4090)], {"cell_voltages_mv": {0: 4100, 2: 4090}}),
+    (
+        Battery,
+        [battery.Voltage(7612), battery.Voltage(0), battery.Temperature(298), battery.Temperature(0)],
+        {"voltage_mv": None, "temperature_k": None},
+    ),
+    (Battery, [battery.CellVoltage(0, 4100), battery.CellVoltage(0, 0)], {"cell_voltages_mv": {}}),
     # First | Last = 3, Empty = 4, Remove = 8
     (
         Battery,
