@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from typing import Any
 
+import msgspec
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as stock
 from support.mav import Client
 from support.params import value_of, write
 from support.setpoints import attitude, engage, streaming
-from support.world import World, world
+from support.video_server import METADATA, VideoServer
+from support.world import World, loopback, world
 
 from anafi_mav.arsdk.messages import alarms, ardrone3, camera, common, rth, wifi
 from anafi_mav.arsdk.messages.generic import ListFlags
+from anafi_mav.arsdk.video.video_metadata import PROTO_PROFILE, StarfishLink, WifiLink
 from anafi_mav.mavlink import dialect
+from anafi_mav.sim import SimulatedDrone
 from anafi_mav.sim.skycontroller import (
     PITCH,
     RESET_ZOOM,
@@ -139,6 +144,34 @@ async def test_link() -> None:
         assert observed.quality == 3
         assert observed.flags == dialect.ANAFI_LINK_FLAGS_REPORTED | dialect.ANAFI_LINK_FLAGS_PERTURBED
         assert observed.goodput == 0xFFFFFFFF  # the live video alone reports it
+
+
+@pytest.mark.parametrize(
+    ("reported", "goodput", "rssi", "quality"),
+    [
+        ({"wifi": WifiLink(goodput=0xFFFFFFFF, quality=9, rssi=-40_000)}, 0xFFFFFFFE, -0x8000, 5),
+        ({"wifi": None, "starfish": StarfishLink(links=(), quality=-1)}, 0xFFFFFFFF, 0x7FFF, 0xFF),
+    ],
+    ids=["wifi", "starfish"],
+)
+async def test_link_of_pictures_fits_its_fields(
+    reported: dict[str, Any], goodput: int, rssi: int, quality: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    def reports_no_link(drone: SimulatedDrone) -> None:
+        drone.faults.unreported = frozenset({common.LinkSignalQuality.NAME, wifi.RssiChanged.NAME})
+
+    metadata = msgspec.structs.replace(METADATA, **reported)
+    server = VideoServer(PROTO_PROFILE, metadata, address=loopback())
+    async with (
+        server,
+        world(drone_address=server.address, rtsp_port=server.port, before=reports_no_link, speed=1.0) as w,
+    ):
+        await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_CAMERA_EXPOSURE)
+        frame = dialect.ANAFI_EXPOSURE_SOURCE_FRAME
+        await w.client.wait("ANAFI_CAMERA_EXPOSURE", lambda m: m.source == frame, timeout=12.0)
+        observed = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_LINK)
+        assert (observed.goodput, observed.rssi, observed.quality) == (goodput, rssi, quality)
+    assert [record for record in caplog.records if record.levelno >= logging.ERROR] == []
 
 
 @pytest.mark.parametrize("model", ["4k", "ai"])

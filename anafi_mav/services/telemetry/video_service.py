@@ -95,9 +95,9 @@ def link(vehicle: Vehicle, times: Times) -> dialect.MAVLink_message | None:
         rssi = wifi.rssi
     return dialect.MAVLink_anafi_link_message(
         times.boot_ms,
-        UNKNOWN_U32 if wifi is None else wifi.goodput * 1000,
-        UNKNOWN_I16 if rssi is None else rssi,
-        UNKNOWN_U8 if quality is None else min(quality, 5),
+        UNKNOWN_U32 if wifi is None else min(wifi.goodput * 1000, UNKNOWN_U32 - 1),
+        UNKNOWN_I16 if rssi is None else units.saturate(rssi, 16),
+        UNKNOWN_U8 if quality is None or quality < 0 else min(quality, 5),
         _link_flags(state),
     )
 
