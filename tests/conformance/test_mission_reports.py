@@ -29,6 +29,7 @@ from support.missions import (
     CORNERS,
     LAND,
     MISSION_MODE,
+    NOT_STARTED,
     PAUSED,
     PLACE,
     RTL,
@@ -94,6 +95,25 @@ async def test_mission_that_ends_in_the_air_without_a_report_of_its_plans_end_is
         await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
 
 
+@pytest.mark.parametrize("change", ["current item", "mission"])
+async def test_change_of_a_mission_whose_plans_end_was_not_reported_keeps_the_mode(change: str) -> None:
+    """QGroundControl chooses the first item at the end."""
+    async with world(web=True) as w:
+        await put(w, [takeoff(6.0), way(12.0, 0.0, 6.0)])
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=0)
+        w.drone.faults.unreported = frozenset({PLAYING})
+        await state(w, COMPLETE, since=0)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
+        mark = w.client.mark()
+        if change == "mission":
+            await put(w, [takeoff(6.0), way(6.0, 0.0, 6.0)])
+        else:
+            w.client.send(dialect.MAVLink_mission_set_current_message(1, 1, 0))
+        await state(w, NOT_STARTED, since=mark)
+        assert (await w.client.heartbeat(lambda beat: True)).custom_mode == HOLD
+
+
 async def test_turn_after_a_file_whose_plans_end_is_not_reported_is_flown() -> None:
     async with world(web=True) as w:
         turn = Item(dialect.MAV_CMD_CONDITION_YAW, 0.0, 0.0, p1=90.0, frame=2)
@@ -103,6 +123,7 @@ async def test_turn_after_a_file_whose_plans_end_is_not_reported_is_flown() -> N
         w.drone.faults.unreported = frozenset({PLAYING})
         await state(w, COMPLETE, since=0)
         assert abs(w.drone.pose.yaw - 1.57) < 0.1
+        await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
 
 
 async def test_landing_of_another_controller_on_the_way_to_a_landing_place_pauses_the_mission() -> None:

@@ -266,7 +266,7 @@ class MissionFlight(PlainTask):
 
     @property
     def ended_unreported(self) -> bool:
-        """True when the mission is complete, and the drone has not reported the end of its plan."""
+        """True when the plan that the drone reports as playing is over, as far as its lines go."""
         plan = self._vehicle.drone.flight_plan.state
         return plan.playing == PlayingState.PLAYING and self.machine.has_flown(plan.uid)
 

@@ -315,6 +315,11 @@ class MissionMachine:
         self.mission = Mission()
         self.progress = MissionProgress()
         self.phase = MissionPhase(S.NO_MISSION, S.NO_MISSION)
+        self._unended = ""
+        """The plan whose last line is executed, and whose end the drone has not reported; empty: none.
+
+        That is no progress of the mission, which may have been replaced since.
+        """
 
     @property
     def state(self) -> State:
@@ -389,13 +394,11 @@ class MissionMachine:
         return self.mission.items[leg.origins[-1]].command == mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH
 
     def has_flown(self, uid: str | None) -> bool:
-        """Return True when the mission is complete, and the plan of this name was its last file.
+        """Return True for a plan that is over, though the drone has not reported its end.
 
-        A drone that does not report the end of that plan goes on reporting that it flies it. False if another
-        controller has started it again.
+        Such a drone goes on reporting that it flies it. False once that plan is started again.
         """
-        progress = self.progress
-        return self.rest is S.COMPLETE and progress.leg_done and uid == progress.uid != self.phase.plays
+        return uid == self._unended
 
     @property
     def leads_home(self) -> bool:
@@ -622,8 +625,11 @@ class MissionMachine:
 
         `attempt` has started it; None: another controller.
         """
+        if attempt is not None and attempt is not self.phase.attempt:
+            return []
+        self._unended = ""
         if attempt is not None:
-            return self._playing(attempt) if attempt is self.phase.attempt else []
+            return self._playing(attempt)
         if uid == self.phase.plays:
             return []
         known = self._paused_file()
@@ -659,7 +665,7 @@ class MissionMachine:
 
     def halted(self, *, stopped: bool, report: DroneReport, now: float) -> list[Effect]:
         """The drone reports its plan as paused, or as `stopped`."""
-        self.phase = replace(self.phase, plays=None, stops=False)
+        self.phase, self._unended = replace(self.phase, plays=None, stops=False), ""
         return self._halted(stopped=stopped, report=report, now=now)
 
     @_on(E.HALTED)
@@ -764,6 +770,7 @@ class MissionMachine:
             case S.FLYING_FILE:  # its plan has ended, but that was not reported
                 self.phase = replace(phase, until=math.inf)
                 if self.progress.leg_done:
+                    self._unended = self.progress.uid
                     yield from self._part_over()
             case _:
                 yield from self._look(report, last=True)
