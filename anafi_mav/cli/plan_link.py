@@ -12,7 +12,7 @@ import msgspec
 
 from anafi_mav.cli import interrupts, plan_files, plan_options
 from anafi_mav.cli.ground_client import Ground, Texts, connected
-from anafi_mav.cli.terminal import progress, say
+from anafi_mav.cli.terminal import progress, say, say_later
 from anafi_mav.errors import AnafiMavError, PlanError
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
@@ -138,7 +138,7 @@ def collect_texts(ground: Ground) -> Iterator[list[str]]:
             if text:
                 said.append(text)
                 severe = inbound.message.severity <= dialect.MAV_SEVERITY_WARNING
-                say(f"system {inbound.sysid}: {text}", "yellow" if severe else "")
+                say_later(f"system {inbound.sysid}: {text}", "yellow" if severe else "")
 
     before, ground.on_message = ground.on_message, hear
     try:
@@ -159,9 +159,9 @@ async def give_list(ground: Ground, kind: int, items: Sequence[PlanItem], said: 
     assert transfer.result is not None, "run ends with one"
     count = counted(len(items) - int(kind == MISSION and ground.first_item_is_home), "item")
     if transfer.result.outcome is Outcome.UNCONFIRMED and await _has(ground, kind, items):
-        say(f"{NAMES[kind]}: {count} on system {sysid}; the acknowledgement was lost, they were read back")
+        say_later(f"{NAMES[kind]}: {count} on system {sysid}; the acknowledgement was lost, they were read back")
     elif transfer.result.outcome is Outcome.DONE:
-        say(f"{NAMES[kind]}: {count} on system {sysid}", "green")
+        say_later(f"{NAMES[kind]}: {count} on system {sysid}", "green")
     else:
         why = f"; system {sysid} said: {said[-1]}" if said else ""
         raise TransferRefused(f"{NAMES[kind]} not taken: {transfer.result.reason}{why}")

@@ -186,7 +186,13 @@ def complain(line: str, style: str = "red") -> None:
 
 
 def say_later(line: str, style: str = "") -> None:
-    """Say in a thread: for the event loop of a gateway. Dropped when too many lines wait."""
+    """Say in a thread: for the event loop of a gateway. Dropped when too many lines wait.
+
+    Above a bar it is printed at once: a stopped terminal delays the bar, too.
+    """
+    if _bars:
+        say(line, style)
+        return
     STDOUT_WRITER.post(functools.partial(_write_stdout, _rendered(sys.stdout, line, style)))
 
 

@@ -171,14 +171,18 @@ async def test_stopped_terminal_stops_no_ground_process() -> None:
             assert await end(process) == 0
 
 
-async def test_stopped_terminal_of_plan_fly_delays_neither_its_heartbeats_nor_ctrl_c() -> None:
-    """The lines about the mission have no room on stdout."""
+@pytest.mark.parametrize("shown_last", [b"", b"begun"], ids=["upload", "flight"])
+async def test_stopped_terminal_of_plan_fly_delays_neither_its_heartbeats_nor_ctrl_c(shown_last: bytes) -> None:
+    """The lines about the upload, or about the mission, have no room on stdout."""
     async with world(speed=4.0, web=True) as w:
         words = ("plan", "fly", str(MISSIONS / "orbit.plan"), "--endpoint", f"tcpout://{w.address}:5760")
         with open_pipe() as (reading, shown):
-            async with started(*words, stdout=shown) as process:
-                await read_until(reading, b"begun")
+            if not shown_last:
                 fill(shown)
+            async with started(*words, stdout=shown) as process:
+                if shown_last:
+                    await read_until(reading, shown_last)
+                    fill(shown)
                 await w.client.wait("MISSION_ITEM_REACHED", lambda m: m.seq >= 1, since=0, timeout=60.0)
                 process.send_signal(signal.SIGINT)
                 assert await asyncio.wait_for(process.wait(), 15.0) == 130
