@@ -101,8 +101,6 @@ class MissionProtocol:
 
     def _clear_all(self, peer: Peer, now: float) -> list[Effect]:
         """All three lists or none."""
-        if any(transfer.has_cleared_over_other_link(peer, now) for transfer in self.transfers.values()):
-            return []
         if not all(transfer.may_clear(peer, now) for transfer in self.transfers.values()):
             return [
                 _ack(peer, dialect.MAV_MISSION_DENIED, ALL),

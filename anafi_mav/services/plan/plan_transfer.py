@@ -241,7 +241,7 @@ class PlanTransfer:
     def reset(self) -> None:
         """No transfer is under way any more; the plan stays."""
         self.state = State.IDLE
-        self._upload = self._done = self._committing = None
+        self._upload = self._done = self._committing = self._cleared = None
         self._downloads.clear()
 
     # Uploads.
@@ -364,42 +364,46 @@ class PlanTransfer:
         items = tuple(self.kind.taken(sent, peer.flavour))
         if (fault := self.kind.check_plan(items, peer.flavour)) is not None:
             return fault
-        self.begin_clear(peer, now)
+        self._begin_commit(peer, now)
         remarks = [Say(Severity.WARNING, text) for text in self.kind.remarks(sent)]
         commit = Commit({self.kind.mission_type: items}, peer, self.kind.mission_type, acknowledged=False)
         return [*remarks, commit]
 
     def clear(self, peer: Peer, now: float) -> list[Effect]:
         """Handle MISSION_CLEAR_ALL, or MISSION_COUNT of 0; an empty list is acknowledged, too."""
-        if self.has_cleared_over_other_link(peer, now):
-            return []
         if not self.may_clear(peer, now):
             return self._occupied(peer)
         self.begin_clear(peer, now)
         return [Commit({self.kind.mission_type: ()}, peer, self.kind.mission_type)]
 
-    def has_cleared_over_other_link(self, peer: Peer, now: float) -> bool:
-        """Return True if the client's ids cleared this list over another link a moment ago.
+    def may_clear(self, peer: Peer, now: float) -> bool:
+        """Return True if no other client transfers this list, and the request is no late copy."""
+        return not self._busy(peer, now) and not (self.items and self._may_be_late_copy(peer, now))
 
-        A late copy of that must not delete what the client has uploaded since. Another program with the same ids
-        repeats it when it gets no answer.
+    def _may_be_late_copy(self, peer: Peer, now: float) -> bool:
+        """Return True if the client's ids have cleared this list over another link a moment ago.
+
+        A late copy must not delete what was uploaded since. Another program with the same ids is refused then, and may
+        clear that a moment later.
         """
         if self._cleared is None:
             return False
         by, at = self._cleared
         return peer.is_copy_of(by) and now - at < PATIENCE
 
-    def may_clear(self, peer: Peer, now: float) -> bool:
-        """Return True if no other client transfers this list."""
-        return not self._busy(peer, now)
-
     def begin_clear(self, peer: Peer, now: float) -> None:
         """The list becomes empty with the commit that the caller makes."""
+        if not self._may_be_late_copy(peer, now):
+            self._cleared = peer, now
+        self._begin_commit(peer, now)
+
+    def _begin_commit(self, peer: Peer, now: float) -> None:
+        """Store a whole list that was not received item by item."""
         self._upload = None
         self._downloads.pop(peer.client, None)
         self._forget_done(peer)
         self.state = TRANSITIONS[self.state][Event.CLEAR]
-        self._committing, self._cleared = _Done(peer, now, -1), (peer, now)
+        self._committing = _Done(peer, now, -1)
 
     def stored(self, items: tuple[PlanItem, ...], now: float, fault: PlanFault | None = None) -> list[Effect]:
         """Finish a `Commit`: it is stored, or has a fault.
@@ -415,6 +419,7 @@ class PlanTransfer:
             done.result = dialect.MAV_MISSION_ACCEPTED if fault is None else fault.result
             self._done = done
         if fault is not None:
+            self._cleared = None  # nothing was deleted
             return []
         self.put(items)
         return [Changed(self.kind.mission_type)]

@@ -354,12 +354,41 @@ def test_late_copy_of_a_clearing_over_another_link_deletes_no_newer_plan(late: A
     plans, copy = mission_protocol(), peer(channel="b")
     plans.stored(commit_of(plans.receive(clear(), ME, 0.0)), 0.0)
     plans.receive(count(2), ME, 0.1)
-    assert plans.receive(late, copy, 0.2) == []
+    assert [m.type for m in replies(plans.receive(late, copy, 0.2))] == [DENIED]
     assert uploaded_rest(plans, 0, 2) == items(2)
-    assert plans.receive(late, copy, PATIENCE - 0.1) == []
+    assert [m.type for m in replies(plans.receive(late, copy, PATIENCE - 0.1))] == [DENIED]
     assert plans.transfers[FENCE].items == items(2)
     commit = commit_of(plans.receive(late, copy, PATIENCE))  # of another program with the same ids
     assert commit.plans[FENCE] == ()
+
+
+@pytest.mark.parametrize("message", [clear(), count(0), clear(ALL)], ids=["clear", "count 0", "clear all"])
+def test_two_programs_with_the_same_ids_that_clear_are_both_answered(message: Any) -> None:
+    plans = mission_protocol()
+    for who in (ME, peer(channel="b")):
+        effects = plans.stored(commit_of(plans.receive(message, who, 0.0)), 0.0)
+        assert [m.type for m in replies(effects)] == [ACCEPTED]
+
+
+def test_client_clears_its_new_plan_although_a_copy_of_its_first_clearing_was_later() -> None:
+    plans = mission_protocol()
+    for who in (ME, peer(channel="b")):
+        plans.stored(commit_of(plans.receive(clear(), who, 0.0)), 0.0)
+    uploaded(plans, 2, now=0.1)
+    assert commit_of(plans.receive(clear(), ME, 0.2)).plans[FENCE] == ()
+
+
+def test_clearing_that_could_not_be_stored_is_tried_again_over_another_link() -> None:
+    plans = mission_protocol()
+    plans.transfers[FENCE].put(items(2))
+    plans.stored(commit_of(plans.receive(clear(), ME, 0.0)), 0.0, PlanFault(ERROR, ""))
+    assert commit_of(plans.receive(clear(), peer(channel="b"), 0.1)).plans[FENCE] == ()
+
+
+def test_list_that_replaces_another_as_a_file_is_no_clearing() -> None:
+    plans = mission_protocol()
+    plans.stored(commit_of(plans.transfers[FENCE].replace(items(2), ME, 0.0)), 0.0)
+    assert commit_of(plans.receive(clear(), peer(channel="b"), 0.1)).plans[FENCE] == ()
 
 
 def test_a_silent_client_gives_way_to_another() -> None:
