@@ -890,6 +890,25 @@ async def test_conf_093_format_without_a_result_event_resets_the_index() -> None
         assert (await shoot(w.client)).image_index == 0
 
 
+async def test_conf_093_format_after_which_the_drone_checks_its_card_resets_the_index() -> None:
+    """Without a result event STORAGE_FORMAT is ACCEPTED then, too."""
+    state = user_storage.State.NAME
+    async with world(web=True) as w:
+        await enter(w.client, PHOTO)
+        await shoot(w.client)
+        w.drone.inject(user_storage.Capabilities(1 << user_storage.Feature.FORMAT_WHEN_READY_ALLOWED))
+        await w.client.wait("HEARTBEAT")
+        w.drone.faults.unreported = frozenset({user_storage.FormatResult.NAME, state})
+        mark, answer = w.client.mark(), asyncio.ensure_future(command(w.client, FORMAT, 1, 1))
+        await w.drone.wait_log(lambda e: e.name == "user_storage.format_with_type")
+        w.drone.faults.unreported = frozenset()
+        for file_system in (FsState.FORMATTING, FsState.CHECKING, FsState.READY):
+            w.drone.inject(user_storage.State(PhyState.AVAILABLE, file_system, 0, 1, 5))
+        w.drone.faults.unreported = frozenset({user_storage.FormatResult.NAME, state})
+        assert await answer == ACCEPTED
+        await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_count == 0, since=mark)
+
+
 async def test_conf_093_format_is_refused_in_flight_and_while_recording() -> None:
     async with world() as w:
         await enter(w.client, VIDEO)

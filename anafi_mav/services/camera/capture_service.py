@@ -168,11 +168,14 @@ class CaptureService(Service):
         id = media_storage(self.host.drone)
         if id is None or self.host.drone.storage[id].has_format_result:
             return
-        was_formatting, state = self._is_formatting, self.host.drone.storage[id].file_system
-        self._is_formatting = state == events.FsState.FORMATTING
-        if was_formatting and state == events.FsState.READY:
-            self._reporter.reset()
-            self._send_changed()
+        state = self.host.drone.storage[id].file_system
+        if state == events.FsState.FORMATTING:
+            self._is_formatting = True
+        elif self._is_formatting and state in (events.FsState.READY, events.FsState.ERROR):  # after a check
+            self._is_formatting = False
+            if state == events.FsState.READY:
+                self._reporter.reset()
+                self._send_changed()
 
     def tick(self, now: float) -> float:
         self._reporter.tick(now, is_series=self._photos.is_series)
