@@ -305,9 +305,9 @@ def replace_file(path: Path, data: bytes) -> None:
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
-            if os.name == "posix" and os.geteuid() == 0:
-                owner = path.parent.stat()
-                os.fchown(file.fileno(), owner.st_uid, owner.st_gid)
+            if os.name == "posix" and os.geteuid() == 0 and (owner := path.parent.stat()).st_uid != 0:
+                with contextlib.suppress(OSError):  # a container or a network disk may forbid it: it stays root's
+                    os.fchown(file.fileno(), owner.st_uid, owner.st_gid)
             file.write(data)
             file.flush()
             os.fsync(file.fileno())

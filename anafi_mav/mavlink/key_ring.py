@@ -312,10 +312,9 @@ def write_key(folder: Path, name: str, content: bytes, suffix: str = SUFFIX) -> 
         if os.name == "posix" and os.geteuid() == 0:
             # Not by its name: the owner may have put another file there meanwhile.
             owner, made = folder.parent.stat(), os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-            try:
+            with contextlib.suppress(OSError):  # a container or a network disk may forbid it
                 os.fchown(made, owner.st_uid, owner.st_gid)
-            finally:
-                os.close(made)
+            os.close(made)
     replace_file(path_of(folder, name, suffix), content)
 
 

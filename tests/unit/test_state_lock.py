@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
 import json
 import os
@@ -21,7 +22,16 @@ from anafi_mav.errors import ConfigError
 from anafi_mav.gateway import state_in_use
 from anafi_mav.mavlink.key_ring import folder_of, write_key
 from anafi_mav.mavlink.signing import CONTENT_BYTES
-from anafi_mav.state_lock import FILE, STATE_WRITER, HeldDrone, Holder, StateLock, read_holder, state_folder
+from anafi_mav.state_lock import (
+    FILE,
+    STATE_WRITER,
+    HeldDrone,
+    Holder,
+    StateLock,
+    read_holder,
+    replace_file,
+    state_folder,
+)
 
 ALPHA = HeldDrone("alpha", "192.168.42.1", "wlan1", "PI040416DA9H839157")
 
@@ -262,3 +272,20 @@ def test_holder_finds_a_drone_by_address_interface_or_serial() -> None:
 def test_state_folder_that_is_none_is_named_with_its_key(folder: str) -> None:
     with pytest.raises(ConfigError, match=r"^state: expected the path of a folder, got "):
         state_folder(folder)
+
+
+def test_state_file_that_root_may_not_give_away_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A container without CAP_CHOWN; a network disk."""
+
+    def refuse(file: int, user: int, group: int) -> None:
+        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+
+    if os.name == "posix" and os.geteuid() == 0:  # any other user has folders of its own only
+        os.chown(tmp_path, 65534, 65534)
+    monkeypatch.setattr(os, "geteuid", lambda: 0, raising=False)
+    monkeypatch.setattr(os, "fchown", refuse, raising=False)
+    replace_file(tmp_path / "alpha.json", b"content")
+    assert [path.name for path in tmp_path.iterdir()] == ["alpha.json"]
+    assert (tmp_path / "alpha.json").read_bytes() == b"content"
+    write_key(folder_of(tmp_path), "k", b"content")
+    assert [path.read_bytes() for path in folder_of(tmp_path).iterdir()] == [b"content"]
