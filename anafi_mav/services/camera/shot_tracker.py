@@ -84,6 +84,10 @@ class _Capture:
         """Return True for a count that adds nothing."""
         return count is not None and bool(self.taken) and self.reported is not None and not self.more(count)
 
+    def counts(self, update: CaptureUpdate) -> bool:
+        """Return True for a report that counts as many pictures as this capture has."""
+        return update.count is not None and update.count == self.taken % COUNT
+
     def continues(self, update: CaptureUpdate) -> bool:
         """Return True for the shutter of a picture of this capture, whose end was reported before."""
         if self.ended is None or self.camera != update.camera or update.count is None or not self.taken:
@@ -274,26 +278,31 @@ class ShotTracker:
             self._now.taken = update.count  # it may continue the count of the media before
         return lost
 
-    def _is_of_capture_before(self, media: str) -> bool:
-        """True for the report that the capture before is stored, whose pictures still wait for it.
+    def _is_of_capture_before(self, update: CaptureUpdate) -> bool:
+        """Return True for the report that the capture before is stored, whose pictures still wait for it.
 
-        The next one is not stored before it has pictures, nor as two media.
+        The next one is not stored before it has pictures, nor as two media, nor with the other's count.
         """
-        before, known = self._before, self.capture_of(media)
-        if not before.shots or before.media not in ("", media):
+        before, last, known = self._before, self._now, self.capture_of(update.media)
+        if not before.shots or before.media not in ("", update.media):
             return False
         if known:
             return known == before.number
-        return not self._now.taken or self._now.media != ""
+        return not last.taken or last.media != "" or (before.counts(update) and not last.counts(update))
 
     def _save(self, update: CaptureUpdate, now: float) -> list[CapturedShot]:
-        if self._is_of_capture_before(update.media):
-            if not self._before.media and self._now.media and self._before.taken == self._now.taken:
+        if self._is_of_capture_before(update):
+            before, last = self._before, self._now
+            is_last = before.taken == last.taken or (last.counts(update) and not before.counts(update))
+            rest: list[CapturedShot] = []
+            if not before.media and last.media and is_last:
                 self._exchange(update.media)
+                last.ended = None
+                rest = last.report_all(is_saved=True)
             else:
-                self._name(self._before, update.media)
-            self._before.ended = None
-            return self._before.report_all(is_saved=True)
+                self._name(before, update.media)
+            before.ended = None
+            return rest + before.report_all(is_saved=True)
         if self.capture_of(update.media) not in (0, self.capture):
             return self._save_before(update, now)
         last, lost = self._now, list[CapturedShot]()
@@ -346,7 +355,7 @@ class ShotTracker:
     def _exchange(self, media: str) -> None:
         """Note this media as the last capture's, and the media of that as the one before's.
 
-        Both were taken before the first was stored, and it was taken for the last. A drone stores them in sequence.
+        The first was taken for the last one's, because that had pictures already. A drone stores them in sequence.
         """
         first = self._now.media
         self._name(self._now, media)

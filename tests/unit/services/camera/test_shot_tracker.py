@@ -184,6 +184,27 @@ def test_photos_stored_after_both_were_taken_are_two_pictures() -> None:
     assert {tracker.media_of(shot.capture): shot.at for shot in shots} == {"a": 1.2, "b": 1.6}
 
 
+@pytest.mark.parametrize(
+    ("first", "second", "stored"),
+    [((1.1, 1.2, 1.3), (1.6,), 1.7), ((1.1,), (1.6, 1.7, 1.8), 1.65)],
+    ids=["burst first", "photo first"],
+)
+def test_burst_and_photo_of_which_the_first_is_stored_late_keep_their_pictures(
+    first: tuple[float, ...], second: tuple[float, ...], stored: float
+) -> None:
+    tracker, shots = ShotTracker(), list[CapturedShot]()
+    events = [
+        (at, CaptureUpdate(0, TAKEN, count=number)) for taken in (first, second) for number, at in enumerate(taken, 1)
+    ]
+    events += [(1.0, CaptureUpdate(0, STARTED)), (1.4, CaptureUpdate(0, ENDED)), (1.5, CaptureUpdate(0, STARTED))]
+    events += [(stored, saved("a", len(first))), (1.9, CaptureUpdate(0, ENDED)), (2.0, saved("b", len(second)))]
+    for at, update in sorted(events, key=lambda event: event[0]):
+        shots += tracker.receive(update, at)
+    assert all(shot.is_saved for shot in shots)
+    taken = {media: [shot.at for shot in shots if shot.capture == tracker.capture_of(media)] for media in "ab"}
+    assert taken == {"a": list(first), "b": list(second)}
+
+
 def test_failure_of_a_photo_that_is_reported_after_the_next_one_has_begun_is_its_own() -> None:
     tracker = ShotTracker()
     feed(tracker, (1.0, STARTED, None), (1.2, TAKEN, 1), (1.3, ENDED, None), (1.4, STARTED, None))
