@@ -137,7 +137,9 @@ class BoundedLogFile:
         """Open the file for appending. Raises OSError."""
         self._path = path
         self._file = self._open()
-        self._has_failed = False
+        if self._is_regular:
+            self._path = path.resolve()  # what is put aside is the file, never a link to it, as /dev/stderr
+        self._reported: set[str] = set()
 
     def write(self, line: str) -> None:
         """Append a line."""
@@ -149,7 +151,7 @@ class BoundedLogFile:
                 try:
                     self._put_aside()
                 except OSError as error:  # as a file in /var/log, whose folder is root's
-                    self._complain(f"begins again, because it cannot be put aside: {error}")
+                    self._complain("begins again, because it cannot be put aside", error)
                     os.truncate(self._path, 0)
             if self._file.closed:
                 self._file = self._open()
@@ -157,13 +159,13 @@ class BoundedLogFile:
             while data:
                 data = data[self._file.write(data) :]
         except OSError as error:
-            self._complain(f"cannot be written: {error}")
+            self._complain("cannot be written", error)
 
-    def _complain(self, problem: str) -> None:
-        """Report the first problem."""
-        if not self._has_failed:
-            self._has_failed = True
-            complain_later(f"--log-file: {self._path} {problem}")
+    def _complain(self, problem: str, error: OSError) -> None:
+        """Report the first error of each kind."""
+        if problem not in self._reported:
+            self._reported.add(problem)
+            complain_later(f"--log-file: {self._path} {problem}: {error}")
 
     def _open(self) -> io.FileIO:
         file = io.FileIO(self._path, "ab")

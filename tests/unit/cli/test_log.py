@@ -88,6 +88,27 @@ def test_log_file_that_cannot_be_put_aside_begins_again(
     assert path.read_text().endswith("line 99\n")
     assert STDERR_WRITER.wait(PATIENCE)
     assert capsys.readouterr().err.count("begins again, because it cannot be put aside: ") == 1
+    path.unlink()
+    path.mkdir()
+    for number in range(100):
+        file.write(f"line {number}")
+    assert STDERR_WRITER.wait(PATIENCE)
+    assert capsys.readouterr().err.count("cannot be written: ") == 1
+
+
+def test_link_to_the_log_file_keeps_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As /dev/stderr, which would be another file for every program then."""
+    monkeypatch.setattr(log, "FILE_BYTES", 200)
+    link, folder = tmp_path / "stderr", tmp_path / "logs"
+    folder.mkdir()
+    link.symlink_to(folder / "gateway.log")
+    file = log.BoundedLogFile(link)
+    for number in range(30):
+        file.write(f"line {number}")
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["logs", "stderr"]
+    assert sorted(one.name for one in folder.iterdir()) == ["gateway.log", "gateway.log.1"]
+    assert link.is_symlink()
+    assert link.read_text().endswith("line 29\n")
 
 
 def test_repeated_line_is_counted_once_for_all_outputs(tmp_path: Path) -> None:
