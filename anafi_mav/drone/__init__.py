@@ -56,6 +56,7 @@ from anafi_mav.drone.payload.camera_state import (
     RecordingSettings,
     StyleSettings,
 )
+from anafi_mav.drone.payload.flight_logs import FlightLog, FlightLogs
 from anafi_mav.drone.payload.gimbal import Aim, Angles, Gimbal, GimbalAttitude, GimbalState
 from anafi_mav.drone.payload.media import Media, MediaItem, MediaState, Notification, Place, Resource
 from anafi_mav.drone.payload.storage import Storage, StorageState
@@ -121,6 +122,8 @@ __all__ = [
     "ExposureMode",
     "ExposureSettings",
     "Feature",
+    "FlightLog",
+    "FlightLogs",
     "FlightPlan",
     "FlightPlanState",
     "FlyingState",

@@ -459,3 +459,11 @@ _VERSION_1_LENGTHS = {
     id: (_base_length(kind), kind.unpacker.size) for id, kind in dialect.mavlink_map.items() if id <= 0xFF
 }
 """Version 1 knows neither truncation nor extensions, but pymavlink sends the latter in it."""
+
+
+def char_field(text: str | None, size: int) -> bytes:
+    """Return the characters of a text that fit into a field of `size` bytes, in UTF-8.
+
+    No character is divided: half of one is no UTF-8, and strict readers reject the text. Empty for None.
+    """
+    return (text or "").encode(errors="replace")[:size].decode(errors="ignore").encode()

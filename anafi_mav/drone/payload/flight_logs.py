@@ -86,7 +86,7 @@ def _logs(body: bytes) -> tuple[list[FlightLog], int]:
 
 
 class FlightLogs:
-    """The flight logs of one drone.
+    """The flight logs of one drone, as `drone.flight_logs`.
 
     Methods raise `NotSupported` when the drone has no such list, `CommandRejected` when its web server refuses,
     `CommandTimeout` and `LinkLost` when it does not answer, `RemoteProtocolError` when the answer is not readable.

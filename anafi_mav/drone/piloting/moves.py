@@ -192,7 +192,7 @@ _MOVE_BY_REFUSALS = {
 
 
 def _axes(message: ardrone3.MoveByEnd, offset: Displacement) -> list[tuple[float, float, float]]:
-    """Return the flown, the commanded and the tolerated value of each axis that is reported as a number."""
+    """Return flown, commanded and tolerated value of each axis that is reported as a number."""
     length, angle = _SHORT
     axes = [
         (message.dX, offset.front, length),

@@ -14,9 +14,9 @@ from anafi_mav.drone.payload.camera import MAIN
 from anafi_mav.drone.payload.camera_enums import CameraMode
 from anafi_mav.drone.payload.camera_state import CameraState
 from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.frames import char_field
 from anafi_mav.models import Model, PayloadSensor
 from anafi_mav.services.camera.pose_track import CameraPose
-from anafi_mav.services.char_field import char_field
 from anafi_mav.services.stream import Times
 from anafi_mav.services.version_numbers import version_numbers
 from anafi_mav.vehicle.vehicle import Vehicle

@@ -279,7 +279,7 @@ class ShotTracker:
         return lost
 
     def _is_of_capture_before(self, update: CaptureUpdate) -> bool:
-        """Return True for the report that the capture before is stored, whose pictures still wait for it.
+        """Return True for a report that the capture before is stored, if its pictures wait for it.
 
         The next one is not stored before it has pictures, nor as two media, nor with the other's count.
         """

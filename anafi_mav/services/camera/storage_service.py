@@ -19,10 +19,10 @@ from anafi_mav.drone.payload.camera import BEGUN, Camera
 from anafi_mav.drone.payload.storage import StorageState
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.frames import char_field
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.camera.camera_messages import MEBIBYTE
 from anafi_mav.services.camera.camera_targets import PASSING, media_storage, require_idle, storage_problem
-from anafi_mav.services.char_field import char_field
 from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect, ProgressPolicy
 from anafi_mav.services.service import Answer, Host, Request, Service
 from anafi_mav.texts import Reason

@@ -13,10 +13,10 @@ from functools import partial
 from anafi_mav.clock import NEVER
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
+from anafi_mav.mavlink.frames import char_field
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services import component_metadata
 from anafi_mav.services.capabilities import capability_bits
-from anafi_mav.services.char_field import char_field
 from anafi_mav.services.checksum import crc32
 from anafi_mav.services.commands import Command
 from anafi_mav.services.component_metadata import COMPRESSED, GENERAL

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from anafi_mav import __version__
 from anafi_mav.drone import Drone
 from anafi_mav.mavlink import dialect
+from anafi_mav.mavlink.frames import char_field
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.capabilities import capability_bits
-from anafi_mav.services.char_field import char_field
 from anafi_mav.services.commands import Command
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.service import MessageHandler, Request, Service

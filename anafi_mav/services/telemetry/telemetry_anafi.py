@@ -20,7 +20,7 @@ from anafi_mav.drone.status.alerts import Alerts
 from anafi_mav.drone.status.home import Home
 from anafi_mav.drone.video.stream_intrinsics import IntrinsicsSource, shown_intrinsics
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.char_field import char_field
+from anafi_mav.mavlink.frames import char_field
 from anafi_mav.services.stream import INPUT_FASTEST, MessageStream, Times
 from anafi_mav.services.telemetry.telemetry_link import INPUT_EVENTS
 from anafi_mav.vehicle.vehicle import Vehicle

@@ -14,7 +14,7 @@ from anafi_mav.drone import events
 from anafi_mav.drone.events import AlertLevel, BatteryAlert, MotorError, Sensor
 from anafi_mav.drone.status.battery import BatteryState
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.char_field import char_field
+from anafi_mav.mavlink.frames import char_field
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.vehicle import Vehicle
 

@@ -17,16 +17,16 @@ EXAMPLES = sorted((Path(__file__).parents[3] / "examples" / "python_api").glob("
 
 STABLE = """
 Aim Alerts AlertsState AnafiMavError Angles Animations AnimationsState Antiflicker Attitude Avoidance Battery
-BatteryState Blocker BlockerKind Bracketing Burst Calibration CalibrationState Camera CameraKind CameraMode CameraState
-CamerasState Colour CommandRejected CommandTimeout Controller ControllerState Displacement Drone ExposureMode
-ExposureSettings Feature FlightPlan FlightPlanState FlyingState FollowMe FollowMeState FrameMetadata Gimbal
-GimbalAttitude GimbalState Gps GpsState HandshakeRefused Home HomeState Identity KnownDrone Limits Link LinkLost
-LinkState LocalProtocolError Location MODELS Media MediaItem MediaState Metering Model Move MoveEnd Ned NotSupported
-Notification Palette PhotoFile PhotoFormat PhotoMode PhotoOption PhotoSettings Picture Piloting PilotingCommand
-PilotingState Place PlanOnDrone PlayingState Poi PoiState Position Product ProductState Quaternion Range RecordingMode
-RecordingOption RecordingSettings Recovery RemoteProtocolError Resolution Resource Shown Sound SoundState Storage
-StoragePolicy StorageState Streaming Style StyleSettings Support Thermal ThermalState Trajectory Velocity Video
-VideoCodec VideoFrame VideoState WhiteBalance WifiLink connect events
+BatteryState Blocker BlockerKind Bracketing Burst Calibration CalibrationState Camera CameraKind CameraMode
+CameraState CamerasState Colour CommandRejected CommandTimeout Controller ControllerState Displacement Drone
+ExposureMode ExposureSettings Feature FlightLog FlightLogs FlightPlan FlightPlanState FlyingState FollowMe
+FollowMeState FrameMetadata Gimbal GimbalAttitude GimbalState Gps GpsState HandshakeRefused Home HomeState Identity
+KnownDrone Limits Link LinkLost LinkState LocalProtocolError Location MODELS Media MediaItem MediaState Metering Model
+Move MoveEnd Ned NotSupported Notification Palette PhotoFile PhotoFormat PhotoMode PhotoOption PhotoSettings Picture
+Piloting PilotingCommand PilotingState Place PlanOnDrone PlayingState Poi PoiState Position Product ProductState
+Quaternion Range RecordingMode RecordingOption RecordingSettings Recovery RemoteProtocolError Resolution Resource
+Shown Sound SoundState Storage StoragePolicy StorageState Streaming Style StyleSettings Support Thermal ThermalState
+Trajectory Velocity Video VideoCodec VideoFrame VideoState WhiteBalance WifiLink connect events
 """
 """Names that programs of others import. Removing or renaming one breaks them: it needs a line in the changelog."""
 

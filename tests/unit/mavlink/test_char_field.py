@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from anafi_mav.services.char_field import char_field
+from anafi_mav.mavlink.frames import char_field
 
 
 @pytest.mark.parametrize(
