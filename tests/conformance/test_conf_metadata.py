@@ -248,7 +248,7 @@ async def test_conf_126_flight_events_are_sent_in_sequence() -> None:
 
 @pytest.mark.parametrize("before", [FlyingState.EMERGENCY, None], ids=["motors cut", "not reported"])
 async def test_conf_126_landed_state_without_a_flight_is_no_landing(before: FlyingState | None) -> None:
-    """The state on the ground may be reported late, or again after an emergency stop on the ground."""
+    """The state may be reported late, or again after an emergency stop on the ground."""
 
     def reports(drone: SimulatedDrone) -> None:
         drone.faults.unreported = frozenset({FlyingStateChanged.NAME} if before is None else ())
@@ -288,7 +288,7 @@ async def test_conf_127_run_prearm_checks(flavour: str) -> None:
 
 
 async def test_conf_127_station_that_connects_in_flight_gets_the_health_report() -> None:
-    """The command is for a vehicle that is not armed (common.xml); PX4 sends the report in flight, too."""
+    """The answer is that of common.xml; the report is sent all the same, as by PX4."""
     async with world() as w:
         events = await reader(w.client)
         await w.take_off(3.0)

@@ -133,7 +133,7 @@ async def test_conf_037_low_charge_is_reported_by_either_alert(unreported: list[
 
 
 async def test_conf_037_low_charge_outlasts_another_alert() -> None:
-    """AlertStateChanged has one alert at a time; only its NONE ends that of the battery (GroundSDK, AnafiAlarms)."""
+    """AlertStateChanged has one alert; NONE alone ends the battery's (GroundSDK AnafiAlarms)."""
 
     def reports(drone: SimulatedDrone) -> None:
         drone.faults.unreported = frozenset({battery.Alert.NAME, alarms.TakeoffChecklist.NAME})

@@ -296,7 +296,7 @@ async def test_playing_viewer_that_reads_no_responses_is_aborted(
 
 
 async def test_viewer_that_stops_reading_frees_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A suspended player answers the probes of TCP for ever, and the pictures that wait for it never leave."""
+    """A suspended player keeps its connection alive and takes no picture."""
     monkeypatch.setattr("support.video_server.SLICE", SLICE[:1] + bytes(60_000))
     monkeypatch.setattr(server_module, "STUCK", 1.0)
     async with studio() as held, viewer(held.relay.port) as stuck:
