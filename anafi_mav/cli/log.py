@@ -247,9 +247,13 @@ def check(option: str, path: Path) -> None:
     try:
         if path.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        if path.exists():  # a device, or a file in a folder of another user, is written where it is
+            if not os.access(path, os.W_OK):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+            return
         if not path.parent.is_dir():
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
-        check_folder(path.parent, path.name)
+        check_folder(path.parent)
     except OSError as error:
         raise _unusable(option, path, error) from error
 

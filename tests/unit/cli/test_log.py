@@ -6,8 +6,11 @@ import errno
 import json
 import logging
 import os
+import subprocess
+import sys
 import time
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 from support.hanging_disk import PATIENCE, hanging_file
@@ -135,6 +138,30 @@ def test_complaint_follows_the_lines_of_the_log_before_it(capfd: pytest.CaptureF
     log.LogThreadHandler(STDERR_WRITER, write_stderr, "terminal").emit(logging.makeLogRecord({"msg": "line"}))
     complain("no gateway")
     assert capfd.readouterr().err.splitlines() == ["line", "anafi-mav: no gateway"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions of a folder exist on POSIX alone")
+def test_log_file_in_a_folder_that_refuses_new_files_passes_the_check() -> None:
+    """As /dev/null, or a file in /var/log: a start writes it without a new name."""
+    script = """
+import os, sys
+from pathlib import Path
+from anafi_mav.cli import log
+if os.geteuid() == 0:
+    os.setuid(65534)
+log.check("--log-file", Path("/dev/null"))
+log.check("--log-file", Path(sys.argv[1]))
+"""
+    with TemporaryDirectory() as name:
+        path = Path(name) / "gateway.log"
+        path.touch()
+        path.chmod(0o666)
+        path.parent.chmod(0o555)
+        run = subprocess.run(
+            [sys.executable, "-c", script, str(path)], capture_output=True, text=True, check=False, timeout=30
+        )
+        path.parent.chmod(0o755)
+    assert run.stderr == ""
 
 
 def test_log_file_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
