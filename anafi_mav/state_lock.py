@@ -136,7 +136,7 @@ class StateLock:
         Raises `OSError` for a folder that cannot be used.
         """
         self._folder.mkdir(parents=True, exist_ok=True)
-        file = os.open(self._folder / FILE, os.O_RDWR | os.O_CREAT, 0o644)
+        file = _make_lock(self._folder / FILE)
         try:
             for attempt in range(TRIES):
                 if try_lock(file) and self._lock_folder():
@@ -255,6 +255,21 @@ def _try_lock_folder(folder: Path, *, is_shared: bool = False) -> int | None:
         os.close(own)
         raise
     return own
+
+
+def _make_lock(path: Path) -> int:
+    """Open the lock file, and make it where it is absent.
+
+    One that root makes belongs to the owner of its folder, whose gateway could not lock it otherwise.
+    """
+    try:
+        file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644)
+    except FileExistsError:
+        return os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    if os.name == "posix" and os.geteuid() == 0 and (owner := path.parent.stat()).st_uid != 0:
+        with contextlib.suppress(OSError):  # a container or a network disk may forbid it: it stays root's
+            os.fchown(file, owner.st_uid, owner.st_gid)
+    return file
 
 
 def _open_lock(path: Path) -> int:

@@ -92,6 +92,19 @@ def another_user() -> Iterator[None]:
         os.seteuid(0)
 
 
+def test_lock_that_root_makes_belongs_to_the_owner_of_its_folder(tmp_path: Path) -> None:
+    """A gateway that root starts once must not keep that of a service from its folder ever after.
+
+    Any other user has folders of its own only.
+    """
+    if os.name == "posix" and os.geteuid() == 0:
+        os.chown(tmp_path, 65534, 65534)
+    lock = StateLock(tmp_path)
+    assert lock.acquire() is None
+    lock.release()
+    assert (tmp_path / FILE).stat().st_uid == tmp_path.stat().st_uid
+
+
 @pytest.mark.skipif(os.name != "posix", reason="another user and permissions of a file exist on POSIX alone")
 def test_holder_is_found_by_a_user_who_may_only_read() -> None:
     """A service's: `info` and `doctor` must not take its drones."""
