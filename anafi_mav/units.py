@@ -20,6 +20,14 @@ def counted(number: int, what: str) -> str:
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 
+def is_finite(*values: float) -> bool:
+    """Return True for numbers whose sum a float holds; an int may be too large for one."""
+    try:
+        return math.isfinite(sum(values))
+    except OverflowError:
+        return False
+
+
 def wrap_pi(angle: float) -> float:
     """The same angle (rad) in [-pi, pi)."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi

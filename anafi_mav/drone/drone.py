@@ -434,6 +434,7 @@ class Drone:
 
     async def pause(self, seconds: float) -> None:
         """Wait before the next `connect`, no longer than until a silent session is heard again."""
+        require_number(seconds)
         if self._fading is None:
             await asyncio.sleep(seconds)
         else:

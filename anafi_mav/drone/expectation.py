@@ -36,13 +36,17 @@ own SDK waits 10 s, too long for a ground station that repeats its command every
 
 
 def require_number(timeout: float | None) -> None:
-    """Raise `LocalProtocolError` for a timeout of NaN.
+    """Raise `LocalProtocolError` for a timeout of NaN, and for one that no float holds.
 
     NaN is neither before nor after another time: in asyncio's heap of timers it would hold back those of others, among
     them the one that centres the sticks.
     """
-    if timeout is not None and math.isnan(timeout):
-        raise LocalProtocolError(f"expected a timeout in s, got {timeout}")
+    try:
+        if timeout is None or not math.isnan(timeout):
+            return
+    except OverflowError:
+        pass
+    raise LocalProtocolError("expected a timeout in s")
 
 
 def loop_time() -> float:
@@ -86,7 +90,7 @@ class Expectation(Generic[T]):
         try:
             verdict = self._judge(message)
         except Exception as error:  # a caller's predicate; the link must survive it
-            self.future.set_exception(error)
+            self.fail(error)
             return
         if isinstance(verdict, AnafiMavError):
             self.fail(verdict)
@@ -106,11 +110,15 @@ class Expectation(Generic[T]):
     def expire_after(self, seconds: float, what: str) -> None:
         """(Re)start the clock: the wait fails with `CommandTimeout` about `what` after this time.
 
-        Raises `LocalProtocolError` for NaN, and stops listening.
+        Raises `LocalProtocolError` for a time that is not a number, and stops listening.
         """
-        if math.isnan(seconds):
+        try:
+            is_number = not math.isnan(seconds)
+        except OverflowError:
+            is_number = False
+        if not is_number:
             self.close()
-            require_number(seconds)
+            raise LocalProtocolError("expected a timeout in s")
         if self._timer is not None:
             self._timer.cancel()
         self._timer = self.future.get_loop().call_later(seconds, self._expire, what, seconds)

@@ -20,6 +20,7 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.drone.element import Element, StateT
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
+from anafi_mav.units import is_finite
 
 T = TypeVar("T")
 
@@ -40,10 +41,10 @@ Attitude and zoom are reported five times a second.
 def number(value: float, what: str) -> float:
     """The value.
 
-    Raises `LocalProtocolError` for NaN and infinities, which ask a drone for nothing.
+    Raises `LocalProtocolError` for NaN, infinities and what no float holds, which ask a drone for nothing.
     """
-    if not math.isfinite(value):
-        raise LocalProtocolError(f"{what}: {value} is not a number")
+    if not is_finite(value):
+        raise LocalProtocolError(f"{what}: expected a finite number")
     return value
 
 

@@ -474,7 +474,8 @@ class Camera(Commanding[CamerasState]):
         self, saturation: float, contrast: float, sharpness: float, id: int = MAIN
     ) -> CameraState:
         """Set the levels of the present style; their ranges are in `StyleSettings`."""
-        number(saturation + contrast + sharpness, "style")
+        for value in (saturation, contrast, sharpness):
+            number(value, "style")
 
         def is_done(state: CameraState) -> bool:
             style = state.style or StyleSettings()
@@ -496,7 +497,8 @@ class Camera(Commanding[CamerasState]):
 
     async def set_alignment(self, yaw: float, pitch: float, roll: float, id: int = MAIN) -> CameraState:
         """Set the corrections against the other camera, deg."""
-        number(yaw + pitch + roll, "alignment")
+        for angle in (yaw, pitch, roll):
+            number(angle, "alignment")
         wanted = {"yaw": float(yaw), "pitch": float(pitch), "roll": float(roll)}
         return await self._ask(
             id,

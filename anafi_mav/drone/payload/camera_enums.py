@@ -17,6 +17,7 @@ from typing import TypeVar
 
 from anafi_mav.arsdk.codec.wire import OpenEnum
 from anafi_mav.errors import LocalProtocolError, NotSupported
+from anafi_mav.units import is_finite
 
 
 class CameraKind(enum.Enum):
@@ -280,8 +281,8 @@ def quantities(values: Iterable[OpenEnum]) -> tuple[float, ...]:
 
 def nearest(values: type[ParrotT], wanted: float) -> ParrotT:
     """The value whose number is nearest, by ratio."""
-    if not (math.isfinite(wanted) and wanted > 0.0):
-        raise LocalProtocolError(f"expected a number above zero, got {wanted}")
+    if not (is_finite(wanted) and wanted > 0.0):
+        raise LocalProtocolError("expected a finite number above zero")
     known = [(abs(math.log(number / wanted)), value) for value in values if (number := quantity(value))]
     return min(known)[1]
 
@@ -298,6 +299,6 @@ def ev_of(value: int | None) -> float | None:
 
 def ev_step(ev: float) -> int:
     """The nearest step."""
-    if not math.isfinite(ev):
-        raise LocalProtocolError(f"expected EV, got {ev}")
+    if not is_finite(ev):
+        raise LocalProtocolError("expected EV: a finite number")
     return min(max(round(ev * EV_STEPS) + _EV_ZERO, 0), 2 * _EV_ZERO)

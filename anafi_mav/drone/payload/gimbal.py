@@ -33,7 +33,7 @@ from anafi_mav.drone.expectation import ANSWER_TIMEOUT, require_number
 from anafi_mav.drone.settings import Commanding, is_same
 from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError, CommandRejected, LocalProtocolError, NotSupported
-from anafi_mav.units import clip
+from anafi_mav.units import clip, is_finite
 
 MAIN = 0
 """Id of the gimbal that carries the cameras; the Ai's stereo camera has one of its own."""
@@ -352,7 +352,7 @@ class Gimbal(Commanding[Gimbals]):
 
         gimbal.xml 148-0-4.
         """
-        if not math.isfinite(degrees_per_second):
+        if not is_finite(degrees_per_second):
             raise LocalProtocolError("a speed is not a number")
         self._require(self[id].max_speed, gimbal.SetMaxSpeed.NAME)
         return await self._change(
@@ -382,7 +382,7 @@ class Gimbal(Commanding[Gimbals]):
         for axis, value in ((Axis.YAW, yaw), (Axis.PITCH, pitch), (Axis.ROLL, roll)):
             kept = now[axis].current if axis in now else 0.0
             wanted[axis] = kept if value is None else value
-        if not math.isfinite(sum(wanted.values())):
+        if not is_finite(*wanted.values()):
             raise LocalProtocolError("an offset is not a number")
         return await self._change(
             gimbal.SetOffsets(id, *wanted.values()),
@@ -443,16 +443,16 @@ class Gimbal(Commanding[Gimbals]):
                 continue
             if axis not in axes:
                 raise NotSupported(f"gimbal axis {axis.name.lower()}")
-            if not math.isfinite(aim.value) or aim.frame == FrameOfReference.NONE:
-                raise LocalProtocolError(f"no target for the gimbal: {aim}")
+            if not is_finite(aim.value) or aim.frame == FrameOfReference.NONE:
+                raise LocalProtocolError("no target for the gimbal")
             targets[axis] = Aim(clip(aim.value, *self[id].bounds(axis, aim.frame)), aim.frame)
         return targets
 
     def _share(self, axis: Axis, aim: Aim, id: int) -> Aim:
         if axis not in self._axes(id):
             raise NotSupported(f"gimbal axis {axis.name.lower()}")
-        if not math.isfinite(aim.value) or aim.frame == FrameOfReference.NONE:
-            raise LocalProtocolError(f"no rate for the gimbal: {aim}")
+        if not is_finite(aim.value) or aim.frame == FrameOfReference.NONE:
+            raise LocalProtocolError("no rate for the gimbal")
         speed = self[id].max_speed.get(axis)
         if speed is None:
             raise NotSupported("reported gimbal speed")

@@ -27,7 +27,7 @@ from anafi_mav.arsdk.messages.user_storage import (
     PhyState,
 )
 from anafi_mav.drone.element import EMPTY, REMOVE, Reducer, members, with_item
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, require_number
 from anafi_mav.drone.payload.camera_enums import StoragePolicy
 from anafi_mav.drone.settings import Commanding, Question
 from anafi_mav.drone.status.alerts import spoken
@@ -334,6 +334,7 @@ class Storage(Commanding[Storages]):
 
         Raises `CommandRejected` when the drone refuses (it flies or records) or fails.
         """
+        require_number(timeout)
         speech, storage = self._addressed(id)
         known = self[storage]
         if known.formats is not None and kind not in known.formats:

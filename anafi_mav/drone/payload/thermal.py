@@ -132,7 +132,8 @@ class Thermal(Commanding[ThermalState]):
     async def set_palette(self, palette: Palette) -> Palette:
         """Set the relation of temperatures to colours; return that of the drone."""
         self._require(self.state.palette, "thermal camera")
-        number(palette.lowest_k + palette.highest_k + palette.spot_threshold, "palette")
+        for value in (palette.lowest_k, palette.highest_k, palette.spot_threshold):
+            number(value, "palette")
         command = thermal.SetPaletteSettings(
             palette.mode,
             palette.lowest_k,

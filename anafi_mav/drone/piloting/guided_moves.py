@@ -32,7 +32,7 @@ from anafi_mav.errors import (
     LocalProtocolError,
     NotSupported,
 )
-from anafi_mav.units import RAD_PER_DEG, wrap_360
+from anafi_mav.units import RAD_PER_DEG, is_finite, wrap_360
 
 MOVE_BY_MARGIN = 20.0
 """s that a relative move may take beyond the flight itself."""
@@ -69,7 +69,7 @@ class GuidedMoves:
         timeout: float | None,
         turn_rate_dps: float | None,
     ) -> Displacement:
-        if not math.isfinite(front + right + down + turn):
+        if not is_finite(front, right, down, turn):
             raise LocalProtocolError("a relative move is not a number")
         require_number(timeout)
         self.require_free()
@@ -100,7 +100,7 @@ class GuidedMoves:
     ) -> Message:
         if turn_rate_dps is None:
             return ardrone3.MoveBy(front, right, down, turn)
-        if not (math.isfinite(turn_rate_dps) and turn_rate_dps > 0.0):
+        if not (is_finite(turn_rate_dps) and turn_rate_dps > 0.0):
             raise LocalProtocolError("a turn needs a rate above zero")
         limits = self._flight.state.limits
         if limits is None:
@@ -118,9 +118,12 @@ class GuidedMoves:
         timeout: float,
         orientation: OrientationMode | None,
     ) -> Move:
-        if not math.isfinite(
-            latitude + longitude + altitude + (heading_deg or 0.0) + (horizontal_speed or 0.0) + (vertical_speed or 0.0)
-        ):
+        try:
+            speeds = (horizontal_speed or 0.0) + (vertical_speed or 0.0)
+            is_target = math.isfinite(latitude + longitude + altitude + (heading_deg or 0.0) + speeds)
+        except OverflowError:  # an int that no float holds
+            is_target = False
+        if not is_target:
             raise LocalProtocolError("a target is not a number")
         require_number(timeout)
         if orientation is None:

@@ -88,10 +88,11 @@ def percent(command: PilotingCommand, limits: Limits) -> Percent:
 
 
 def _share(value: float, limit: float) -> int:
-    if math.isnan(value):
+    held = -limit if value < -limit else limit if value > limit else value  # an int of any size, too
+    if math.isnan(held):
         raise LocalProtocolError("a piloting setpoint is not a number")
     # A limit of zero is a drone that may not move that way at all.
-    return round(min(max(100.0 * value / limit, -100.0), 100.0)) if limit > 0.0 else 0
+    return round(100.0 * held / limit) if limit > 0.0 else 0
 
 
 def is_deflected(pcmd: PCMD) -> bool:

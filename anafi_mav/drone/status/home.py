@@ -27,7 +27,7 @@ from anafi_mav.arsdk.messages.rth import (
     StateReason,
 )
 from anafi_mav.drone.element import Position, Range, Reducer, members, position, setting
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, require_number
 from anafi_mav.drone.settings import Commanding
 from anafi_mav.errors import CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
 
@@ -243,6 +243,7 @@ class Home(Commanding[HomeState]):
         after it has received the command, for a report of the old place may be from before that. `CommandTimeout` when
         the command did not arrive.
         """
+        require_number(timeout)
         wanted = position(latitude, longitude, altitude)
         if wanted is None:
             raise LocalProtocolError(f"no place on earth: {latitude}, {longitude}, {altitude}")
