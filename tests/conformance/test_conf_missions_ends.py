@@ -145,6 +145,7 @@ async def test_conf_073_landing_whose_lines_are_reported_late_completes_the_miss
         mark = w.client.mark()
         w.drone.faults.late = {common.MissionItemExecuted.NAME: 0.8, common.MavlinkFilePlayingStateChanged.NAME: 0.3}
         await state(w, COMPLETE, since=mark)
+        assert reached(w) == [0, 1, 2]
         await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=mark, timeout=40.0)
 
 

@@ -275,7 +275,7 @@ class MissionPhase:
     plays: str | None = None
     """The plan that another controller lets the drone fly."""
     may_end_late: bool = False
-    """PAUSED: the drone stopped its plan. Its report of the last line still completes the mission."""
+    """PAUSED: the drone stopped its plan. Its lines still count, and the last one completes the mission."""
     stops: bool = False
     """PAUSED: the drone has been commanded to pause its file, and has not reported that. Lines count until then."""
 
@@ -696,8 +696,8 @@ class MissionMachine:
         leg, state = self.progress.leg, self.phase.state
         late = state is S.PAUSED
         is_last = leg is not None and line == len(leg.origins) - 1
-        if late and self.phase.stops and not is_last:
-            yield from self._execute(line)  # before the drone has heard of the pause
+        if late and (self.phase.stops or self.phase.may_end_late) and not is_last:
+            yield from self._execute(line)  # before the drone has heard of the pause, or stopped
             return
         if late and not (self.phase.may_end_late and is_last):
             return
