@@ -114,6 +114,21 @@ async def test_change_of_a_mission_whose_plans_end_was_not_reported_keeps_the_mo
         assert (await w.client.heartbeat(lambda beat: True)).custom_mode == HOLD
 
 
+@pytest.mark.parametrize("command", [(SET_MODE, *PX4_HOLD), (LAND_CMD,), (RTL_CMD,)], ids=["hold", "land", "return"])
+async def test_command_at_the_last_item_leaves_a_complete_mission(command: tuple[float, ...]) -> None:
+    """A program commands it when that item is reached, and the drone reports the end of its plan later."""
+    async with world(web=True) as w:
+        await put(w, [takeoff(6.0), way(12.0, 0.0, 6.0)])
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=0)
+        w.drone.faults.late = {PLAYING: 1.5}
+        await w.client.wait("MISSION_ITEM_REACHED", lambda m: m.seq == 1, since=0, timeout=30.0)
+        mark = w.client.mark()
+        assert (await w.client.command(*command)).result == ACCEPTED
+        await state(w, COMPLETE, since=mark, timeout=2.0)
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Mission complete", since=mark)
+
+
 async def test_turn_after_a_file_whose_plans_end_is_not_reported_is_flown() -> None:
     async with world(web=True) as w:
         turn = Item(dialect.MAV_CMD_CONDITION_YAW, 0.0, 0.0, p1=90.0, frame=2)

@@ -190,7 +190,7 @@ TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
         E.EXECUTED: (S.FLYING_FILE,),
         E.SKIPPED: (S.FLYING_FILE,),
         E.REPORTED: (S.FLYING_FILE, S.COMPLETE),
-        E.CONTROL_LOST: (S.PAUSED,),
+        E.CONTROL_LOST: (S.PAUSED, S.COMPLETE),
         E.TIMEOUT: (S.FLYING_FILE, *_NEXT),
         E.LINK_DOWN: (S.PAUSED,),
     },
@@ -745,7 +745,13 @@ class MissionMachine:
         drone lands, and no client has commanded that. Lines of the file may be reported late: the last one shows then
         that the landing was the plan's.
         """
-        state, flew = self.state, self.flying
+        state, flew, course = self.state, self.flying, self.progress.course
+        is_last_part = course.following is None and course.later is None
+        if state is S.FLYING_FILE and self.progress.leg_done and is_last_part and not self.ending:
+            self._unended = self.progress.uid  # only the end of its plan was not reported yet
+            yield from self._complete()
+            yield Suspend(starting=False)
+            return
         yield from self._end()
         if state is S.FLYING_FILE:
             late = lands and self.progress.course.following is None
