@@ -17,7 +17,6 @@ import enum
 import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from functools import partial
 
 from anafi_mav import geo, texts
 from anafi_mav.clock import Alarm
@@ -93,20 +92,40 @@ class ReturnAttempt:
     phase: _Phase
     task: asyncio.Task[None] | None = None
     """The wait above home and the landing."""
-    doubt: Alarm | None = None
-    """Runs while the drone hovers at home and reports no end."""
-    asked: bool = False
-    """It has been asked for its states since."""
 
     def stop(self) -> list[asyncio.Task[None]]:
         """Nothing more is sent for it. Returns the task that is about to end."""
-        if self.doubt is not None:
-            self.doubt.cancel()
         task, self.task = self.task, None
         if task is None or task is asyncio.current_task():
             return []
         task.cancel()
         return [task]
+
+
+@dataclass
+class _UnreportedEnd:
+    """Doubt about the return that the drone reports, whatever commanded it: it hovers at home and reports no end."""
+
+    alarm: Alarm | None = None
+    """Runs while it hovers, and then while its answer is due."""
+    is_asked: bool = False
+    """It has been asked for its states in this return."""
+
+    def set_in(self, seconds: float, act: Callable[[], None]) -> None:
+        """Replace the alarm by one that acts in so many s."""
+        self.cancel()
+        self.alarm = Alarm(act)
+        self.alarm.set_in(seconds)
+
+    def cancel(self) -> None:
+        """End the alarm."""
+        if self.alarm is not None:
+            self.alarm.cancel()
+
+    def settle(self) -> None:
+        """The return is over, or another one begins."""
+        self.cancel()
+        self.is_asked = False
 
 
 @dataclass(frozen=True)
@@ -142,6 +161,7 @@ class ReturnEnd(PlainTask):
         self._vehicle = vehicle
         self._command_landing = land
         self._attempt: ReturnAttempt | None = None
+        self._unreported_end = _UnreportedEnd()
         self._given: _GivenHome | None = None
 
     @property
@@ -176,6 +196,7 @@ class ReturnEnd(PlainTask):
     def command(self) -> ReturnAttempt:
         """The drone is about to be commanded to return."""
         self.end()
+        self._unreported_end.settle()
         self._attempt = ReturnAttempt(_Phase.RETURNING if self._vehicle.returning else _Phase.COMMANDED)
         return self._attempt
 
@@ -222,6 +243,7 @@ class ReturnEnd(PlainTask):
         attempt, self._attempt = self._attempt, None
         if attempt is not None:
             attempt.stop()
+        self._unreported_end.settle()
         if self._given is not None and not self._given.flight_id:
             self._given = None  # the next connection may find another flight
 
@@ -235,14 +257,12 @@ class ReturnEnd(PlainTask):
     def on_return_state(self) -> None:
         """rth.state was reported, once more perhaps."""
         attempt, home = self._attempt, self._vehicle.drone.home.state
+        self._watch_end()
         if attempt is None:
             return
         if home.returning and attempt.phase is not _Phase.LANDING:
-            if attempt.asked:
-                return  # that is its answer
             attempt.stop()  # it waited above home, and the drone has a reason of its own to return once more
             attempt.phase = _Phase.RETURNING
-            self._watch_end(attempt)
         elif not home.returning and attempt.phase is _Phase.RETURNING:
             attempt.stop()
             if home.rth == RthState.AVAILABLE and home.reason == ReturnReason.FINISHED:
@@ -255,12 +275,11 @@ class ReturnEnd(PlainTask):
     def on_flying_state(self) -> None:
         """The drone's flying state has changed."""
         attempt = self._attempt
+        self._watch_end()
         if attempt is None:
             return
         if self._vehicle.flying_state == FlyingState.EMERGENCY_LANDING:
             self._vehicle.control.release(self)  # by the drone itself, and shown as a landing
-        elif attempt.phase is _Phase.RETURNING:
-            self._watch_end(attempt)
         elif attempt.phase is _Phase.WAITING and self._vehicle.flying_state in LANDING:
             attempt.stop()
             attempt.phase = _Phase.LANDING
@@ -363,29 +382,29 @@ class ReturnEnd(PlainTask):
             vehicle.text(Severity.WARNING, texts.RETURN_HOVERS_REASON.fill(at=at, reason=reason))
         vehicle.changed()
 
-    def _watch_end(self, attempt: ReturnAttempt) -> None:
+    def _watch_end(self) -> None:
         """Notice a drone that hovers at home and reports no end of its return."""
-        if attempt.asked:
-            return
-        if attempt.doubt is not None:
-            attempt.doubt.cancel()
-        under_way = self._vehicle.drone.home.state.rth == RthState.IN_PROGRESS
-        if under_way and self._vehicle.flying_state == FlyingState.HOVERING:
-            attempt.doubt = Alarm(partial(self._unreported, attempt))
-            attempt.doubt.set_in(UNREPORTED)
+        doubt = self._unreported_end
+        if not self._vehicle.returning:
+            doubt.settle()
+        elif not doubt.is_asked:  # else this is its answer
+            doubt.cancel()
+            under_way = self._vehicle.drone.home.state.rth == RthState.IN_PROGRESS
+            if under_way and self._vehicle.flying_state == FlyingState.HOVERING:
+                doubt.set_in(UNREPORTED, self._ask)
 
-    def _unreported(self, attempt: ReturnAttempt) -> None:
+    def _ask(self) -> None:
         metres = _metres(self._vehicle.place, self._vehicle.drone.home.state.location)
-        if attempt is not self._attempt or metres is None or metres > NEAR_HOME:
+        if metres is None or metres > NEAR_HOME:
             return
-        attempt.asked = True
-        attempt.doubt = Alarm(partial(self._unanswered, attempt))
-        attempt.doubt.set_in(ANSWER)
+        self._unreported_end.is_asked = True
+        self._unreported_end.set_in(ANSWER, self._unanswered)
         with contextlib.suppress(LinkLost):
             self._vehicle.drone.home.request_states()
 
-    def _unanswered(self, attempt: ReturnAttempt) -> None:
-        if attempt is self._attempt:
+    def _unanswered(self) -> None:
+        """The drone still reports that it returns: a commanded return is over nevertheless."""
+        if self._attempt is not None and self._attempt.phase is _Phase.RETURNING:
             self._hover(texts.HOVER_UNREPORTED)
 
     # Where and how.

@@ -322,6 +322,31 @@ async def test_hold_after_the_unreported_end_of_a_return_is_accepted(command: tu
         assert not [e for e in w.drone.log if e.t > hovers_at.t and e.name == "flying"]
 
 
+@pytest.mark.parametrize("own", [False, True])
+async def test_unreported_end_of_a_return_without_an_attempt_ends_mode_return(own: bool) -> None:
+    """Quirk rth-finished-missing, in a return of the drone's own, and in a commanded one after a link loss."""
+    async with world(speed=FAST, quirks=("rth-finished-missing",)) as w:
+        await away(w, 60.0)
+        mark = w.client.mark()
+        if own:
+            return_by_itself(w)
+            await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.returning, since=mark)
+        else:
+            await go_home(w)
+            w.simulator.speed = 1.0
+            w.drone.faults.mute = True
+            await w.client.silence("HEARTBEAT", 2.0)
+            w.drone.faults.mute = False
+            mark = w.client.mark()
+            await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.returning, since=mark, timeout=10.0)
+            w.simulator.speed = FAST
+        assert w.drone.firmware.homing.active
+        await w.drone.wait_log(lambda e: not w.drone.firmware.homing.active, 30.0, since=w.drone.log[-1].t)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, since=w.client.mark(), timeout=20.0)
+        assert w.drone.flying_state.name == "HOVERING"
+        assert landings(w) == []
+
+
 async def test_return_not_reported_as_finished_ends_with_the_landing() -> None:
     """Quirk rth-finished-missing: a return of the flight before neither ends the next climb nor shows mode Return."""
     async with world(speed=FAST, quirks=("rth-finished-missing",)) as w:
