@@ -107,25 +107,22 @@ class _UnreportedEnd:
     """Doubt about the return that the drone reports, whatever commanded it: it hovers at home and reports no end."""
 
     alarm: Alarm | None = None
-    """Runs while it hovers, and then while its answer is due."""
+    """Runs while it hovers, and then while its answer is due; None without a return."""
     is_asked: bool = False
     """It has been asked for its states in this return."""
 
-    def set_in(self, seconds: float, act: Callable[[], None]) -> None:
-        """Replace the alarm by one that acts in so many s."""
-        self.cancel()
-        self.alarm = Alarm(act)
-        self.alarm.set_in(seconds)
-
-    def cancel(self) -> None:
-        """End the alarm."""
+    def replace(self, act: Callable[[], None]) -> Alarm:
+        """Return a new alarm in place of the one of before, not set yet."""
         if self.alarm is not None:
             self.alarm.cancel()
+        self.alarm = Alarm(act)
+        return self.alarm
 
     def settle(self) -> None:
         """The return is over, or another one begins."""
-        self.cancel()
-        self.is_asked = False
+        if self.alarm is not None:
+            self.alarm.cancel()
+        self.alarm, self.is_asked = None, False
 
 
 @dataclass(frozen=True)
@@ -197,6 +194,7 @@ class ReturnEnd(PlainTask):
         """The drone is about to be commanded to return."""
         self.end()
         self._unreported_end.settle()
+        self.watch_end()
         self._attempt = ReturnAttempt(_Phase.RETURNING if self._vehicle.returning else _Phase.COMMANDED)
         return self._attempt
 
@@ -257,7 +255,8 @@ class ReturnEnd(PlainTask):
     def on_return_state(self) -> None:
         """rth.state was reported, once more perhaps."""
         attempt, home = self._attempt, self._vehicle.drone.home.state
-        self._watch_end()
+        if self._unreported_end.alarm is not None:
+            self.watch_end()
         if attempt is None:
             return
         if home.returning and attempt.phase is not _Phase.LANDING:
@@ -275,7 +274,8 @@ class ReturnEnd(PlainTask):
     def on_flying_state(self) -> None:
         """The drone's flying state has changed."""
         attempt = self._attempt
-        self._watch_end()
+        if self._unreported_end.alarm is not None:
+            self.watch_end()
         if attempt is None:
             return
         if self._vehicle.flying_state == FlyingState.EMERGENCY_LANDING:
@@ -382,23 +382,23 @@ class ReturnEnd(PlainTask):
             vehicle.text(Severity.WARNING, texts.RETURN_HOVERS_REASON.fill(at=at, reason=reason))
         vehicle.changed()
 
-    def _watch_end(self) -> None:
+    def watch_end(self) -> None:
         """Notice a drone that hovers at home and reports no end of its return."""
         doubt = self._unreported_end
         if not self._vehicle.returning:
             doubt.settle()
         elif not doubt.is_asked:  # else this is its answer
-            doubt.cancel()
+            alarm = doubt.replace(self._ask)
             under_way = self._vehicle.drone.home.state.rth == RthState.IN_PROGRESS
             if under_way and self._vehicle.flying_state == FlyingState.HOVERING:
-                doubt.set_in(UNREPORTED, self._ask)
+                alarm.set_in(UNREPORTED)
 
     def _ask(self) -> None:
         metres = _metres(self._vehicle.place, self._vehicle.drone.home.state.location)
         if metres is None or metres > NEAR_HOME:
             return
         self._unreported_end.is_asked = True
-        self._unreported_end.set_in(ANSWER, self._unanswered)
+        self._unreported_end.replace(self._unanswered).set_in(ANSWER)
         with contextlib.suppress(LinkLost):
             self._vehicle.drone.home.request_states()
 

@@ -876,6 +876,7 @@ class Vehicle(Aircraft):
         self.height.recall(kept)
         if self.on_ground:  # maybe another aircraft, or carried elsewhere
             self.flight_facts, self.commanded_speeds = FlightFacts(), CommandedSpeeds()
+        self.return_end.watch_end()
         self.on_flying_state()
         self.on_location()  # the one that it has reported counts for as long as a new one
         if self.flying_state is not None and not self.on_ground:
@@ -927,6 +928,7 @@ class Vehicle(Aircraft):
         if before is not None and home.rth == RthState.AVAILABLE and home.reason == ReturnReason.STOPPED:
             self._note_stopped_return(before)
         if self.returning:
+            self.return_end.watch_end()
             if self.mission.returns and not (self.returning_by_itself or self.return_end.active):
                 self.return_end.announce(self.return_end.command(), None)  # the mission's last item
                 if self.control.active is self.mission:
