@@ -140,3 +140,29 @@ class Schedule(Generic[KeyT]):
         for key in keys:
             self._due[key] = call(key)
         self.next = min(self.all_at, min(self._due.values(), default=NEVER))
+
+
+ROUND_TRIP_LIMIT = 2.5
+"""s: a longer one is no measurement, for a link is lost before."""
+
+SHORTER_SHARE = 0.3
+"""Share of a shorter round trip that is believed at once.
+
+A longer one is believed altogether. A loop that counts with too long a delay is slow, one with too short a one swings.
+"""
+
+
+class RoundTrip:
+    """Time that a link takes to the peer and back, as measured so far."""
+
+    __slots__ = ("seconds",)
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+        """0 before the first measurement."""
+
+    def measure(self, elapsed: float) -> None:
+        """Take a measurement (s); one that makes no sense is ignored."""
+        if 0.0 <= elapsed <= ROUND_TRIP_LIMIT:
+            shorter = min(0.0, elapsed - self.seconds)
+            self.seconds = max(elapsed, self.seconds + SHORTER_SHARE * shorter)

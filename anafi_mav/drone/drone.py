@@ -31,7 +31,7 @@ from anafi_mav.arsdk.messages.follow_me import Mode as FollowMeMode
 from anafi_mav.arsdk.messages.proto import device_manager
 from anafi_mav.arsdk.mux import mux_link
 from anafi_mav.arsdk.video.rtsp import DEFAULT_PORT as RTSP_PORT
-from anafi_mav.clock import Clock, SystemClock
+from anafi_mav.clock import Clock, RoundTrip, SystemClock
 from anafi_mav.drone import startup_queries
 from anafi_mav.drone.automatic.animations import Animations
 from anafi_mav.drone.automatic.flight_plan import FlightPlan
@@ -235,6 +235,11 @@ class Drone:
         self._opening = False
         self._complete = False
         self._counters: Counter[str] = Counter()
+        self.round_trip = RoundTrip()
+        """Of the present or last connection, measured while sticks are sent.
+
+        Behind a Skycontroller it is the way to that alone.
+        """
         self._model = models.NO_MODEL
         self._reports_rth_state = False
         """rth.state has been received on this connection, so that its legacy twin says nothing more."""
@@ -455,7 +460,7 @@ class Drone:
         self._model = _model(device.model_id)
         self._announced_serial, self._announced_name = device.serial, device.name
         self._session = session
-        self._counters = session.counters
+        self._counters, self.round_trip = session.counters, session.round_trip
         self._commander.attach(session)
         if self.controller.present:
             session.on_stall = self.controller.stalled

@@ -138,13 +138,16 @@ class Lap:
         if self._bearing is not None:
             self.flown += circle.direction * units.wrap_pi(bearing - self._bearing)
         self._bearing = bearing
-        cos, sin = math.cos(bearing), math.sin(bearing)
         along = circle.direction * circle.speed
         inwards = circle.speed**2 / circle.radius
+        out = circle.radius - math.hypot(away_north, away_east)
+        velocity = (-math.sin(bearing) * along, math.cos(bearing) * along)
+        bearing += along / circle.radius * motion.round_trip.seconds  # where the drone is when the sticks arrive
+        cos, sin = math.cos(bearing), math.sin(bearing)
         turning = circle.facing in (Facing.CENTRE, Facing.TANGENT)
         return Demand(
-            x=Axis(velocity=-sin * along, acceleration=-cos * inwards, position=north + cos * circle.radius),
-            y=Axis(velocity=cos * along, acceleration=-sin * inwards, position=east + sin * circle.radius),
+            x=Axis(velocity=velocity[0], acceleration=-cos * inwards, position=motion.north + cos * out),
+            y=Axis(velocity=velocity[1], acceleration=-sin * inwards, position=motion.east + sin * out),
             height=circle.height,
             yaw=heading_at(circle, bearing),
             yaw_rate=along / circle.radius if turning else None,

@@ -874,6 +874,7 @@ class Vehicle(Aircraft):
         `kept` is of the last flight that was seen.
         """
         self.height.recall(kept)
+        self.offboard.link_up()
         if self.on_ground:  # maybe another aircraft, or carried elsewhere
             self.flight_facts, self.commanded_speeds = FlightFacts(), CommandedSpeeds()
         self.return_end.watch_end()

@@ -13,11 +13,12 @@ from support.flavours import both
 from support.mav import NAN
 from support.plans import ACCEPTED as TAKEN
 from support.plans import FENCE, circle, upload
-from support.setpoints import motion, said
+from support.setpoints import allow_speed, motion, said
 from support.world import HOLD, HOME, World, world
 
 from anafi_mav import geo, units
 from anafi_mav.arsdk.messages import piloting_style
+from anafi_mav.sim.world.faults import Impairment
 
 ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
@@ -78,6 +79,22 @@ async def test_conf_078_orbit(flavour: str, frame: int, z: float, radius: float)
         await w.drone.wait_log(
             lambda e: e.kind == "pose" and math.hypot(e.args["vn"], e.args["ve"]) < 0.3, 10.0, since=w.drone.log[-1].t
         )
+
+
+async def test_orbit_over_a_late_link_stays_on_its_circle() -> None:
+    """0.7 s from a stick to the report of its effect, and a tenth of all datagrams lost: the drone must not swing."""
+    async with world(speed=1.0) as w:
+        await w.take_off(10.0)
+        allow_speed(w)
+        late = Impairment(loss=0.1, delay=0.35)
+        w.drone.faults.up, w.drone.faults.down = late, late
+        z = HOME[2] + 10.0
+        command = w.client.command(ORBIT, 10.0, 3.0, 5, NAN, frame=GLOBAL, x=CENTRE[0], y=CENTRE[1], z=z, timeout=30.0)
+        assert (await command).result == ACCEPTED
+        poses = (await lap(w, 10.0, 45.0))[-600:]
+        assert all(abs(around(pose)[0] - 10.0) < 2.0 for pose in poses), [round(around(p)[0], 1) for p in poses]
+        assert all(abs(pose["up"] - 10.0) < 1.0 for pose in poses)
+        assert max(math.hypot(pose["vn"], pose["ve"]) for pose in poses) < 4.5
 
 
 @both

@@ -31,6 +31,7 @@ from anafi_mav.arsdk.link.transport import (
     Transport,
     Undelivered,
 )
+from anafi_mav.clock import RoundTrip
 from anafi_mav.receive_buffer import limit_reads, read_after_clients, read_waiting
 
 log = logging.getLogger("anafi_mav.arsdk")
@@ -137,6 +138,11 @@ class Session(asyncio.DatagramProtocol):
     def last_received(self) -> float:
         """Loop time at which the peer was heard last; the beginning of the session if never."""
         return self._transport.last_received
+
+    @property
+    def round_trip(self) -> RoundTrip:
+        """Measured while sticks are sent."""
+        return self._transport.round_trip
 
     @property
     def silent(self) -> bool:

@@ -46,6 +46,7 @@ from anafi_mav.arsdk.link.frame import (
     with_length,
 )
 from anafi_mav.arsdk.link.known_frames import KnownFrames
+from anafi_mav.clock import RoundTrip
 from anafi_mav.errors import LocalProtocolError
 
 PING, PONG = 0, 1
@@ -59,6 +60,12 @@ ACK_TIMEOUT = 0.15
 
 MAX_RETRIES_V1 = 5
 """Repetitions after which a version 1 controller gives a command up (same file, default_max_retry_count)."""
+
+MEASURE_EVERY = 1.0
+"""s between two pings of a controller whose unacknowledged commands, the sticks, are on their way.
+
+The loops that fly by them have to know the delay of the link. libARNetwork pings all the time for that.
+"""
 
 MAX_UNANSWERED_PINGS = 3
 """arsdk-ng arsdk_transport.c, send_ping."""
@@ -215,6 +222,8 @@ class Transport:
         self.version = version
         self.counters: Counter[str] = Counter()
         """Events by kind: "received", "sent", "retransmitted", "duplicate", "garbage.<reason>", …"""
+        self.round_trip = RoundTrip()
+        """Measured by the pongs to our pings."""
         self._gives_up = gives_up and version == 1 and role is Role.CONTROLLER
         self._ping_after = ping_after
         self._silence_limit = _NEVER if silence_limit is None else silence_limit
@@ -238,6 +247,7 @@ class Transport:
         self._ping_due = now + ping_after
         self._ping_seq = -1
         self._unanswered = 0
+        self._measure_due = now + MEASURE_EVERY
         self._fades = fades
         self._silent = False
         self._down = False
@@ -281,7 +291,10 @@ class Transport:
                 self._acknowledged(self._queues[id - ACK_OFFSET], payload, events)
             elif id == PING and type != _ACK:
                 self._reply(encode_frame(self.version, type, PONG, seq, payload))
-            elif id != PONG or type == _ACK:
+            elif id == PONG and type != _ACK:
+                if len(payload) == _U64.size:  # the time of our ping
+                    self.round_trip.measure(now - _U64.unpack(payload)[0] / 1e6)
+            else:
                 self._garbage("queue", events)
         if garbage is not None:
             self._garbage(garbage, events)
@@ -501,6 +514,9 @@ class Transport:
         """The datagrams to send now; they are forgotten here, repetitions come by themselves."""
         if self._down:
             return []
+        if self._noack and now >= self._measure_due and self.role is Role.CONTROLLER:
+            self._measure_due = now + MEASURE_EVERY
+            self._ping(now)
         datagrams = self._replies
         self._replies = []
         while self._noack:
@@ -613,6 +629,9 @@ class Transport:
     def _send_ping(self, now: float) -> None:
         self._unanswered += 1
         self._ping_due = now + self._ping_after
+        self._ping(now)
+
+    def _ping(self, now: float) -> None:
         self._ping_seq = (self._ping_seq + 1) & self._seq_mask
         payload = _U64.pack(int(now * 1e6) & 0xFFFF_FFFF_FFFF_FFFF)
         self.counters["ping"] += 1

@@ -11,6 +11,8 @@ horizontal velocity is closed here, on the drone's own speed, which it reports f
 - a velocity needs a push in proportion to the error, against the air's, and on top of it the acceleration that the
   setpoint names. The error is the one that will be left when the tilt has followed: it lags by `TILT_LAG`;
 - a position needs a velocity; the position of the drone is its GPS location carried on by its speed;
+- the link delays reports and commands. A gain that the round trip does not permit is lowered (`MotionEstimate.gain`),
+  and the heading is carried on to the time when the sticks arrive;
 - until the sign of the reported roll is verified (`roll_sign`) nothing is derived from the tilt: the loop knows the
   last speed alone, counts with calm air, and leans by `CAUTIOUS_TILT` at most.
 
@@ -26,6 +28,7 @@ import math
 from dataclasses import dataclass
 
 from anafi_mav import geo, units
+from anafi_mav.clock import RoundTrip
 from anafi_mav.drone import Limits, PilotingCommand
 from anafi_mav.vehicle.base.roll_sign import RollCheck, RollSign
 
@@ -73,6 +76,10 @@ HEIGHT_GAIN = 1.0
 
 YAW_GAIN = 1.5
 """1/s: turn rate per heading error. Attitude comes at 5 Hz and answers after 0.1-0.2 s, which stays well damped."""
+
+LOOP_DELAY_SHARE = 0.5
+"""Largest product of a gain and the round trip of the link. A loop sees the effect of its sticks one round trip later,
+and swings if it has corrected too much until then: with pi/2 for ever, with a third of that hardly."""
 
 STALE = 1.0
 """s after which what the drone reported five times a second is not known any more. A loop that closes on an older
@@ -145,6 +152,8 @@ class MotionEstimate:
 
     def __init__(self, roll: RollCheck | None = None) -> None:
         self._roll = roll or RollCheck(RollSign.NORMAL)
+        self.round_trip = RoundTrip()
+        """Of the link: so long after a command its effect is reported."""
         self.yaw: float | None = None
         """rad, clockwise from north, as last reported; None: unknown."""
         self.height: float | None = None
@@ -266,8 +275,13 @@ class MotionEstimate:
         return self.height is not None and now - self._height_at < STALE
 
     def heading(self, now: float) -> float:
-        """rad, carried on by the turn since the last report. Only after `knows_heading`."""
-        return (self.yaw or 0.0) + self.turning * min(now - self._attitude_at, STALE)
+        """rad when a command of now arrives, carried on by the turn since the report. Only after `knows_heading`."""
+        return (self.yaw or 0.0) + self.turning * min(now - self._attitude_at + self.round_trip.seconds, STALE)
+
+    def gain(self, gain: float) -> float:
+        """Return a gain (1/s) that the delay of the link permits: the given one, or less."""
+        delay = self.round_trip.seconds
+        return gain if gain * delay <= LOOP_DELAY_SHARE else LOOP_DELAY_SHARE / delay
 
     def velocity(self, at: float) -> tuple[float, float]:
         """Return m/s north and east, extrapolated to a moment by tilt and air.
@@ -338,7 +352,7 @@ class VelocityController:
             wish[i] = (axis.velocity or 0.0) + towards[i] if closed[i] else velocity[i]
             push[i] = axis.acceleration or 0.0
         air = _turned(*motion.air_at(*_turned(wish[0], wish[1], frame)), -frame)
-        gain = VELOCITY_GAIN if motion.trusts_tilt else CAUTIOUS_GAIN
+        gain = motion.gain(VELOCITY_GAIN if motion.trusts_tilt else CAUTIOUS_GAIN)
         for i in range(2):
             if closed[i]:
                 push[i] += gain * (wish[i] - velocity[i]) - air[i]
@@ -371,7 +385,8 @@ class VelocityController:
         north, east = north / distance, east / distance
         ahead = _turned(demand.x.velocity or 0.0, demand.y.velocity or 0.0, frame)
         most = PLACE_SPEED + max(0.0, -(ahead[0] * north + ahead[1] * east))
-        speed = min(PLACE_GAIN * distance, math.sqrt(2.0 * PLACE_BRAKING * distance), most)
+        gain = PLACE_GAIN / VELOCITY_GAIN * self.motion.gain(VELOCITY_GAIN)  # the loop around that over velocity
+        speed = min(gain * distance, math.sqrt(2.0 * PLACE_BRAKING * distance), most)
         return north * speed, east * speed
 
     def _note_saturation(self, saturated: bool, short: float, now: float) -> None:
@@ -394,13 +409,13 @@ class VelocityController:
         # A faster one cannot be flown, and would only shift the height that is held.
         climb = -units.clip(demand.down_velocity or 0.0, -limits.climb_mps, limits.climb_mps)
         if demand.height is not None and self.motion.height is not None:
-            climb += HEIGHT_GAIN * (demand.height - self.motion.height)
+            climb += self.motion.gain(HEIGHT_GAIN) * (demand.height - self.motion.height)
         return units.clip(climb, -limits.climb_mps, limits.climb_mps)
 
     def _turn(self, demand: Demand, now: float) -> float:
         rate = demand.yaw_rate or 0.0
         if demand.yaw is not None and self.motion.knows_heading(now):
-            return turn_towards(demand.yaw, self.motion.heading(now), rate)
+            return turn_towards(demand.yaw, self.motion.heading(now), rate, self.motion.gain(YAW_GAIN))
         return rate
 
 
@@ -410,9 +425,9 @@ def tilt_limit(limits: Limits, motion: MotionEstimate) -> float:
     return tilt if motion.trusts_tilt else min(tilt, CAUTIOUS_TILT)
 
 
-def turn_towards(yaw: float, heading: float, feed_forward: float = 0.0) -> float:
+def turn_towards(yaw: float, heading: float, feed_forward: float = 0.0, gain: float = YAW_GAIN) -> float:
     """Turn rate (rad/s, clockwise +) that brings a drone's heading (rad) to `yaw` the short way."""
-    return feed_forward + YAW_GAIN * units.wrap_pi(yaw - heading)
+    return feed_forward + gain * units.wrap_pi(yaw - heading)
 
 
 def _turned(x: float, y: float, angle: float) -> tuple[float, float]:

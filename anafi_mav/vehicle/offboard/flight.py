@@ -457,6 +457,10 @@ class OffboardFlight(PlainTask):
         if self._vehicle.control.below == _GUIDED:
             self._vehicle.control.adopt(_GUIDED)
 
+    def link_up(self) -> None:
+        """The link's delay is measured from now on."""
+        self._motion.round_trip = self._vehicle.drone.round_trip
+
     def link_down(self) -> None:
         """Setpoints of before count for nothing."""
         self._moves.forget()

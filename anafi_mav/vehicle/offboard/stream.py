@@ -30,7 +30,7 @@ from anafi_mav.drone import Limits, PilotingCommand
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.refusal import Refused
-from anafi_mav.vehicle.base.velocity_loop import STILL, VelocityController, turn_towards
+from anafi_mav.vehicle.base.velocity_loop import STILL, YAW_GAIN, VelocityController
 from anafi_mav.vehicle.offboard.goals import Goal, demand, resolve
 from anafi_mav.vehicle.offboard.setpoints import NOTHING, AttitudeSetpoint, MotionSetpoint, Setpoint
 from anafi_mav.vehicle.offboard.silence import SILENCE
@@ -81,7 +81,7 @@ class Steering(Struct, frozen=True):
         """Return the flight by an attitude."""
         motion, turn = self.controller.motion, setpoint.yaw_rate
         if motion.yaw is not None and motion.knows_heading(now):
-            turn = turn_towards(setpoint.yaw, motion.yaw, turn)
+            turn += motion.gain(YAW_GAIN) * units.wrap_pi(setpoint.yaw - motion.yaw)
         sticks = PilotingCommand(
             roll_deg=setpoint.roll * units.DEG_PER_RAD,
             pitch_deg=setpoint.pitch * units.DEG_PER_RAD,

@@ -399,6 +399,34 @@ def test_three_unanswered_pings_in_silence_end_the_link() -> None:
     assert transport.deadline() is None
 
 
+@pytest.mark.parametrize("version", VERSIONS)
+def test_controller_that_sends_sticks_measures_the_round_trip(version: int) -> None:
+    """One ping a second beside them; a pong that is not one of ours measures nothing, and nothing ends the session."""
+    transport = Transport(Role.CONTROLLER, version, 0.0, ping_after=0.5)
+    pings: list[tuple[float, Frame]] = []
+    for step in range(1, 61):
+        now = step * 0.05
+        transport.receive(data_frame(version, 127, step, HOVERING, FrameType.NOACK), now)
+        transport.send(STICKS, now)
+        pings += [(now, frame) for frame in frames(transport, transport.outgoing(now)) if frame.id == 0]
+    assert [at for at, _ in pings] == [pytest.approx(at) for at in (1.0, 2.0, 3.0)]
+    assert transport.round_trip.seconds == 0.0
+
+    def pong(payload: bytes, now: float) -> None:
+        assert transport.receive(encode_frame(version, FrameType.NOACK, 1, 7, payload), now) == []
+
+    for payload in (b"", b"\1\2\3", bytes(8), b"\xff" * 8, b"\xff" * 9):
+        pong(payload, 3.1)
+        assert transport.round_trip.seconds == 0.0
+    pong(pings[2][1].payload, 3.4)
+    assert transport.round_trip.seconds == pytest.approx(0.4, abs=0.001)
+    pong(pings[2][1].payload, 3.1)  # a shorter one is believed in steps
+    assert transport.round_trip.seconds == pytest.approx(0.31, abs=0.001)
+    pong(pings[0][1].payload, 3.4)  # late: a longer one at once
+    assert transport.round_trip.seconds == pytest.approx(2.4, abs=0.001)
+    assert transport.expire(4.0) == []
+
+
 def test_any_frame_restarts_the_silence_timer() -> None:
     transport = Transport(Role.CONTROLLER, 3, 0.0, ping_after=0.5, silence_limit=2.5)
     for step in range(40):

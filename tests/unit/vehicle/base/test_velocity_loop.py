@@ -7,6 +7,7 @@ of 45 degrees.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 from support.sim_bench import Bench
@@ -265,7 +266,53 @@ def test_the_heading_goes_on_as_it_turns() -> None:
     assert motion.heading(0.3) == pytest.approx(math.radians(-160.0))
 
 
+@pytest.mark.parametrize(("seconds", "share"), [(0.0, 1.0), (0.2, 1.0), (1.0, 0.5), (2.0, 0.25)])
+def test_a_gain_is_lowered_by_the_round_trip(seconds: float, share: float) -> None:
+    motion = still(height=10.0)
+    motion.round_trip.measure(seconds)
+    assert sticks(Demand(height=11.0), motion).climb_mps == pytest.approx(share)
+
+
 # Flown, with reports as late as a radio makes them.
+
+
+@pytest.mark.parametrize("delay", [0.35, 0.7])
+@pytest.mark.parametrize("model", sorted(MODELS))
+def test_a_place_is_held_over_a_late_link(model: str, delay: float) -> None:
+    """10 m to the north and 3 m up, with sticks and reports that arrive so many s late."""
+    bench = Bench(model)
+    for setting in (ardrone3.MaxTilt(35.0), ardrone3.MaxRotationSpeed(90.0), ardrone3.MaxVerticalSpeed(3.0)):
+        bench.send(setting)
+    bench.take_off()
+    bench.climb(10.0)
+    motion = MotionEstimate()
+    motion.round_trip.measure(2.0 * delay)
+    controller = VelocityController(motion)
+    reports: list[tuple[float, Any]] = []
+    sent: list[tuple[float, PilotingCommand]] = []
+    begin = bench.pose
+    motion.on_place(48.8789, 2.3677)
+    demand = Demand(Axis(0.0, position=10.0), Axis(0.0, position=0.0), height=13.0, yaw=0.0)
+    command = None
+    for tick in range(6000):
+        bench.turn()
+        now = bench.now
+        if tick % 20 == 0:
+            reports.append((now + delay, bench.pose))
+        if reports and reports[0][0] <= now:
+            _, pose = reports.pop(0)
+            motion.on_attitude(pose.roll, pose.pitch, pose.yaw, now)
+            motion.on_velocity(pose.vn, pose.ve, pose.vd, now)
+            motion.on_height(pose.up, now)
+            if (sticks := controller.sticks(demand, LIMITS, now)) is not None:
+                sent.append((now + delay, sticks))
+        if sent and sent[0][0] <= now:
+            _, command = sent.pop(0)
+        if command is not None and tick % 5 == 0:
+            bench.send(ardrone3.PCMD(1, *percent(command, LIMITS), 0))
+        if tick > 3000:
+            assert bench.pose.north - begin.north == pytest.approx(10.0, abs=1.0)
+            assert bench.pose.up == pytest.approx(13.0, abs=0.5)
 
 
 @pytest.mark.parametrize("late", [0.0, 0.1, 0.2])
