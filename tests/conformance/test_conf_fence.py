@@ -154,6 +154,23 @@ async def test_conf_076_stopped_before_the_fence(flavour: str) -> None:
         assert len([text for text in texts(w.client, mark) if text.startswith("Fence")]) == 1
 
 
+@pytest.mark.parametrize("delay", [0.35, 0.7])
+async def test_drone_over_a_late_link_is_stopped_before_the_fence(delay: float) -> None:
+    """The sight of the drone is late, and so is the stop: both belong to the way that it still flies."""
+    async with world(also="px4", speed=1.0) as w:
+        assert (await upload(w.client, square(PLACE, 80.0), FENCE)).type == TAKEN
+        await bits(w.client, True, True, True)
+        await w.take_off()
+        allow_speed(w)
+        w.drone.faults.up = w.drone.faults.down = Impairment(delay=delay)
+        mark = w.client.mark()
+        async with flown(w, pitch=2.0 * FORWARD):
+            await said(w.client, "too fast for", since=mark, timeout=25.0)
+            await w.client.heartbeat(lambda beat: beat.custom_mode == MODES["px4"].hold, since=mark, timeout=10.0)
+            await at_rest(w)
+            assert 50.0 < farthest(w) < 80.0
+
+
 @both
 async def test_conf_076_position_with_a_velocity_is_stopped_before_the_fence(flavour: str) -> None:
     """A feed-forward of 9 m/s leads away from a position inside: the drone holds before the square, not behind it."""

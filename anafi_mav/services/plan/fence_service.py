@@ -163,6 +163,7 @@ class FenceService(Service):
             and (state.plan != PlayingState.PLAYING or vehicle.mission.flying or vehicle.mission.ended_unreported),
             orders=vehicle.control.epoch,
             takes_off=flying_state in TAKING_OFF,
+            round_trip=vehicle.drone.round_trip.seconds,
         )
 
     def _has_judged_way(self) -> bool:

@@ -29,7 +29,8 @@ from anafi_mav.vehicle.fence.plan_items import PlanItem, PlanItems
 REACTION = 0.6
 """s from a motion to the drone's response to our action.
 
-Telemetry is received five times a second, a stick takes 0.1 s to be obeyed, and radio takes the rest.
+Telemetry is received five times a second, a stick takes 0.1 s to be obeyed, and radio takes the rest. The round trip
+of the link, where it is measured, comes on top.
 """
 
 BRAKING = 2.5
@@ -185,6 +186,8 @@ class Sight(msgspec.Struct, frozen=True):
     An action of ours that is still the newest need not be repeated.
     """
     takes_off: bool = False
+    round_trip: float = 0.0
+    """s that the link delays the sight of the drone, and then an action."""
 
 
 @dataclass(frozen=True)
@@ -491,7 +494,7 @@ class FenceWatch:
             return Event.BREACH, FenceFinding(Breach.BOUNDARY, _beyond(margin))
         speed = math.hypot(north, east)
         if self.predict and sight.steering and sight.flying and speed > 0.0:
-            stopping = REACTION + speed / (2.0 * BRAKING)
+            stopping = REACTION + sight.round_trip + speed / (2.0 * BRAKING)
             way = zones.leaves(here, geo.destination(*here, north * stopping, east * stopping), sight.home)
             if way is not None:
                 return Event.AHEAD, FenceFinding(Breach.BOUNDARY, texts.FENCE_TOO_FAST.fill(zone=way.zone), ahead=True)
