@@ -104,7 +104,10 @@ class ReturnAttempt:
 
 @dataclass
 class _UnreportedEnd:
-    """Doubt about the return that the drone reports, whatever commanded it: it hovers at home and reports no end."""
+    """Doubt about the return that the drone reports, whatever commanded it.
+
+    It hovers at home, and has reported no end.
+    """
 
     alarm: Alarm | None = None
     """Runs while it hovers, and then while its answer is due; None without a return."""

@@ -275,7 +275,10 @@ class MotionEstimate:
         return self.height is not None and now - self._height_at < STALE
 
     def heading(self, now: float) -> float:
-        """rad when a command of now arrives, carried on by the turn since the report. Only after `knows_heading`."""
+        """Return the heading (rad) when a command of now arrives. Only after `knows_heading`.
+
+        It is carried on by the turn since the last report.
+        """
         return (self.yaw or 0.0) + self.turning * min(now - self._attitude_at + self.round_trip.seconds, STALE)
 
     def gain(self, gain: float) -> float:
