@@ -17,7 +17,7 @@ from support.world import World, loopback, world
 
 from anafi_mav.arsdk.messages import alarms, ardrone3, camera, common, rth, wifi
 from anafi_mav.arsdk.messages.generic import ListFlags
-from anafi_mav.arsdk.video.video_metadata import PROTO_PROFILE, StarfishLink, WifiLink
+from anafi_mav.arsdk.video.video_metadata import PROTO_PROFILE, Quaternion, StarfishLink, WifiLink
 from anafi_mav.mavlink import dialect
 from anafi_mav.sim import SimulatedDrone
 from anafi_mav.sim.skycontroller import (
@@ -171,6 +171,24 @@ async def test_link_of_pictures_fits_its_fields(
         await w.client.wait("ANAFI_CAMERA_EXPOSURE", lambda m: m.source == frame, timeout=12.0)
         observed = await ask(w.client, dialect.MAVLINK_MSG_ID_ANAFI_LINK)
         assert (observed.goodput, observed.rssi, observed.quality) == (goodput, rssi, quality)
+    assert [record for record in caplog.records if record.levelno >= logging.ERROR] == []
+
+
+@pytest.mark.parametrize("length", [0.5, 3.0, 1e29])
+async def test_rotations_of_pictures_have_the_length_one(length: float, caplog: pytest.LogCaptureFixture) -> None:
+    metadata = msgspec.structs.replace(
+        METADATA, quat=Quaternion(length, 0.0, -length, 0.0), drone_quat=Quaternion(length, 0.0, 0.0, length)
+    )
+    server = VideoServer(PROTO_PROFILE, metadata, address=loopback())
+    half = math.sqrt(0.5)
+    async with server, world(drone_address=server.address, rtsp_port=server.port, speed=1.0) as w:
+        await stream(w.client, dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS, 1 / 30)
+        await stream(w.client, dialect.MAVLINK_MSG_ID_ANAFI_PICTURE, 1 / 30)
+        picture = await w.client.wait("ANAFI_PICTURE", timeout=12.0)
+        assert picture.q == pytest.approx([half, 0.0, -half, 0.0])
+        assert picture.drone_q == pytest.approx([half, 0.0, 0.0, half])
+        mark = w.client.mark()
+        await w.client.wait("GIMBAL_DEVICE_ATTITUDE_STATUS", lambda m: abs(m.q[2] + 0.5) < 1e-6, since=mark)
     assert [record for record in caplog.records if record.levelno >= logging.ERROR] == []
 
 

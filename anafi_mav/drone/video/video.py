@@ -27,7 +27,7 @@ from anafi_mav.drone.piloting.state import Attitude
 from anafi_mav.drone.video.route import VideoRoute
 from anafi_mav.drone.video.stream import Shown, VideoStream
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost
-from anafi_mav.units import euler_from_quaternion
+from anafi_mav.units import euler_from_quaternion, unit_quaternion
 
 log = logging.getLogger("anafi_mav")
 
@@ -50,6 +50,10 @@ HEALTHY = 5.0
 _CLOCK_WRAP = 1 << 32
 
 
+Rotation: TypeAlias = tuple[float, float, float, float]
+"""Quaternion (w, x, y, z)."""
+
+
 class VideoFrame(msgspec.Struct, frozen=True):
     """Metadata of one picture."""
 
@@ -69,14 +73,24 @@ class VideoFrame(msgspec.Struct, frozen=True):
     fastest picture counts as one without delay."""
 
     @property
+    def rotation(self) -> Rotation | None:
+        """Rotation of the drone's axes to north, east, down; None: unknown."""
+        return rotation(self.metadata.drone_quat)
+
+    @property
+    def camera_rotation(self) -> Rotation | None:
+        """Rotation of the picture's axes to north, east, down; None: unknown."""
+        return rotation(self.metadata.quat)
+
+    @property
     def attitude(self) -> Attitude | None:
         """Attitude of the drone, as in `PilotingState`; None: unknown."""
-        return attitude(self.metadata.drone_quat)
+        return attitude(self.rotation)
 
     @property
     def camera_attitude(self) -> Attitude | None:
         """Attitude of the picture; None: unknown."""
-        return attitude(self.metadata.quat)
+        return attitude(self.camera_rotation)
 
 
 class VideoState(msgspec.Struct, frozen=True):
@@ -98,14 +112,19 @@ FrameCallback: TypeAlias = Callable[[VideoFrame], None]
 PictureCallback: TypeAlias = Callable[[Picture], None]
 
 
-def attitude(quat: tuple[float, float, float, float] | None) -> Attitude | None:
-    """The angles of a quaternion of the metadata; None when it is no rotation."""
+def rotation(quat: Rotation | None) -> Rotation | None:
+    """The quaternion of the metadata with length 1; None when it is no rotation."""
     if quat is None:
         return None
     try:
-        return Attitude(*euler_from_quaternion(*quat))
+        return unit_quaternion(*quat)
     except ValueError:
         return None
+
+
+def attitude(quat: Rotation | None) -> Attitude | None:
+    """The angles of a rotation; None when it is unknown."""
+    return None if quat is None else Attitude(*euler_from_quaternion(*quat))
 
 
 class Video(Element[VideoState]):

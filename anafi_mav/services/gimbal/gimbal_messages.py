@@ -165,7 +165,7 @@ def attitude_status(gimbal: GimbalState, times: Times, *, neutral: bool) -> dial
     if pose.frame is None:
         q = reported_rotation(gimbal, earth=earth)
     else:
-        q = pictured_rotation(pose.frame.metadata.quat, None if body is None else body.yaw, earth=earth)
+        q = pictured_rotation(pose.frame.camera_rotation, None if body is None else body.yaw, earth=earth)
     if q is None:
         return None
     return dialect.MAVLink_gimbal_device_attitude_status_message(
