@@ -7,7 +7,6 @@ pictures stop arriving is ended here.
 from __future__ import annotations
 
 import asyncio
-import math
 import random
 from collections import Counter
 from collections.abc import Callable
@@ -21,7 +20,7 @@ from anafi_mav.arsdk.video.rtp_h264 import CLOCK_RATE, Picture, PictureReceiver
 from anafi_mav.arsdk.video.rtp_reception import Reception
 from anafi_mav.arsdk.video.rtsp import Response, RtspTransport
 from anafi_mav.arsdk.video.sdp import MediaDescription, SessionDescription
-from anafi_mav.drone.element import field_of_view
+from anafi_mav.drone.element import field_of_view, finite
 from anafi_mav.drone.video.picture_clock import PictureClock
 from anafi_mav.drone.video.route import DatagramPair, VideoRoute
 from anafi_mav.drone.video.rtsp_client import RtspClient
@@ -270,9 +269,9 @@ def _shown(description: SessionDescription, media: MediaDescription) -> Shown:
 
 
 def _numbers(text: str | None) -> tuple[float, ...]:
-    """Return the numbers between commas; empty when one of them is not a finite number."""
+    """Return the numbers between commas; empty when one of them is no measure."""
     try:
         numbers = tuple(float(piece) for piece in (text or "").split(","))
     except ValueError:
         return ()
-    return numbers if all(map(math.isfinite, numbers)) else ()
+    return () if None in map(finite, numbers) else numbers

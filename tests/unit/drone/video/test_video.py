@@ -129,6 +129,16 @@ async def test_impossible_field_of_view_is_unknown(fov: str) -> None:
         assert drone.video.state.shown.fov_deg is None
 
 
+@pytest.mark.parametrize("point", ["1e300,0.5", "0.5,-1e300", "0.5,inf", "0.5"])
+async def test_impossible_principal_point_is_unknown(point: str) -> None:
+    server = VideoServer()
+    described = SDP.replace("principal-point:0.5,0.48", f"principal-point:{point}")
+    server.answers["DESCRIBE"] = lambda asked: ok(asked, "Content-Type: application/sdp\r\n", described)
+    async with watched(server) as (drone, _), drone.video.watching("DefaultVideo"):
+        assert drone.video.state.shown is not None
+        assert drone.video.state.shown.principal_point is None
+
+
 async def test_video_runs_while_it_is_watched() -> None:
     server = VideoServer()
     async with watched(server) as (drone, _):
