@@ -92,7 +92,10 @@ def quaternion_from_euler(roll: float, pitch: float, yaw: float) -> tuple[float,
 
 
 def unit_quaternion(w: float, x: float, y: float, z: float) -> tuple[float, float, float, float]:
-    """The same rotation (w, x, y, z) of length 1. Raises `ValueError` for a length of zero, NaN or infinity."""
+    """The same rotation, (w, x, y, z), with length 1.
+
+    Raises `ValueError` for a length of zero, NaN or infinity.
+    """
     norm = math.sqrt(w * w + x * x + y * y + z * z)
     if not norm > 0.0 or not math.isfinite(norm):
         raise ValueError(f"not a rotation: quaternion of length {norm}")
@@ -104,7 +107,10 @@ def euler_from_quaternion(w: float, x: float, y: float, z: float) -> tuple[float
 
     At pitch = +-90 degrees roll and yaw turn about the same axis; roll is then reported as 0.
     """
-    w, x, y, z = unit_quaternion(w, x, y, z)
+    norm = math.sqrt(w * w + x * x + y * y + z * z)  # as in `unit_quaternion`, without a call for each setpoint
+    if not norm > 0.0 or not math.isfinite(norm):
+        raise ValueError(f"not a rotation: quaternion of length {norm}")
+    w, x, y, z = w / norm, x / norm, y / norm, z / norm
     sin_pitch = clip(2.0 * (w * y - z * x), -1.0, 1.0)
     if abs(sin_pitch) > 1.0 - 1e-9:
         return 0.0, math.asin(sin_pitch), wrap_pi(math.copysign(2.0, -sin_pitch) * math.atan2(x, w))

@@ -72,3 +72,14 @@ def test_geodesy() -> None:
     assert geo.offset(0.0, 0.0, 0.0, 1.0) == pytest.approx((0.0, 111319.5), abs=0.1)
     assert geo.offset(48.8789, 2.3677, *geo.destination(48.8789, 2.3677, -30.0, 40.0)) == pytest.approx((-30.0, 40.0))
     assert geo.destination(48.8789, 2.3677, 0.0, 0.0) == (48.8789, 2.3677)
+
+
+def test_unit_quaternion_has_the_length_one() -> None:
+    assert units.unit_quaternion(3.0, 0.0, 0.0, -4.0) == pytest.approx((0.6, 0.0, 0.0, -0.8))
+    assert units.unit_quaternion(0.0, 3e38, 0.0, 0.0) == (0.0, 1.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("number", [0.0, math.nan, math.inf, 1e200])
+def test_unit_quaternion_of_no_rotation_raises(number: float) -> None:
+    with pytest.raises(ValueError, match="not a rotation"):
+        units.unit_quaternion(number, 0.0, 0.0, 0.0)
