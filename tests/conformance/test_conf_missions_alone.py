@@ -38,6 +38,7 @@ from support.product import Process, program
 from support.world import HOME, WEB_PORT, World, loopback, world
 
 from anafi_mav import mav_enums
+from anafi_mav.arsdk.messages import common
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, Simulator
@@ -98,6 +99,24 @@ async def test_conf_122_the_drone_returns_when_the_link_is_lost() -> None:
         await state(w, PAUSED, seq=2, since=mark)
         assert reached(w) == [0, 1]
         assert len(w.commands("common.Mavlink.Start")) == 1
+
+
+async def test_mission_whose_lines_were_all_reported_before_the_link_was_lost_completes() -> None:
+    """The drone reports its last wait when it begins, and never the end of its plan."""
+    async with world(web=True, speed=1.5) as w:
+        wait = Item(mav_enums.MAV_CMD_NAV_DELAY, 0.0, 0.0, p1=30.0, frame=2)
+        await put(w, [takeoff(6.0), way(8.0, 0.0, 6.0), wait])
+        assert (await write(w.client, "ANF_MIS_RTH", 0, INT32)).param_id == "ANF_MIS_RTH"
+        await start(w)
+        await w.drone.wait_log(lambda e: e.name == "item" and e.args["command"].endswith("delay"), 40.0)
+        w.drone.inject(common.MissionItemExecuted(len(w.drone.firmware.flight_plan.items) - 1))
+        await w.client.wait("MISSION_ITEM_REACHED", lambda m: m.seq == 2, since=0)
+        await lost_and_back(w)
+        mark = w.client.mark()
+        await state(w, ACTIVE, since=mark)
+        w.drone.faults.unreported = frozenset({common.MavlinkFilePlayingStateChanged.NAME})
+        await state(w, COMPLETE, since=mark, timeout=60.0)
+        assert not w.drone.firmware.flight_plan.playing
 
 
 @asynccontextmanager

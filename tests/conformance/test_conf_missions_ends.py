@@ -375,3 +375,89 @@ async def test_mission_with_quirk_completes_over_a_bad_link(quirk: Quirk) -> Non
         w.drone.faults.up = w.drone.faults.down = Impairment(loss=0.25, delay=0.2)
         await state(w, COMPLETE, since=0, timeout=60.0)
         assert reached(w) == [0, 1, 2]
+
+
+# Lines, states and the start of a file that are reported later than what they are about.
+
+PLAYING, FLYING_STATE = common.MavlinkFilePlayingStateChanged.NAME, ardrone3.FlyingStateChanged.NAME
+DESCENTS = {"land": LAND, "return": RTL}
+LATE = {
+    "lines": {EXECUTED: 0.9},
+    "lines and landing": {EXECUTED: 0.9, FLYING_STATE: 0.6},
+    "lines and stop": {EXECUTED: 0.9, PLAYING: 0.6},
+}
+"""s by which events are late."""
+
+
+def paused_texts(w: World) -> list[str]:
+    return [m.text for _, m in w.client.since(0, "STATUSTEXT") if "paused" in m.text]
+
+
+async def lands(w: World) -> None:
+    await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, since=0, timeout=60.0)
+
+
+@pytest.mark.parametrize("late", LATE.values(), ids=LATE)
+@pytest.mark.parametrize("quirks", [set(), {Quirk.LAST_ITEM_NOT_REPORTED}], ids=["", "last unreported"])
+@pytest.mark.parametrize("last", DESCENTS.values(), ids=DESCENTS)
+async def test_mission_whose_descent_precedes_its_lines_completes_without_a_pause(
+    last: Item, quirks: set[Quirk], late: dict[str, float]
+) -> None:
+    async with world(speed=1.0, web=True) as w:
+        await put(w, [takeoff(6.0), way(9.0, 0.0, 6.0), last])
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=0)
+        w.drone.faults.quirks = frozenset(quirks)
+        w.drone.faults.late = late
+        await state(w, COMPLETE, since=0, timeout=60.0)
+        assert reached(w) == [0, 1, 2]
+        await lands(w)
+        assert paused_texts(w) == []
+        assert w.commands(common.Pause.NAME) == []
+        assert w.commands(common.Stop.NAME) == []
+
+
+@pytest.mark.parametrize("late", [1.4, 2.5])
+async def test_mission_that_lands_before_its_start_is_reported_completes(late: float) -> None:
+    async with world(web=True) as w:
+        await w.take_off(6.0)
+        w.simulator.speed = 1.0
+        await put(w, [way(1.0, 0.0, 6.0), LAND])
+        w.drone.faults.late = {PLAYING: late}
+        assert (await w.client.command(mav_enums.MAV_CMD_MISSION_START)).result == mav_enums.MAV_RESULT_ACCEPTED
+        await state(w, COMPLETE, since=0)
+        assert reached(w)[-1] == 1  # a line that is reported before the start of its file may be another file's
+        await lands(w)
+        assert paused_texts(w) == []
+        assert w.commands(common.Pause.NAME) == []
+        assert w.commands(common.Stop.NAME) == []
+
+
+async def test_mission_whose_lines_follow_its_end_in_the_air_completes_without_a_pause() -> None:
+    async with world(speed=1.0, web=True) as w:
+        await put(w, [takeoff(6.0), way(0.5, 0.0, 6.0)])
+        w.drone.faults.late = {EXECUTED: 1.5}
+        await start(w)
+        await state(w, COMPLETE, since=0)
+        assert reached(w) == [0, 1]
+        assert paused_texts(w) == []
+
+
+async def test_last_wait_that_is_reported_as_it_begins_is_flown_to_its_end() -> None:
+    """The turn behind it begins when the drone has waited."""
+    async with world(speed=1.0, web=True) as w:
+        wait = Item(mav_enums.MAV_CMD_NAV_DELAY, 0.0, 0.0, p1=5.0, frame=2)
+        turn = Item(mav_enums.MAV_CMD_CONDITION_YAW, 0.0, 0.0, p1=90.0, frame=2)
+        await put(w, [takeoff(6.0), way(9.0, 0.0, 6.0), wait, turn])
+        waits = while_it_waits(w, lambda: report_wait(w))
+        await start(w)
+        begun = await waits
+        await state(w, COMPLETE, since=0, timeout=60.0)
+        stopped = next(e for e in w.drone.log if e.name == "plan" and e.args["state"] == "stopped" and e.t > begun.t)
+        assert stopped.t - begun.t >= 4.9
+        assert w.commands(common.Stop.NAME) == []
+
+
+def report_wait(w: World) -> None:
+    """The drone reports the wait as executed when it begins."""
+    w.drone.inject(common.MissionItemExecuted(len(w.drone.firmware.flight_plan.items) - 1))

@@ -141,11 +141,11 @@ def calls(machine: MissionMachine) -> dict[Event, Callable[[], list[Effect]]]:
         Event.EXECUTED: lambda: machine.executed(machine.progress.line + 1),
         Event.SKIPPED: lambda: machine.skipped(machine.progress.line + 1),
         Event.ITEM_FLOWN: lambda: machine.item_flown(attempt),
-        Event.REPORTED: lambda: machine.reported(TROUBLE),
+        Event.REPORTED: lambda: machine.reported(TROUBLE, NOW),
         Event.CONTROL_LOST: machine.control_lost,
         Event.TIMEOUT: lambda: machine.timeout(GONE),
         Event.LINK_DOWN: machine.link_down,
-        Event.LINK_UP: lambda: machine.link_up(None, machine.progress.uid, plays=True, in_air=True),
+        Event.LINK_UP: lambda: machine.link_up(None, machine.progress.uid, NOW, plays=True, in_air=True),
     }
 
 
@@ -190,23 +190,23 @@ class RandomFlight:
                 return machine.armed(chance.choice(["client", "other"]), storing=chance.random() < 0.2)
             case Event.PLAYING | Event.RESUMED | Event.OTHER_PLAYING:
                 begun = [work.attempt for work in self._works if isinstance(work, StartFile)]
-                return machine.playing(chance.choice(["a", "b", "other"]), chance.choice([None, *begun]))
+                return machine.playing(chance.choice(["a", "b", "other"]), chance.choice([None, *begun]), now)
             case Event.HALTED:
                 report = DroneReport(pilot=chance.random() < 0.1)
                 return machine.halted(stopped=chance.random() < 0.7, report=report, now=now)
             case Event.EXECUTED:
-                return machine.executed(chance.randrange(-1, 4))
+                return machine.executed(chance.randrange(-1, 4), now)
             case Event.SKIPPED:
                 return machine.skipped(chance.randrange(-1, 4))
             case Event.REPORTED:
-                return machine.reported(chance.choice(REPORTS), chance.choice([None, GpsLocationChanged]))
+                return machine.reported(chance.choice(REPORTS), now, chance.choice([None, GpsLocationChanged]))
             case Event.CONTROL_LOST:
                 return machine.control_lost()
             case Event.TIMEOUT:
                 return machine.timeout(chance.choice(REPORTS))
             case Event.LINK_UP:
                 uid, plays = chance.choice(["a", "b", "other", None]), chance.random() < 0.5
-                return machine.link_up(machine.progress.kept, uid, plays=plays, in_air=chance.random() < 0.5)
+                return machine.link_up(machine.progress.kept, uid, now, plays=plays, in_air=chance.random() < 0.5)
             case Event.PREPARED | Event.GRANTED | Event.CONFIRMED | Event.ITEM_FLOWN | Event.FAILED:
                 return self._result(event)
         return calls(machine)[event]()
@@ -232,7 +232,7 @@ class RandomFlight:
         return machine.item_flown(work.attempt)
 
 
-REPORTS = (GONE, TROUBLE, DroneReport(lands_or_returns=True), DroneReport(pilot=True))
+REPORTS = (GONE, TROUBLE, DroneReport(lands=True, lands_or_returns=True), DroneReport(pilot=True))
 STARTS = (START, TURNS_FIRST, LAST, Prepared(COURSE, "a", 1, resumes=True))
 _RARE = frozenset({Event.CLEARED, Event.UPLOADED, Event.LINK_DOWN, Event.LINK_UP, Event.FAILED, Event.OTHER_PLAYING})
 _OFTEN = frozenset({Event.PREPARED, Event.GRANTED, Event.CONFIRMED, Event.PLAYING, Event.HALTED, Event.EXECUTED})

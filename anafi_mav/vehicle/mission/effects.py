@@ -50,6 +50,8 @@ class DroneReport:
     """The Skycontroller's pilot has acquired control."""
     is_in_trouble: bool = False
     """It may have stopped for another reason than the end of its plan."""
+    lands: bool = False
+    """It lands now, and nothing forces it to."""
     lands_or_returns: bool = False
     """It lands, has landed or returns, and the plan may be the cause."""
     returns_by_plan: bool = False

@@ -282,7 +282,10 @@ class MissionFlight(PlainTask):
 
     @property
     def owns_descent(self) -> bool:
-        return self.ending or (self._vehicle.returning and self.returns)
+        vehicle = self._vehicle
+        if self.ending:
+            return True
+        return self.returns if vehicle.returning else self._lands and self.machine.may_land(vehicle.place)
 
     @property
     def returns(self) -> bool:
@@ -577,7 +580,7 @@ class MissionFlight(PlainTask):
         match message.state:
             case PlayingState.PLAYING if not plan.plays_withdrawn:
                 attempt = flown.cause if isinstance(flown, SentCommand) else None
-                self._handle(self.machine.playing(message.filepath, attempt))
+                self._handle(self.machine.playing(message.filepath, attempt, now))
             case PlayingState.PAUSED | PlayingState.STOPPED if flown is None:
                 stopped = message.state == PlayingState.STOPPED
                 self._handle(self.machine.halted(stopped=stopped, report=self._report(), now=self._now))
@@ -587,29 +590,44 @@ class MissionFlight(PlainTask):
             return
         for kind in values.layout.kinds:
             if kind in PROOF and self.machine.state is State.ENDING:
-                self._handle(self.machine.reported(self._report(), kind))
+                self._handle(self.machine.reported(self._report(), self._now, kind))
 
     def on_vehicle(self) -> None:
         """Landing, return or flying state have changed."""
-        machine = self.machine
-        state = machine.state
-        if state is State.ENDING or (state is State.FLYING_FILE and machine.progress.leg_done):
-            self._handle(machine.reported(self._report()))
+        machine, drone = self.machine, self._vehicle.drone
+        match machine.phase.state:
+            case State.ENDING:
+                may_end = True
+            case State.FLYING_FILE:
+                may_end = machine.progress.leg_done or drone.piloting.settled.flying is FlyingState.LANDING
+            case _:
+                may_end = False
+        if may_end:
+            self._handle(machine.reported(self._report(), self._now))
 
     def _on_alarm(self) -> None:
         self._handle(self.machine.timeout(self._report()))
 
+    @property
+    def _forced(self) -> bool:
+        """The drone lands, or is about to, and no plan is the cause."""
+        return self._vehicle.drone.alerts.state.forced_landing not in (None, ForcedLandingReason.NONE)
+
+    @property
+    def _lands(self) -> bool:
+        return self._vehicle.flying_state is FlyingState.LANDING and not self._forced
+
     def _report(self) -> DroneReport:
         vehicle, drone = self._vehicle, self._vehicle.drone
         alerts, returning = drone.alerts.state, drone.home.state.returning
-        pilot = drone.controller.pilot_acquired_control
-        forced = alerts.forced_landing not in (None, ForcedLandingReason.NONE)
+        pilot, forced = drone.controller.pilot_acquired_control, self._forced
         alert = alerts.alert not in (None, AlertState.NONE)
         plan_error = drone.flight_plan.state.error not in (None, PlayError.NONE)
         down = vehicle.flying_state in (FlyingState.LANDING, FlyingState.LANDED)
         return DroneReport(
             pilot=pilot,
             is_in_trouble=not vehicle.in_air or returning or pilot or alert or forced or plan_error,
+            lands=self._lands,
             lands_or_returns=not forced and (down or (vehicle.returning and not vehicle.returning_by_itself)),
             returns_by_plan=returning and drone.home.state.reason == events.ReturnReason.FLIGHTPLAN,
             place=vehicle.place,
@@ -638,4 +656,5 @@ class MissionFlight(PlainTask):
         """The drone is connected again, or to a new gateway: look if it flies our mission."""
         plan = self._vehicle.drone.flight_plan.state
         plays, in_air = plan.playing == PlayingState.PLAYING, self._vehicle.in_air
-        self._handle(self.machine.link_up(record, plan.uid, plays=plays, in_air=in_air))
+        self._handle(self.machine.link_up(record, plan.uid, self._now, plays=plays, in_air=in_air))
+        self.on_vehicle()  # it may have landed meanwhile

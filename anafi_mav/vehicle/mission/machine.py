@@ -26,6 +26,7 @@ from anafi_mav.drone.events import AltitudeChanged, GpsLocationChanged, Message
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import FlightPlanFile, GatewayStep
 from anafi_mav.texts import OperatorText
+from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.mission.course import Course
 from anafi_mav.vehicle.mission.effects import (
@@ -46,7 +47,7 @@ from anafi_mav.vehicle.mission.effects import (
     StartFile,
     Suspend,
 )
-from anafi_mav.vehicle.mission.path import WayPoint, way_points
+from anafi_mav.vehicle.mission.path import WayPoint, seconds_of_last_line, way_points
 from anafi_mav.vehicle.mission.progress import ENDINGS, Mission, MissionProgress
 from anafi_mav.vehicle.mission.record import MissionRecord
 from anafi_mav.vehicle.mission.texts import FIRST_LABEL
@@ -58,9 +59,10 @@ QGroundControl chooses the mode first and arms when it is shown.
 """
 
 END_WAIT = 2.0
-"""s within which a drone whose plan has ended has reported the last line, or begun its landing or return.
+"""s within which a drone whose plan has ended has reported its lines, or begun its landing or return.
 
-Or the other way round, within which one that has executed the last line has reported that its plan has ended.
+Or the other way round, within which one that has executed the last line has reported that its plan has ended. A last
+line that takes time may be reported when it begins: that time is added.
 """
 
 POSITION_WAIT = 10.0
@@ -86,7 +88,7 @@ class State(enum.Enum):
     STARTING = "the drone is commanded to fly a file, and has not confirmed it"
     FLYING_FILE = "the drone flies a file"
     FLYING_ITEM = "the gateway flies an item, or loads the next file"
-    ENDING = "the drone has stopped its file without a report of the last line"
+    ENDING = "the drone has stopped its file, lands or returns, without a report of the last line"
     PAUSED = "begun and then stopped"
     COMPLETE = "flown completely"
 
@@ -189,7 +191,7 @@ TRANSITIONS: dict[State, dict[Event, tuple[State, ...]]] = {
         E.HALTED: (*_NEXT, S.ENDING),
         E.EXECUTED: (S.FLYING_FILE,),
         E.SKIPPED: (S.FLYING_FILE,),
-        E.REPORTED: (S.FLYING_FILE, S.COMPLETE),
+        E.REPORTED: (S.FLYING_FILE, S.ENDING, S.COMPLETE),
         E.CONTROL_LOST: (S.PAUSED, S.COMPLETE),
         E.TIMEOUT: (S.FLYING_FILE, *_NEXT),
         E.LINK_DOWN: (S.PAUSED,),
@@ -266,8 +268,8 @@ class MissionPhase:
     """The start has interrupted the flight of the mission."""
     again: bool = False
     """The same mission was uploaded during the start: if it fails, nothing of that mission has been flown."""
-    target: WayPoint | None = None
-    """ENDING: the last way point; None when the plan's last line lands or returns."""
+    has_landed: bool = False
+    """ENDING: the drone has begun to land."""
     missing: frozenset[type[Message]] = frozenset()
     """ENDING: parts of the position that have not been received since the drone stopped."""
     waits_for_position: bool = False
@@ -403,12 +405,33 @@ class MissionMachine:
     @property
     def leads_home(self) -> bool:
         """The file that is flown, or about to be, has a return as its last line."""
+        return self._ends_in(mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)
+
+    def may_land(self, place: GeoPoint | None) -> bool:
+        """Return True if a landing that begins at this place may be that of the file's last line.
+
+        Lines may be reported after it, and the start of the file, too: until then only a landing where the file lands.
+        """
+        if not self._leads_down:
+            return False
+        prepared = self.phase.prepared
+        if self.state is not S.STARTING or prepared is None:
+            return True
+        leg = prepared.course.parts[0]
+        assert isinstance(leg, FlightPlanFile), "STARTING begins a file"
+        return all(_is_above(point, place) for point in way_points(leg, prepared.line))
+
+    @property
+    def _leads_down(self) -> bool:
+        """The file that is flown, or about to be, has a landing as its last line."""
+        return self._ends_in(mav_enums.MAV_CMD_NAV_LAND)
+
+    def _ends_in(self, command: int) -> bool:
+        """Return True if the file that is flown, or about to be, ends with this command."""
         leg: object = self.progress.leg if self.state in (S.FLYING_FILE, S.ENDING) else None
         if self.state is S.STARTING and self.phase.prepared is not None:
             leg = self.phase.prepared.course.parts[0]
-        if not isinstance(leg, FlightPlanFile):
-            return False
-        return self.mission.items[leg.origins[-1]].command == mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH
+        return isinstance(leg, FlightPlanFile) and self.mission.items[leg.origins[-1]].command == command
 
     @property
     def needs_gimbal(self) -> bool:
@@ -577,7 +600,7 @@ class MissionMachine:
     @_on(E.CONFIRMED)
     def _confirmed(self, attempt: MissionAttempt) -> _Steps:
         prepared = self.phase.prepared
-        self._be(S.FLYING_FILE)
+        self.phase = MissionPhase(S.FLYING_FILE, S.FLYING_FILE, until=self.phase.until)
         if attempt.course is None and prepared is not None:
             yield Announce(_head_item(prepared), prepared.resumes, prepared.course.stepped)
 
@@ -620,7 +643,7 @@ class MissionMachine:
 
     # Reports of the drone.
 
-    def playing(self, uid: str, attempt: MissionAttempt | None) -> list[Effect]:
+    def playing(self, uid: str, attempt: MissionAttempt | None, now: float = math.inf) -> list[Effect]:
         """The drone flies the plan of this name; it may report that twice.
 
         `attempt` has started it; None: another controller.
@@ -633,7 +656,7 @@ class MissionMachine:
         if uid == self.phase.plays:
             return []
         known = self._paused_file()
-        return self._other_playing(uid) if known is None or uid != known.uid else self._resumed(known)
+        return self._other_playing(uid) if known is None or uid != known.uid else self._resumed(known, now)
 
     @_on(E.PLAYING)
     def _playing(self, attempt: MissionAttempt) -> _Steps:
@@ -648,10 +671,11 @@ class MissionMachine:
         yield from ()
 
     @_on(E.RESUMED)
-    def _resumed(self, known: MissionProgress) -> _Steps:
+    def _resumed(self, known: MissionProgress, now: float) -> _Steps:
         """Show the mission as flown: a client that looks at it has to see that."""
         self.progress = replace(known, left=None, kept=self.progress.kept)
         self.phase = MissionPhase(S.FLYING_FILE, S.FLYING_FILE, plays=known.uid)
+        self._limit(now)
         yield Select()
         yield SendText(Severity.NOTICE, texts.MISSION_RESUMED_ELSEWHERE)
 
@@ -670,25 +694,17 @@ class MissionMachine:
 
     @_on(E.HALTED)
     def _halted(self, *, stopped: bool, report: DroneReport, now: float) -> _Steps:
-        progress = self.progress
         if self.phase.state is S.PAUSED:
             return  # by a client's command, which the drone has carried out now
-        if progress.leg_done:
+        descends = report.returns_by_plan or (self.ending and self.progress.at_last_line)
+        if self.progress.leg_done:
             yield from self._part_over()
-        elif stopped and self.ending and progress.at_last_line:
-            yield from self._await_end(None, report, now)
-        elif stopped and report.returns_by_plan and self.leads_home and (leg := progress.leg) is not None:
-            # Only the last line does that. The reports of the lines before it may have preceded that of the start.
-            yield from self._execute(len(leg.origins) - 1)
-            yield from self._part_over()
-        elif report.pilot:
+        elif report.pilot and not (stopped and descends):
             yield from self._stop(texts.MISSION_PILOT)
-        elif stopped and self.leads_home:
-            yield from self._await_end(None, report, now)  # reports of lines before the return may be late, too
-        elif stopped and (last := self._last_way_point()) is not None:
-            yield from self._await_end(last, report, now)
+        elif stopped:
+            yield from self._await_end(report, now)
         else:
-            yield from self._stopped_by_drone(stopped=stopped)
+            yield from self._stopped_by_drone(stopped=False)
 
     @_on(E.EXECUTED)
     def executed(self, line: int, now: float = math.inf) -> _Steps:
@@ -706,8 +722,14 @@ class MissionMachine:
             yield from self._complete()
         elif state is S.ENDING and self.progress.leg_done:
             yield from self._part_over()
-        elif state is S.FLYING_FILE and is_last and not self.ending:
-            self.phase = replace(self.phase, until=now + END_WAIT)
+        elif is_last and state is S.FLYING_FILE:
+            self._limit(now)
+
+    def _limit(self, now: float) -> None:
+        """Set the deadline for the end of a file whose lines are all executed."""
+        leg = self.progress.leg
+        if leg is not None and self.progress.leg_done and not self.ending:
+            self.phase = replace(self.phase, until=now + END_WAIT + seconds_of_last_line(leg))
 
     def _execute(self, line: int) -> _Steps:
         self.progress, done = self.progress.with_executed(self.mission.items, line)
@@ -722,15 +744,18 @@ class MissionMachine:
             yield SendText(Severity.WARNING, texts.MISSION_OUT_OF_REACH.fill(item=item + FIRST_LABEL))
 
     @_on(E.REPORTED)
-    def reported(self, report: DroneReport, kind: type[Message] | None = None) -> _Steps:
+    def reported(self, report: DroneReport, now: float, kind: type[Message] | None = None) -> _Steps:
         """The drone has reported a landing, a return, an alert, or (`kind`) a part of its position."""
         phase = self.phase
         if phase.state is S.FLYING_FILE:
-            # Its last line may be executed before the drone reports its plan as stopped.
-            if kind is None and self.progress.leg_done and self.ending and report.lands_or_returns:
-                yield from self._part_over()
+            if self.progress.leg_done:  # its last line may be executed before the drone reports its plan as stopped
+                if self.ending and report.lands_or_returns:
+                    yield from self._part_over()
+            elif report.lands and self._leads_down:
+                yield from self._await_end(report, now)
             return
         if kind is None:
+            self.phase = replace(phase, has_landed=phase.has_landed or report.lands)
             yield from self._look(report)
             return
         self.phase = replace(phase, missing=phase.missing - {kind})
@@ -771,7 +796,7 @@ class MissionMachine:
                 why = texts.NOT_ARMED_WITHIN.fill(seconds=ARM_WAIT)
                 yield Release()
                 yield SendText(Severity.WARNING, texts.MISSION_NOT_STARTED.fill(reason=why))
-            case S.ENDING if phase.missing and not phase.waits_for_position:
+            case S.ENDING if self._flown(report) is None and not phase.waits_for_position:
                 self.phase = replace(phase, waits_for_position=True, until=phase.until + POSITION_WAIT - END_WAIT)
             case S.FLYING_FILE:  # its plan has ended, but that was not reported
                 self.phase = replace(phase, until=math.inf)
@@ -789,7 +814,9 @@ class MissionMachine:
         yield from ()
 
     @_on(E.LINK_UP)
-    def link_up(self, record: MissionRecord | None, uid: str | None, *, plays: bool, in_air: bool) -> _Steps:
+    def link_up(
+        self, record: MissionRecord | None, uid: str | None, now: float, *, plays: bool, in_air: bool
+    ) -> _Steps:
         """The drone is connected and reports its newest plan, and if it flies that.
 
         `record` is the stored one.
@@ -810,6 +837,7 @@ class MissionMachine:
         current = progress.current + FIRST_LABEL
         if plays and uid == progress.uid:
             self.phase = MissionPhase(S.FLYING_FILE, S.FLYING_FILE, plays=uid)
+            self._limit(now)
             yield Select()
             yield SendText(Severity.NOTICE, texts.MISSION_FOUND_FLYING.fill(item=current))
         elif progress.leg_done and later is None:
@@ -903,45 +931,52 @@ class MissionMachine:
 
     # The end of a plan whose last line the drone has not reported.
     #
-    # Parrot does not document if the last MissionItemExecuted precedes the state stopped. A last line that lands or
-    # returns is done when the drone has begun that; one of another cause is not the mission's. Any other last line is
-    # done when the drone is at the last way point and nothing is wrong. The report itself may also be late. A position
-    # that was received before the drone stopped proves nothing: over a bad link it may be seconds old.
+    # Parrot does not document if the last MissionItemExecuted precedes the state stopped, a landing or a return. All
+    # lines may be late, and the last one absent. A last line that lands or returns is done when the drone has begun
+    # that; one of another cause is not the mission's. Any other last line is done when the drone is at the last way
+    # point and nothing is wrong. A position that was received before the drone stopped proves nothing: over a bad link
+    # it may be seconds old.
 
     def _last_way_point(self) -> WayPoint | None:
-        """Return the way point that a file ends at.
-
-        Returns None while other way points are left, or when the file ends with a landing or a return.
-        """
+        """Return the way point that a file ends at; None while other way points are left."""
         leg = self.progress.leg
         if leg is None:
             return None
         points, left = [*way_points(leg)], [*way_points(leg, self.progress.line)]
-        if self.mission.items[leg.origins[-1]].command in ENDINGS or len(left) > 1 or not points:
-            return None
-        return points[-1]
+        return None if len(left) > 1 or not points else points[-1]
 
-    def _await_end(self, target: WayPoint | None, report: DroneReport, now: float) -> _Steps:
-        missing = frozenset[type[Message]]() if target is None else PROOF
-        self.phase = MissionPhase(S.ENDING, S.ENDING, until=now + END_WAIT, target=target, missing=missing)
+    def _await_end(self, report: DroneReport, now: float) -> _Steps:
+        """Wait for late reports of lines, and judge the end of the file."""
+        missing = PROOF
+        if self.leads_home:
+            missing = frozenset()
+        elif self._leads_down:
+            missing = frozenset({GpsLocationChanged})  # its height changes
+        self.phase = MissionPhase(S.ENDING, S.ENDING, until=now + END_WAIT, has_landed=report.lands, missing=missing)
         yield from self._look(report)
+
+    def _flown(self, report: DroneReport) -> bool | None:
+        """Return True if the drone ends its file as planned; None: a position is missing for that."""
+        at_last_line, lands = self.progress.at_last_line, self._leads_down
+        if self.leads_home:
+            return report.returns_by_plan or (at_last_line and report.lands_or_returns)
+        if lands and at_last_line:
+            return report.lands_or_returns
+        if not self.phase.has_landed if lands else report.is_in_trouble:
+            return False
+        if (target := self._last_way_point()) is None:
+            return False
+        if self.phase.missing:
+            return None
+        return _is_above(target, report.place) if lands else _is_at(target, report)
 
     def _look(self, report: DroneReport, *, last: bool = False) -> _Steps:
         """Decide if the plan is complete. `last`: with what is known now."""
-        target, missing = self.phase.target, self.phase.missing
-        if target is None:
-            returns = self.leads_home and report.returns_by_plan
-            flown = returns or (self.progress.at_last_line and report.lands_or_returns)
-            decided = flown or last
-        else:
-            flown = not report.is_in_trouble and not missing and _is_at(target, report)
-            decided = report.is_in_trouble or last
-        if not decided:
-            return
-        if flown and (leg := self.progress.leg) is not None:
+        flown, leg = self._flown(report), self.progress.leg
+        if flown and leg is not None and (last or self.progress.at_last_line):
             yield from self._execute(len(leg.origins) - 1)
             yield from self._part_over()
-        else:
+        elif last or (report.is_in_trouble and not (self.leads_home or self._leads_down)):
             yield from self._stopped_by_drone(stopped=True)
 
 
@@ -950,6 +985,11 @@ def _is_at(target: WayPoint, report: DroneReport) -> bool:
         return False
     away = math.hypot(geo.distance(*report.place, *target.place), report.ato - target.ato)
     return away <= target.radius + GPS_MARGIN
+
+
+def _is_above(target: WayPoint, place: GeoPoint | None) -> bool:
+    """Return True above or below the way point."""
+    return place is not None and geo.distance(*place, *target.place) <= target.radius + GPS_MARGIN
 
 
 def _head_item(prepared: Prepared) -> int:

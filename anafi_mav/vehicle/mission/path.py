@@ -27,6 +27,9 @@ from anafi_mav.vehicle.mission.texts import FIRST_LABEL
 BREATH = 20
 """Way points after which others get their turn: a large polygon takes a while."""
 
+PANORAMA_SPEED = 30.0
+"""deg/s of a panorama that names no speed. Assumed, as Parrot does not document it."""
+
 ACCEPTANCE = 5.0
 """m around a way point that names no radius (Parrot's flight plan page)."""
 
@@ -38,7 +41,7 @@ REMEMBERED = 256
 
 _AMSL_FRAMES = (mav_enums.MAV_FRAME_GLOBAL, mav_enums.MAV_FRAME_GLOBAL_INT)
 
-_COMMAND, _RADIUS, _LATITUDE, _LONGITUDE, _HEIGHT = 3, 5, 8, 9, 10
+_COMMAND, _PARAM1, _RADIUS, _LATITUDE, _LONGITUDE, _HEIGHT = 3, 4, 5, 8, 9, 10
 """Columns of a line (arsdk.md §3.3, Parrot's flight plan page)."""
 
 
@@ -124,6 +127,19 @@ def way_points(leg: FlightPlanFile, after: int = -1) -> Iterator[WayPoint]:
             place = GeoPoint(float(columns[_LATITUDE]), float(columns[_LONGITUDE]))
             radius = float(columns[_RADIUS])
             yield WayPoint(item, place, float(columns[_HEIGHT]), radius if radius > 0.0 else ACCEPTANCE)
+
+
+def seconds_of_last_line(leg: FlightPlanFile) -> float:
+    """Return the duration of a file's last line, s; 0 unless it is a wait or a panorama."""
+    columns = lines_of(leg)[-1].split("\t")
+    one, two, three, four = map(float, columns[_PARAM1 - 1 : _PARAM1 + 3])
+    match int(columns[_COMMAND - 1]):
+        case mav_enums.MAV_CMD_NAV_DELAY | mav_enums.MAV_CMD_CONDITION_DELAY:
+            return one
+        case mav_enums.MAV_CMD_PANORAMA_CREATE:
+            turns = ((one, three), (two, four))
+            return max(abs(angle) / (speed if speed > 0.0 else PANORAMA_SPEED) for angle, speed in turns)
+    return 0.0
 
 
 @functools.lru_cache(maxsize=REMEMBERED)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from support.mission_machine import file
 
 from anafi_mav import mav_enums
 from anafi_mav.plans.plan import Item
@@ -64,7 +65,7 @@ def test_turns_of_loops_are_counted() -> None:
 def test_chosen_item_restarts_loops_and_end_clears_them() -> None:
     machine = MissionMachine()
     machine.upload([*ITEMS[:3], JUMP], 7)
-    leg = FlightPlanFile(b"", (1, 2), ((1,), (2, 3)))
+    leg = FlightPlanFile(file(1, 2).content, (1, 2), ((1,), (2, 3)))
     attempt = machine.attempt(1)
     machine.prepared(attempt, Prepared(Course((leg,)), "name"))
     machine.granted(attempt)
