@@ -610,6 +610,7 @@ RETURNS_TO_HOME = OperatorText("Returns end at home")
 HOME_TYPE_NOT_RESTORED = Template("Home type not restored: {error}", error=BELOW)
 HOME_TYPE_KEPT = Template("Home stays custom: {error}", error=BELOW)
 HOME_PLACE_KEPT = Template("Home may be moved: {error}", error=BELOW)
+HOME_PLACE_UNKNOWN = Reason("old place unknown")
 HOME_SET = OperatorText("Home set: in force until home type changes")
 HOME_RAISED = Template("Home height raised to take-off: was {height:.0f} m", height=-99999.0)
 

@@ -521,3 +521,17 @@ async def test_new_place_of_a_custom_home_is_accepted_although_the_drones_own_re
         custom = w.drone.firmware.homing.custom
         assert custom is not None
         assert custom.latitude > HOME[0] + 1e-4
+
+
+async def test_failed_home_of_a_drone_whose_custom_place_is_not_known_is_reported_as_maybe_moved() -> None:
+    """The drone prefers a custom home, obeys and does not answer: no place can be restored."""
+    async with world(speed=1.0) as w:
+        await w.take_off(6.0)
+        custom = int(rth.RthHomeType.CUSTOM)
+        assert value_of(await write(w.client, "ANF_HOME_TYPE", custom, INT32)) == custom
+        w.drone.faults.unreported = frozenset({rth.CustomLocation.NAME})
+        mark = w.client.mark()
+        ack = await w.client.command(SET_HOME, 0, frame=6, x=HOME[0] + 2e-4, y=HOME[1], z=HOME[2], timeout=15.0)
+        assert ack.result != ACCEPTED
+        assert w.drone.firmware.homing.custom is not None
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Home may be moved: old place unknown", since=mark)

@@ -14,7 +14,7 @@ from dataclasses import replace
 from anafi_mav import texts, units
 from anafi_mav.drone import Position
 from anafi_mav.drone.events import RthHomeType
-from anafi_mav.errors import AnafiMavError
+from anafi_mav.errors import AnafiMavError, NotSupported
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, ProgressPolicy
@@ -310,10 +310,12 @@ class GuidedService(Service):
                 if not is_custom:
                     require_no_own_return()
                 await home.set_preferred_type(RthHomeType.CUSTOM)
-            except BaseException:
+            except BaseException as error:
                 # What is not reported to be home must not stay it: a return that replaces this waits until it is not.
                 if is_custom and old is not None:
                     await asyncio.wait([self.host.spawn(self._restore_place(old))])
+                elif is_custom and not isinstance(error, NotSupported):
+                    self.host.text(Severity.CRITICAL, texts.HOME_PLACE_KEPT.fill(error=texts.HOME_PLACE_UNKNOWN))
                 elif given is not None and before is not None and not is_custom:
                     await asyncio.wait([self.host.spawn(self._prefer(before))])
                 raise
