@@ -53,6 +53,9 @@ RECTILINEAR = 12.0
 HIGHEST = 20_000.0
 """m, above and below: a height beyond is a number in the wrong field. The highest ground is 9 km above the sea."""
 
+SLOWEST_TURN = 0.1
+"""deg/s. A full turn takes an hour then, longer than an ANAFI flies."""
+
 LARGEST_HEADING = 720.0
 """deg: two turns. A larger heading or angle is a number in the wrong field."""
 

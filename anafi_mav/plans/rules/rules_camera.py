@@ -9,6 +9,7 @@ from anafi_mav.plans.rules.flight_plan_writer import (
     LARGEST_HEADING,
     SHORTEST_INTERVAL,
     SHORTEST_STEP,
+    SLOWEST_TURN,
     FlightPlanWriter,
 )
 from anafi_mav.plans.rules.rule import Fidelity, Rule, only
@@ -27,6 +28,13 @@ _UNSET = frozenset({None, 0.0, -1.0})
 
 def _camera(writer: FlightPlanWriter, item: Item, number: int) -> None:
     only(writer, item, number, "only the main camera, component 100, is supported", _CAMERAS)
+
+
+LONGEST_INTERVAL = 3600.0
+"""s between photos. No ANAFI flies for as long: a longer interval is a number in the wrong field or unit."""
+
+FASTEST_PANORAMA = 720.0
+"""deg/s. Faster than any drone or gimbal turns: a number in the wrong field."""
 
 
 def _gimbal(writer: FlightPlanWriter, item: Item, number: int) -> None:
@@ -189,6 +197,8 @@ def _still_mode(writer: FlightPlanWriter, item: Item) -> None:
 def _interval(writer: FlightPlanWriter, seconds: float, number: int) -> None:
     if seconds < SHORTEST_INTERVAL:
         writer.refuse(f"the camera needs {SHORTEST_INTERVAL:g} s between photos, not {seconds:g}", number)
+    if seconds > LONGEST_INTERVAL:
+        writer.refuse(f"invalid interval of {seconds:g} s", number)
 
 
 def _distance(writer: FlightPlanWriter, metres: float, number: int) -> None:
@@ -273,6 +283,10 @@ def _panorama(writer: FlightPlanWriter, item: Item) -> None:
     if not item.params[0] and not item.params[1]:
         writer.refuse("no angles", 1)
     _require_angles(writer, item, 1, 2)
+    for number in (3, 4):
+        speed = item.params[number - 1]
+        if speed and not SLOWEST_TURN <= speed <= FASTEST_PANORAMA:
+            writer.refuse(f"invalid speed of {speed:g} deg/s", number)
     writer.panorama(*item.params[:4])
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from anafi_mav import mav_enums
 from anafi_mav.plans.plan import DO_JUMP, FASTEST, SLOWEST, WAYPOINT, Item, Point
-from anafi_mav.plans.rules.flight_plan_writer import LARGEST_HEADING, FlightPlanWriter
+from anafi_mav.plans.rules.flight_plan_writer import LARGEST_HEADING, SLOWEST_TURN, FlightPlanWriter
 from anafi_mav.plans.rules.rule import Fidelity, Rule
 
 LONGEST_WAIT = 3600.0
@@ -122,7 +122,7 @@ def is_relative(reference: float | None) -> bool:
 def _turn(writer: FlightPlanWriter, item: Item) -> None:
     """Only what the drone looks at then: the gateway turns it."""
     angle, rate, way, reference = item.params[:4]
-    if rate is not None and rate < 0.0:
+    if rate and rate < SLOWEST_TURN:
         writer.refuse(f"invalid rate of {rate:g} deg/s", 2)
     if angle is None or abs(angle) > LARGEST_HEADING:
         writer.refuse("no angle" if angle is None else f"invalid angle of {angle:g} deg", 1)
