@@ -571,9 +571,9 @@ async def test_attitude_at_30_hz_is_made_of_pictures() -> None:
         async def measure(flags: int, yaw: float) -> list[Any]:
             assert (await w.client.command(PITCHYAW, -30.0, yaw, x=flags)).result == ACCEPTED
             await looks(w, pitch_absolute=-30.0)
-            turn = await w.client.command(dialect.MAV_CMD_CONDITION_YAW, 40.0, NAN, 1.0, 1.0)
-            assert turn.result == ACCEPTED
             mark = w.client.mark()
+            turn = await w.client.command(dialect.MAV_CMD_CONDITION_YAW, 40.0, NAN, 1.0, 1.0)
+            assert turn.result == ACCEPTED  # at its end
             for _ in range(3):
                 await w.client.wait("HEARTBEAT")
             return [m for _, m in w.client.since(mark, ATTITUDE)]

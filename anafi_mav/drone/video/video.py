@@ -85,12 +85,12 @@ class VideoFrame(msgspec.Struct, frozen=True):
     @property
     def attitude(self) -> Attitude | None:
         """Attitude of the drone, as in `PilotingState`; None: unknown."""
-        return attitude(self.rotation)
+        return attitude(self.metadata.drone_quat)
 
     @property
     def camera_attitude(self) -> Attitude | None:
         """Attitude of the picture; None: unknown."""
-        return attitude(self.camera_rotation)
+        return attitude(self.metadata.quat)
 
 
 class VideoState(msgspec.Struct, frozen=True):
@@ -123,8 +123,9 @@ def rotation(quat: Rotation | None) -> Rotation | None:
 
 
 def attitude(quat: Rotation | None) -> Attitude | None:
-    """The angles of a rotation; None when it is unknown."""
-    return None if quat is None else Attitude(*euler_from_quaternion(*quat))
+    """The angles of a quaternion of the metadata; None when it is no rotation."""
+    turned = rotation(quat)
+    return None if turned is None else Attitude(*euler_from_quaternion(*turned))
 
 
 class Video(Element[VideoState]):
