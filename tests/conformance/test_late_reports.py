@@ -143,7 +143,7 @@ async def test_hold_ends_a_climb_that_the_late_end_of_an_equal_one_crosses(late:
         assert w.drone.pose.up < min(up + 2.0, 16.0)
 
 
-@pytest.mark.parametrize("late", [1.3, 1.6])
+@pytest.mark.parametrize("late", [1.3, 1.7])
 async def test_turn_is_not_accepted_by_the_late_end_of_a_like_one_before_it_can_be_over(late: float) -> None:
     """It arrives after the time of the fastest drone, and before that of the rate which was commanded."""
     async with world(speed=1.0) as w:
