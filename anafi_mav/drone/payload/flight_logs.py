@@ -11,7 +11,6 @@ import asyncio
 import logging
 from collections.abc import AsyncGenerator, Callable
 from contextlib import aclosing, suppress
-from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple
 
@@ -45,10 +44,7 @@ class FlightLog(msgspec.Struct, frozen=True):
     @property
     def time(self) -> int:
         """When it was made, s since 1970; 0 when that is not readable."""
-        try:
-            return max(int(datetime.strptime(self.date, "%Y%m%dT%H%M%S%z").timestamp()), 0)
-        except (ValueError, OverflowError):
-            return 0
+        return self.file.time
 
     @property
     def file(self) -> Resource:

@@ -6,6 +6,7 @@ import asyncio
 import re
 from collections.abc import AsyncGenerator, Callable
 from contextlib import aclosing
+from datetime import datetime
 from pathlib import Path
 
 import msgspec
@@ -88,6 +89,14 @@ class Resource(msgspec.Struct, frozen=True):
         """
         found = _DATE.match(self.datetime)
         return UNDATED if found is None else "-".join(found.groups())
+
+    @property
+    def time(self) -> int:
+        """When it was made by the drone's clock, s since 1970; 0 when that is not readable."""
+        try:
+            return max(int(datetime.strptime(self.datetime, "%Y%m%dT%H%M%S%z").timestamp()), 0)
+        except (ValueError, OverflowError):
+            return 0
 
     @property
     def identity(self) -> str | None:

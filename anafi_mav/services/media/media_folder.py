@@ -12,7 +12,6 @@ from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 from contextlib import aclosing, contextmanager
 from dataclasses import dataclass
-from datetime import datetime
 from typing import TypeVar
 
 from anafi_mav import texts
@@ -152,15 +151,7 @@ def entries(listing: Listing, path: str, entry: Callable[[Resource], Entry]) -> 
 
 def file_entry(file: Resource) -> Entry:
     """Return a file's name, size and time."""
-    return Entry(file.resource_id, file.size, modified(file))
-
-
-def modified(file: Resource) -> int:
-    """Return when a file was made, s since 1970; 0 when that is not readable."""
-    try:
-        return max(int(datetime.strptime(file.datetime, "%Y%m%dT%H%M%S%z").timestamp()), 0)
-    except (ValueError, OverflowError):
-        return 0
+    return Entry(file.resource_id, file.size, file.time)
 
 
 @contextmanager

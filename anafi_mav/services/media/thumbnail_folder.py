@@ -9,7 +9,7 @@ from anafi_mav.drone import Drone
 from anafi_mav.drone.payload.media import Listing, Resource
 from anafi_mav.services.checksum import crc32
 from anafi_mav.services.files import Entry, FileError, FileRefused, MadeFile
-from anafi_mav.services.media.media_folder import entries, find, modified, refusing, when_listed
+from anafi_mav.services.media.media_folder import entries, find, refusing, when_listed
 
 ENDING = ".jpg"
 
@@ -65,4 +65,4 @@ class ThumbnailFolder:
         return resource
 
     def _entry(self, file: Resource) -> Entry:
-        return Entry(file.resource_id + ENDING, len(self._kept.get(file, b"")), modified(file))
+        return Entry(file.resource_id + ENDING, len(self._kept.get(file, b"")), file.time)
