@@ -140,7 +140,7 @@ def test_complaint_follows_the_lines_of_the_log_before_it(capfd: pytest.CaptureF
     assert capfd.readouterr().err.splitlines() == ["line", "anafi-mav: no gateway"]
 
 
-@pytest.mark.skipif(os.name != "posix", reason="permissions of a folder exist on POSIX alone")
+@pytest.mark.skipif(os.name != "posix", reason="uses os.setuid and folder permissions, which Windows does not have")
 def test_log_file_in_a_folder_that_refuses_new_files_passes_the_check() -> None:
     """As /dev/null, or a file in /var/log: a start writes it without a new name."""
     script = """

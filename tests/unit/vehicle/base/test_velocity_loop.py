@@ -276,15 +276,21 @@ def test_a_gain_is_lowered_by_the_round_trip(seconds: float, share: float) -> No
 # Flown, with reports as late as a radio makes them.
 
 
-@pytest.mark.parametrize("delay", [0.35, 0.7])
-@pytest.mark.parametrize("model", sorted(MODELS))
-def test_a_place_is_held_over_a_late_link(model: str, delay: float) -> None:
-    """10 m to the north and 3 m up, with sticks and reports that arrive so many s late."""
+def hovering(model: str) -> Bench:
+    """A drone 10 m above the ground, with limits that leave the loop free."""
     bench = Bench(model)
     for setting in (ardrone3.MaxTilt(35.0), ardrone3.MaxRotationSpeed(90.0), ardrone3.MaxVerticalSpeed(3.0)):
         bench.send(setting)
     bench.take_off()
     bench.climb(10.0)
+    return bench
+
+
+@pytest.mark.parametrize("delay", [0.35, 0.7])
+@pytest.mark.parametrize("model", sorted(MODELS))
+def test_a_place_is_held_over_a_late_link(model: str, delay: float) -> None:
+    """10 m to the north and 3 m up, with sticks and reports that arrive so many s late."""
+    bench = hovering(model)
     motion = MotionEstimate()
     motion.round_trip.measure(2.0 * delay)
     controller = VelocityController(motion)
@@ -319,11 +325,7 @@ def test_a_place_is_held_over_a_late_link(model: str, delay: float) -> None:
 @pytest.mark.parametrize("model", sorted(MODELS))
 def test_a_step_in_virtual_time(model: str, late: float) -> None:
     """0 to 5 m/s to the east with the nose to the north, in 5 m/s of headwind, at five reports a second."""
-    bench = Bench(model)
-    for setting in (ardrone3.MaxTilt(35.0), ardrone3.MaxRotationSpeed(90.0), ardrone3.MaxVerticalSpeed(3.0)):
-        bench.send(setting)
-    bench.take_off()
-    bench.climb(10.0)
+    bench = hovering(model)
     motion = MotionEstimate()
     controller = VelocityController(motion)
     reports: list[tuple[float, tuple[float, ...]]] = []
