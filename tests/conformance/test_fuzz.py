@@ -12,6 +12,7 @@ import itertools
 import logging
 import math
 import random
+import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -150,6 +151,19 @@ def is_region_of_interest(frame: bytes) -> bool:
     return place < len(frame) and frame[place] >= dialect.MAV_MOUNT_MODE_GPS_POINT
 
 
+TO_GIMBAL = (
+    newer.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_ATTITUDE,
+    newer.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_PITCHYAW,
+    newer.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_MANUAL_CONTROL,
+    newer.MAVLINK_MSG_ID_MOUNT_CONTROL,
+)
+"""They turn the gimbal while no client has control of it (docs/gimbal.md), and have a test of their own."""
+
+
+def is_to_gimbal(frame: bytes) -> bool:
+    return message_id(frame) in TO_GIMBAL
+
+
 def message_id(frame: bytes) -> int | None:
     """Of a whole frame; None for what was cut off before it."""
     return int.from_bytes(frame[7:10], "little") if len(frame) >= 10 else None
@@ -201,13 +215,35 @@ async def throw(w: World, frames: list[bytes], pause: float = BATCH_EVERY) -> No
 @pytest.mark.parametrize("flavour", FLAVOURS)
 async def test_random_frames_on_the_ground(flavour: str, times: int, fuzz_seed: int, mistakes: list[str]) -> None:
     async with world(flavour=flavour) as w:
-        frames = random_frames(random.Random(f"{fuzz_seed} {flavour}"))
+        frames = itertools.filterfalse(is_to_gimbal, random_frames(random.Random(f"{fuzz_seed} {flavour}")))
         began = w.drone.log[-1].t
         with steady(w):
             for _ in range(times * ON_THE_GROUND // BATCH):
                 await throw(w, list(itertools.islice(frames, BATCH)))
         assert motions(w, began) == []
         assert w.drone.flying_state.name == "LANDED"
+        assert mistakes == []
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+async def test_random_frames_to_the_gimbal_turn_only_that(flavour: str, fuzz_seed: int, mistakes: list[str]) -> None:
+    """Beside random ones are some whose numbers are angles, so that they turn it."""
+    source = random.Random(f"{fuzz_seed} gimbal {flavour}")
+    async with world(flavour=flavour) as w:
+        await w.take_off(HEIGHT)
+        place, began = w.drone.pose, w.drone.log[-1].t
+        frames = random_frames(source, TO_GIMBAL)
+        with steady(w):
+            for _ in range(12):
+                batch = list(itertools.islice(frames, BATCH // 4))
+                for sequence in range(20):
+                    angles = struct.pack("<4f", *(source.uniform(-1.0, 1.0) for _ in range(4)))
+                    payload = source.randbytes(4) + angles + bytes((1, source.choice((1, 154)), source.randint(0, 2)))
+                    batch.append(framed(newer.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_PITCHYAW, payload, sequence))
+                source.shuffle(batch)
+                await throw(w, batch)
+        assert set(motions(w, began)) == {"gimbal.set_target"}
+        assert apart(place, w.drone.pose) < STIRRED
         assert mistakes == []
 
 
@@ -317,6 +353,7 @@ async def test_random_frames_in_the_air(
         if mode == "brake":
             assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, COPTER_BRAKE)).result == 0
         frames = itertools.filterfalse(is_region_of_interest, frames_in_the_air(random.Random(f"{fuzz_seed} {mode}")))
+        frames = itertools.filterfalse(is_to_gimbal, frames)
         if mode != "brake":
             frames = itertools.filterfalse(is_guided_item, frames)
         moved: set[int] = set()
