@@ -14,6 +14,7 @@ from anafi_mav import texts, units
 from anafi_mav.drone import MoveEnd, Position
 from anafi_mav.drone.events import AttitudeChanged
 from anafi_mav.drone.expectation import loop_time
+from anafi_mav.drone.piloting.moves import Move
 from anafi_mav.drone.piloting.piloting import Piloting
 from anafi_mav.errors import CommandRejected
 from anafi_mav.texts import Subject
@@ -93,6 +94,17 @@ class Goto(PlainTask):
         return replace(self, yaw=yaw)
 
 
+class _Flown(NamedTuple):
+    """A goto that was begun, and its move."""
+
+    goto: Goto
+    move: Move
+
+    @property
+    def has_arrived(self) -> bool:
+        return self.move.ended.done() and self.move.ended.result() is MoveEnd.DONE
+
+
 class _Ended(NamedTuple):
     """A move that has ended, and what was true then."""
 
@@ -110,13 +122,13 @@ class GuidedFlight:
 
     def __init__(self, vehicle: Aircraft) -> None:
         self._vehicle = vehicle
-        self._newest: _Ended | None = None
+        self._newest: _Flown | _Ended | None = None
 
     @property
     def _ended(self) -> _Ended | None:
         """The newest move that has ended, while nothing was commanded since."""
         ended = self._newest
-        return ended if ended is not None and ended.epoch == self._vehicle.control.epoch else None
+        return ended if isinstance(ended, _Ended) and ended.epoch == self._vehicle.control.epoch else None
 
     @property
     def holds(self) -> bool:
@@ -247,6 +259,7 @@ class GuidedFlight:
             orientation=orientation,
         )
         if (move := vehicle.drone.piloting.move) is not None:
+            self._newest = _Flown(goto, move)
             move.ended.add_done_callback(lambda ended: self._on_end(goto, ended))
 
     async def _climb(self, ato: float, yaw: float | None, mode: FlightMode, by: By) -> None:
@@ -320,7 +333,9 @@ class GuidedFlight:
 
         A location is reported once a second only, and to use it would fly the drone back by some metres.
         """
-        ended = self._ended
+        flown, ended = self._newest, self._ended
+        if isinstance(flown, _Flown) and flown.goto is self._vehicle.control.active and flown.has_arrived:
+            return flown.goto.place  # `_on_end` is called in the next iteration of the event loop
         if ended is None or ended.is_short or self._vehicle.drone.gps.state.location is not ended.location:
             return None
         return ended.goto.place
@@ -331,8 +346,10 @@ class GuidedFlight:
         Every client gets a text when it is short of it, and none has commanded that: the mode does not change.
         """
         vehicle, control = self._vehicle, self._vehicle.control
+        if control.active is not goto:
+            return  # a newer command has ended it
         how = ended.result()
-        is_short = how in _SHORT and control.active is goto
+        is_short = how in _SHORT
         if how is MoveEnd.DONE or is_short:
             control.release(goto)
             self._newest = _Ended(goto, is_short, vehicle.drone.gps.state.location, control.epoch)

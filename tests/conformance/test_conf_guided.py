@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 from typing import Any
 
@@ -15,8 +16,10 @@ from support.setpoints import NO_YAW_RATE, VELOCITY_ONLY, engage, local, streami
 from support.world import ARMED, HOME, World, world
 
 from anafi_mav import geo, units
+from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.mavlink import dialect as newer
+from anafi_mav.vehicle.base.requester import Source
 
 ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
@@ -33,6 +36,7 @@ ROI, NO_ROI, OLD_ROI = (
     dialect.MAV_CMD_DO_SET_ROI_NONE,
     dialect.MAV_CMD_DO_SET_ROI,
 )
+MOVE_TO = "ardrone3.Piloting.moveTo"
 GLOBAL, RELATIVE = dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
 NAN = math.nan
 
@@ -458,3 +462,28 @@ async def test_turn_that_something_else_ends_has_failed(flavour: str, end: str) 
         assert ack.result == dialect.MAV_RESULT_FAILED
         reason = {"landing": "drone is landing", "return": "drone is returning", "pilot": "Skycontroller pilot"}[end]
         assert any(text.startswith(f"Turn failed: {reason}") for text in texts(w.client, mark))
+
+
+async def test_height_commanded_as_a_move_ends_is_flown_at_its_target() -> None:
+    """The command is read before the end of the move, in one event-loop iteration, and carried out after it."""
+    async with world() as w:
+        await w.take_off(10.0)
+        system, commands = w.gateway.systems[0], []
+
+        def command(event: Message) -> None:
+            """A task of before the event runs before what the event itself makes run."""
+            if (
+                isinstance(event, ardrone3.MoveToChanged)
+                and event.status == ardrone3.MoveToStatus.DONE
+                and not commands
+            ):
+                work = system.vehicle.guided.reposition(None, 5.0, None, by=Source.GATEWAY)
+                commands.append(asyncio.create_task(work))
+
+        system.drone.on_event = command
+        await go_north(w)
+        await w.drone.wait_log(lambda e: e.name.endswith("moveToChanged") and e.args["status"] == 1, 30.0)
+        await w.drone.wait_log(lambda e: e.kind == "command" and e.name == MOVE_TO and e.args["altitude"] == 5.0)
+        await commands[0]
+        places = [(geo.distance(*NORTH_60, m["latitude"], m["longitude"]), m["altitude"]) for m in sent(w, MOVE_TO)]
+        assert [(pytest.approx(0.0, abs=0.1), 10.0), (pytest.approx(0.0, abs=0.1), 5.0)] == places
