@@ -235,18 +235,20 @@ class GatewayLoop(asyncio.SelectorEventLoop):
         self.call_at(self.time(), self._calls.run)  # an iteration calls timers after sockets, the most overdue first
 
 
-class _Policy(asyncio.DefaultEventLoopPolicy):
-    """Makes these event loops."""
-
-    def new_event_loop(self) -> asyncio.AbstractEventLoop:
-        return GatewayLoop()
-
-
 def run(work: Coroutine[Any, Any, ResultT]) -> ResultT:
     """Run a coroutine as asyncio.run does.
 
     Windows has an event loop of its own, without a selector.
     """
-    if sys.platform != "win32":
-        asyncio.set_event_loop_policy(_Policy())
+    if sys.platform == "win32":
+        return asyncio.run(work)
+    if sys.version_info >= (3, 11):
+        with asyncio.Runner(loop_factory=GatewayLoop) as runner:
+            return runner.run(work)
+
+    class Policy(asyncio.DefaultEventLoopPolicy):
+        def new_event_loop(self) -> asyncio.AbstractEventLoop:
+            return GatewayLoop()
+
+    asyncio.set_event_loop_policy(Policy())  # Python 3.10 has no Runner, and 3.16 has no policies
     return asyncio.run(work)
