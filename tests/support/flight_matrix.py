@@ -399,6 +399,8 @@ async def _stop(c: Cell, *, holds: bool) -> None:
     land = await client.command(Cmd.MAV_CMD_NAV_LAND, timeout=PATIENCE)
     if land.result != 0 or not await c.until(lambda: c.w.drone.flying_state is FlyingState.LANDED, 60.0):
         c.findings.append(f"land: {NAMES[land.result]} {c.w.drone.flying_state.name} {texts(client)[-1:]}")
+    else:  # what the client's disarm may overtake
+        await client.wait("EXTENDED_SYS_STATE", lambda m: m.landed_state == dialect.MAV_LANDED_STATE_ON_GROUND)
     disarm = await client.command(Cmd.MAV_CMD_COMPONENT_ARM_DISARM, 0, timeout=PATIENCE)
     if disarm.result != 0:
         c.findings.append(f"disarm: {NAMES[disarm.result]} {texts(client)[-1:]}")

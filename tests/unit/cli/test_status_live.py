@@ -141,7 +141,8 @@ async def test_status_shows_the_age_while_a_gateway_hangs(tmp_path: Path) -> Non
     """A gateway that is stopped accepts the connection and sends nothing: the values must not look current."""
     lock, screen = StateLock(tmp_path), Screen()
     assert lock.acquire() is None
-    hanging = await asyncio.start_server(lambda reader, writer: None, "127.0.0.1", 0)
+    kept: list[asyncio.StreamWriter] = []  # Python 3.13 closes the connection of a writer that nothing holds
+    hanging = await asyncio.start_server(lambda reader, writer: kept.append(writer), "127.0.0.1", 0)
     lock.write((), f"http://127.0.0.1:{hanging.sockets[0].getsockname()[1]}/")
     async with aiohttp.ClientSession(timeout=aiohttp.ClientTimeout(total=LIMIT)) as session:
         following = asyncio.create_task(follow(session, lambda: find(str(tmp_path), None), STATUS, screen.show))
@@ -153,4 +154,6 @@ async def test_status_shows_the_age_while_a_gateway_hangs(tmp_path: Path) -> Non
             with suppress(asyncio.CancelledError):
                 await following
             hanging.close()
+            for writer in kept:
+                writer.close()
             lock.release()
