@@ -58,7 +58,8 @@ def test_forked_program_is_a_child_of_ours_until_it_has_ended() -> None:
             parent = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[1]
             assert int(parent) == os.getpid()
             assert not clock.childless()
-            files.append(sorted(one.name for one in Path(f"/proc/{process.pid}/fd").iterdir()))
+            opened = [str(one.readlink()).partition(":")[0] for one in Path(f"/proc/{process.pid}/fd").iterdir()]
+            files.append(sorted(one for one in opened if ".so" not in one))  # libffi keeps its own file open
             process.send_signal(signal.SIGKILL)
         assert process.returncode == -signal.SIGKILL
         assert clock.childless()
