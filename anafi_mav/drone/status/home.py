@@ -28,6 +28,7 @@ from anafi_mav.arsdk.messages.rth import (
 )
 from anafi_mav.drone.element import Position, Range, Reducer, members, position, setting
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, require_number
+from anafi_mav.drone.sent_commands import QUIET
 from anafi_mav.drone.settings import Commanding
 from anafi_mav.errors import CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
 
@@ -239,9 +240,9 @@ class Home(Commanding[HomeState]):
         """Choose a place (deg, deg, m above take-off) for homes of type custom.
 
         The drone flies there only while `preferred_type` is CUSTOM. One that does not accept the place (it is too far
-        away, or the drone does not know where it is itself) reports its old one or nothing: `CommandRejected`, `QUIET`
-        after it has received the command, for a report of the old place may be from before that. `CommandTimeout` when
-        the command did not arrive.
+        away, or the drone does not know where it is itself) reports its old one: `CommandRejected`, `QUIET` after it
+        has received the command, for a report of the old place may be from before that. `CommandTimeout` when it
+        reports none until then, for it may have obeyed, and when the command did not arrive.
         """
         require_number(timeout)
         wanted = position(latitude, longitude, altitude)
@@ -251,7 +252,11 @@ class Home(Commanding[HomeState]):
         if self.state.types is not None and RthHomeType.CUSTOM not in self.state.types:
             raise NotSupported("home of type custom")
 
+        reports_old = False
+
         def judge(message: rth.CustomLocation) -> Position | None:
+            nonlocal reports_old
+            reports_old = True
             same = math.isclose(message.latitude, latitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG) and math.isclose(
                 message.longitude, longitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG
             )
@@ -263,6 +268,8 @@ class Home(Commanding[HomeState]):
             delivery = self._commander.deliver(command)
             try:
                 if not await answer.wait_or_quiet(delivery, command.NAME, timeout):
+                    if not reports_old:
+                        raise CommandTimeout(command.NAME, QUIET)
                     raise CommandRejected("Home refused: the drone does not accept the place")
                 return answer.future.result()
             finally:
