@@ -183,6 +183,20 @@ async def test_conf_037_full_battery_with_another_alert_is_not_low(flavour: str,
             assert (status.battery_remaining, status.charge_state, status.fault_bitmask) == (100, charge, fault)
 
 
+async def test_battery_alert_beyond_critical_counts_as_critical() -> None:
+    """A level of a newer firmware: the text alone called it critical, and the drone could be armed."""
+    async with world() as w:
+        mark = w.client.mark()
+        w.drone.inject(battery.Alert(battery.BatteryAlert.TOO_HOT, battery.AlertLevel(3), 0))
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Battery too hot: critical", since=mark)
+        status = await w.client.wait("BATTERY_STATUS")
+        assert status.charge_state == dialect.MAV_BATTERY_CHARGE_STATE_UNHEALTHY
+        sys_status = await w.client.wait("SYS_STATUS")
+        assert not sys_status.onboard_control_sensors_health & newer.MAV_SYS_STATUS_SENSOR_BATTERY
+        ack = await w.client.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+        assert ack.result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
+
+
 async def test_conf_037_the_cells_of_an_ai() -> None:
     """149-0-6 to 149-0-9: three cells, kelvin, and charge in mAh."""
     async with world(model="ai") as w:

@@ -67,7 +67,8 @@ class BatteryState(msgspec.Struct, frozen=True):
 
 
 def _alert(state: BatteryState, message: battery.Alert) -> BatteryState:
-    return replace(state, alerts=with_item(state.alerts, message.alert, message.level, message.list_flags))
+    level = min(message.level, AlertLevel.CRITICAL)  # one that is newer than our tables is not less
+    return replace(state, alerts=with_item(state.alerts, message.alert, level, message.list_flags))
 
 
 def _cell(state: BatteryState, message: battery.CellVoltage) -> BatteryState:

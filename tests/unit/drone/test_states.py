@@ -159,6 +159,11 @@ CASES: list[tuple[type[Element[Any]], list[wire.Message], dict[str, Any]]] = [
         ],
         {"alerts": {BatteryAlert.LOST_COMM: AlertLevel.WARNING}},
     ),
+    (
+        Battery,
+        [battery.Alert(BatteryAlert.TOO_HOT, AlertLevel(3), 0)],
+        {"alerts": {BatteryAlert.TOO_HOT: AlertLevel.CRITICAL}},
+    ),
     # 0b1000_0011: perturbed, quality 3; 0b0100_0101: 4G interference, quality 5
     (Link, [common.LinkSignalQuality(0x83)], {"quality": 3, "perturbed": True, "interference_4g": False}),
     (Link, [common.LinkSignalQuality(0x45)], {"quality": 5, "perturbed": False, "interference_4g": True}),
