@@ -635,6 +635,30 @@ async def test_fence_circle_around_the_start_becomes_the_drones_geofence(flavour
         await until(lambda: own_fence(w) == before)
 
 
+async def test_drones_own_circle_is_neither_enabled_nor_disabled_by_command() -> None:
+    """FENCE_TYPE's bit 2 is the drone's own circle: it is in force, and a command does not switch it off."""
+    async with world(flavour="ardupilot") as w:
+        client, circle_kind = w.client, 2
+        assert (await client.command(ENABLE, 0, circle_kind)).result == ACCEPTED
+        assert (await put(w, "FENCE_TYPE", 1 + circle_kind)).param_value == 1 + circle_kind
+        assert own_fence(w) == (100.0, 1)
+        mark = client.mark()
+        assert (await client.command(ENABLE, 1, circle_kind)).result == ACCEPTED
+        assert not [text for text in texts(client, mark) if "Fence" in text]
+        assert (await client.command(ENABLE, 0, circle_kind)).result == DENIED
+        await said(client, "Fence refused: drone's circle stays (ANF_GEOFENCE)", since=mark)
+        assert own_fence(w) == (100.0, 1)
+
+
+async def test_mirrored_circle_around_home_is_disabled_by_command() -> None:
+    async with world() as w:
+        item = Item(mav_enums.MAV_CMD_NAV_FENCE_HOME_CIRCLE_INCLUSION, 0.0, 0.0, p1=60.0)
+        assert (await upload(w.client, [item], FENCE)).type == TAKEN
+        await until(lambda: own_fence(w) == (60.0, 1))
+        assert (await w.client.command(ENABLE, 0, 2)).result == ACCEPTED
+        await until(lambda: own_fence(w) == (100.0, 0))
+
+
 async def test_fence_wider_than_the_geofence_keeps_drone_settings() -> None:
     async with world() as w:
         elsewhere = around(PLACE, (40.0, 0.0))[0]

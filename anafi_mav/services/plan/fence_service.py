@@ -35,6 +35,7 @@ from anafi_mav.vehicle.fence.fence_watch import (
     CEILING,
     EVERYTHING,
     FLOOR,
+    HOME_CIRCLE,
     FenceWatch,
     OutsideFence,
     Reaction,
@@ -310,7 +311,8 @@ class FenceService(Service):
     async def _enable(self, command: Command) -> None:
         """Run MAV_CMD_DO_FENCE_ENABLE.
 
-        param1 0 disable, 1 enable, 2 disable the floor; param2 FENCE_TYPE bits, 0 all.
+        param1 0 disable, 1 enable, 2 disable the floor; param2 FENCE_TYPE bits, 0 all. The drone's own boundaries are
+        settings of the drone: they are in force, and no kind of the fence.
         """
         what, types = command.params[:2]
         watch = self._watch
@@ -319,13 +321,16 @@ class FenceService(Service):
             wanted = FLOOR
         if what not in (DISABLE, ENABLE, DISABLE_FLOOR) or wanted not in range(1, EVERYTHING + 1):
             raise Refused(texts.FENCE, texts.FENCE_PARAMS, lasting=True)
-        if what != ENABLE and wanted == CEILING:
-            raise Refused(texts.FENCE, texts.CEILING_STAYS, lasting=True)
+        has_circle = bool(watch.types & HOME_CIRCLE) and watch.fence.is_around_home
+        own_circle = HOME_CIRCLE if self.host.drone.piloting.state.geofence and not has_circle else 0
+        if what != ENABLE and not int(wanted) & ~(CEILING | own_circle):
+            reason = texts.OWN_CIRCLE_STAYS if int(wanted) & HOME_CIRCLE else texts.CEILING_STAYS
+            raise Refused(texts.FENCE, reason, lasting=True)
         if what == ENABLE:
-            if wanted != EVERYTHING and int(wanted) & ~watch.types:
+            if wanted != EVERYTHING and int(wanted) & ~(watch.types | own_circle):
                 raise Refused(texts.FENCE, texts.FENCE_KIND_NOT_CHOSEN, lasting=True)
             watch.enable(int(wanted))
-            if not watch.in_force:
+            if not watch.in_force and not own_circle:
                 self.host.text(Severity.WARNING, texts.FENCE_ON_WITHOUT)
         else:
             watch.disable(int(wanted))
