@@ -174,6 +174,19 @@ async def test_conf_086_shutter_of_a_photo_that_is_reported_twice_is_one_picture
         assert (await shoot(w.client)).image_index == first.image_index + 1
 
 
+async def test_conf_086_shutter_that_is_reported_again_after_the_end_is_not_that_of_the_next_photo() -> None:
+    """An ANAFI Ai counts no pictures. The next photo had the time and the place of the repeated report."""
+    async with world(model="ai", speed=1.0, web=True) as w:
+        await enter(w.client, PHOTO)
+        first = await shoot(w.client)
+        w.drone.inject(camera2.Photo(camera_id=0, type=camera2.PhotoEvent.TAKING_PHOTO))
+        for _ in range(3):
+            await w.client.wait("HEARTBEAT", since=w.client.mark())
+        second = await shoot(w.client)
+        assert (second.image_index, len(photos(w))) == (first.image_index + 1, 2)
+        assert second.time_boot_ms - first.time_boot_ms > 2000
+
+
 async def test_conf_086_photos_that_are_taken_before_the_first_is_stored_have_their_own_files() -> None:
     result, progress = camera_messages.PhotoResult, camera_messages.PhotoProgress
     shown = "CAMERA_IMAGE_CAPTURED"

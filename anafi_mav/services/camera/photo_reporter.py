@@ -158,7 +158,9 @@ class PhotoReporter:
 
     def tick(self, now: float, *, is_series: bool) -> None:
         """Latch poses, and report the pictures that are not waited for any longer."""
-        for at in self._shots.pending:
+        pending = self._shots.pending
+        self._poses = {at: pose for at, pose in self._poses.items() if at in pending}
+        for at in pending:
             if at not in self._poses and (self._track.is_complete(at) or now - at >= LATCH):
                 self._poses[at] = self._track.pose(at)
         self._report(self._shots.expire(now, is_series=is_series), "")

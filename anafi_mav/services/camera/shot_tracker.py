@@ -33,6 +33,10 @@ A drone of the newer feature reports the media of a series only at its end.
 LOST = 10.0
 """s after the end of a photo at which a picture that is not reported as stored counts as lost."""
 
+UNANNOUNCED = 1.0
+"""s after a shutter without a count in which the begin of its photo is reported. A later begin is that of the next one:
+the shutter was that of the photo before, reported again."""
+
 REPEATED = 4
 """Media ids that are remembered, because the drone may report them again."""
 
@@ -58,6 +62,8 @@ class _Capture:
         self.number = number
         self.camera = camera
         self.is_open = is_open
+        self.is_announced = True
+        """False when a shutter without a count has begun it, which may be that of the photo before."""
         self.since = now
         """When the last report of a shot was received, or the capture began."""
         self.shots: list[float] = []
@@ -94,6 +100,12 @@ class _Capture:
             return False
         return self.reported is not None and self.more(update.count) > 0
 
+    def announce(self, now: float) -> None:
+        """Note the reported begin, which may be later than the first shutter."""
+        if not self.is_announced and now - self.since > UNANNOUNCED:
+            self.shots, self.taken, self.since = [], 0, now
+        self.is_announced = True
+
     def take(self, pictures: int, now: float) -> None:
         """Add pictures, spread over the time since the last report."""
         if self.reported is None and pictures:
@@ -112,6 +124,8 @@ class _Capture:
 
     def expire(self, now: float) -> list[CapturedShot]:
         """Return the pictures that are not waited for any longer after the end."""
+        if self.is_open and not self.is_announced and now - self.since > LOST:
+            self.is_open, self.shots, self.taken = False, [], 0  # no photo of its own
         if self.ended is None or now - self.ended < LOST:
             return []
         self.ended = None
@@ -244,6 +258,8 @@ class ShotTracker:
         last = self._now
         if last.camera == update.camera:
             if last.is_open and not self._is_next(update):
+                if update.progress is CaptureProgress.STARTED:
+                    last.announce(now)
                 return []
             if update.is_state and last.ended is not None and last.shots:
                 return []  # further reports of that one may follow; the next one's progress begins it
@@ -253,6 +269,7 @@ class ShotTracker:
         last.end(now)
         lost = self._before.report_all(is_saved=False)
         self._before, self._now = self._now, _Capture(self._now.number + 1, now, update.camera, is_open=True)
+        self._now.is_announced = update.progress is not CaptureProgress.TAKEN or update.count is not None
         return lost
 
     def _is_next(self, update: CaptureUpdate) -> bool:

@@ -43,6 +43,19 @@ def test_shutter_of_a_single_photo_that_is_reported_twice_is_one_picture() -> No
     assert tracker.receive(saved("a", is_last=True), 1.6, 1) == [CapturedShot(1, 1, 1.2, True)]
 
 
+def test_shutter_without_a_count_is_of_a_photo_that_is_announced_soon_or_of_none() -> None:
+    tracker = ShotTracker()
+    feed(tracker, (1.0, STARTED, None), (1.2, TAKEN, None))
+    assert tracker.receive(saved("a", is_last=True), 1.6) == [CapturedShot(1, 1, 1.2, True)]
+    feed(tracker, (2.0, TAKEN, None), (2.2, STARTED, None))  # the events of one photo, in another order
+    assert tracker.receive(saved("b", is_last=True), 2.6) == [CapturedShot(2, 1, 2.0, True)]
+    feed(tracker, (3.0, TAKEN, None), (9.0, STARTED, None), (9.2, TAKEN, None))  # that of the second photo again
+    assert tracker.receive(saved("c", is_last=True), 9.6) == [CapturedShot(3, 1, 9.2, True)]
+    feed(tracker, (20.0, TAKEN, None))
+    assert tracker.expire(20.1 + LOST, is_series=False) == []
+    assert (tracker.is_open, tracker.pending) == (False, ())
+
+
 def test_burst_with_left_out_reports_spreads_its_times() -> None:
     tracker = ShotTracker()
     shots = feed(tracker, (1.0, STARTED, None), (1.2, TAKEN, 2), (2.0, TAKEN, 4), (2.3, SAVED, 4))
