@@ -697,6 +697,21 @@ async def test_conf_089_recording_that_ends_by_itself_is_a_text(is_state_first: 
         assert text.severity == dialect.MAV_SEVERITY_WARNING
 
 
+async def test_end_of_a_recording_that_is_reported_again_is_one_text() -> None:
+    async with world() as w:
+        await enter(w.client, VIDEO)
+        assert await command(w.client, START_VIDEO, 0, 0) == ACCEPTED
+        mark = w.client.mark()
+        full = camera_messages.RecordingResult.STOPPED_NO_STORAGE_SPACE
+        end = camera_messages.RecordingProgress(0, full, "9")
+        inactive = camera_messages.RecordingState(0, Availability.AVAILABLE, State.INACTIVE, 0)
+        for event in (end, inactive, end):
+            w.drone.inject(event)
+        for _ in range(2):
+            await w.client.wait("HEARTBEAT", since=w.client.mark())
+        assert len([text for text in texts(w.client, mark) if text.startswith("Recording ended")]) == 1
+
+
 @pytest.mark.parametrize("model", ["4k", "ai"])
 async def test_recording_on_a_full_storage_is_refused_at_once(model: str) -> None:
     async with world(model=model) as w:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import dataclasses
 import math
+from collections import deque
 from collections.abc import Awaitable, Callable, Mapping
 
 from anafi_mav import texts
@@ -29,6 +30,7 @@ from anafi_mav.services.camera.camera_targets import (
 )
 from anafi_mav.services.camera.photo_control import PhotoControl
 from anafi_mav.services.camera.photo_reporter import PhotoReporter
+from anafi_mav.services.camera.shot_tracker import REPEATED
 from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect, require_camera
 from anafi_mav.services.service import LOOK_EVERY, Host, Request, Service
 from anafi_mav.services.stream import MessageStream, Times
@@ -60,6 +62,8 @@ class CaptureService(Service):
         """When the recording under way began (s, monotonic)."""
         self._recording_failure = ""
         """Reason that the drone reported last; the recording may continue nevertheless."""
+        self._recorded: deque[str] = deque(maxlen=REPEATED)
+        """Media ids of the last recordings whose end is reported."""
         self._is_formatting = False
         """The drone formats the storage for media, and reports the end by its state alone."""
         self._sent: _Status | None = None
@@ -74,6 +78,7 @@ class CaptureService(Service):
         self._photos.link_up()
         self._recordings = asyncio.Lock()
         self._recording_since, self._recording_failure = self._found_recording(self.host.clock.monotonic()), ""
+        self._recorded.clear()
         if self._sent is None:
             self._sent = self._status()
         self._send_changed()  # without a link the pilot, or the drone itself, may have changed it
@@ -135,7 +140,10 @@ class CaptureService(Service):
             self._recording_failure = ""
             if self._recording_since is None:
                 self._recording_since = now
-        elif update is not None:  # the state decides whether it runs: this may be a late report about the one before
+        elif update is not None and update.media not in self._recorded:
+            # The state decides whether it runs: this may be a late report about the one before.
+            if update.media:
+                self._recorded.append(update.media)
             self._recording_failure = update.reason
             if update.media and self._recording_since is None and not self._records:
                 self._end_recording()  # the state was reported first
@@ -160,8 +168,7 @@ class CaptureService(Service):
         """Begin the index again when the storage for media was formatted."""
         formatted = Storage.formatted(message)
         if formatted is not None and formatted == media_storage(self.host.drone):
-            self._reporter.reset()
-            self._send_changed()
+            self._begin_index()
 
     def _on_storage_state(self, message: events.Message, now: float) -> None:
         """Do the same for a storage whose format has no result event."""
@@ -174,8 +181,13 @@ class CaptureService(Service):
         elif self._is_formatting and state in (events.FsState.READY, events.FsState.ERROR):  # after a check
             self._is_formatting = False
             if state == events.FsState.READY:
-                self._reporter.reset()
-                self._send_changed()
+                self._begin_index()
+
+    def _begin_index(self) -> None:
+        """The storage for media is empty: ids of media may be those of before."""
+        self._reporter.reset()
+        self._recorded.clear()
+        self._send_changed()
 
     def tick(self, now: float) -> float:
         self._reporter.tick(now, is_series=self._photos.is_series)
