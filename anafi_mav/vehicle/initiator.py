@@ -16,7 +16,7 @@ It is repeated for 10 s.
 """
 
 ENDS_IN_LANDING = 3.0
-"""s after the end of a return in which a landing that begins counts as its end."""
+"""s after the end of a return, or of a plan that lands, in which a landing that begins counts as its end."""
 
 
 class Initiator(enum.Enum):
@@ -37,13 +37,13 @@ class Initiators:
         """None while the drone does not return."""
         self._land_sent = -math.inf
         self._return_sent = -math.inf
-        self._returned: tuple[Initiator, float] | None = None
-        """Initiator of the return that ended last, and its end time."""
+        self._ended: tuple[Initiator, float] | None = None
+        """Initiator of the return, or of the landing plan, that ended last, and its end time."""
 
     @property
     def last_return(self) -> Initiator | None:
         """Initiator of the return that ended last; None without one."""
-        return None if self._returned is None else self._returned[0]
+        return None if self._ended is None else self._ended[0]
 
     def land_commanded(self, now: float) -> None:
         """Note that a Landing is about to be sent."""
@@ -53,16 +53,23 @@ class Initiators:
         """Note that a return is about to be commanded."""
         self._return_sent = now
 
-    def on_landing(self, now: float, *, plan_lands: bool, skycontroller: bool) -> None:
-        """Note that the drone has begun to land. `plan_lands`: its flight plan ends so."""
+    def plan_ended(self, now: float) -> None:
+        """Note that a flight plan has ended whose last line lands the drone."""
+        self._ended = Initiator.DRONE, now
+
+    def on_landing(self, now: float, *, plan_lands: bool, pilot_may_land: bool) -> None:
+        """Note that the drone has begun to land.
+
+        `plan_lands`: its flight plan ends so. `pilot_may_land`: there is a Skycontroller, and no plan that lands here.
+        """
         if now - self._land_sent <= REPORTED_WITHIN or plan_lands:
             self.landing = Initiator.CLIENT
         elif self.returning is not None:
             self.landing = self.returning
-        elif self._returned is not None and now - self._returned[1] <= ENDS_IN_LANDING:
-            self.landing = self._returned[0]
+        elif self._ended is not None and now - self._ended[1] <= ENDS_IN_LANDING:
+            self.landing = self._ended[0]
         else:
-            self.landing = Initiator.PILOT if skycontroller else Initiator.DRONE
+            self.landing = Initiator.PILOT if pilot_may_land else Initiator.DRONE
 
     def on_landing_over(self, *, unsent: bool) -> None:
         """Note that the drone does not land: it stands, or flies again.
@@ -85,6 +92,6 @@ class Initiators:
     def on_return_over(self, now: float) -> None:
         """Note that the drone does not return."""
         if self.returning is not None:
-            self._returned = self.returning, now
+            self._ended = self.returning, now
             self.returning = None
             self._return_sent = -math.inf

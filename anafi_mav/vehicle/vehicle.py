@@ -413,6 +413,9 @@ class Vehicle(Aircraft):
         if not self.on_ground or self.drone.piloting.about_to_fly:  # else it ends no flight, and none that follows
             self._initiators.land_commanded(self._clock.monotonic())
 
+    def note_plan_landing(self) -> None:
+        self._initiators.plan_ended(self._clock.monotonic())
+
     async def return_home(self, by: By) -> None:
         """Fly home by the drone's own return. A landing goes on unless `by` may end it."""
         if self.return_end.shown:
@@ -998,7 +1001,7 @@ class Vehicle(Aircraft):
             initiators.on_landing(
                 now,
                 plan_lands=self.mission.ending,
-                skycontroller=self.drone.controller.present,
+                pilot_may_land=self.drone.controller.present and not self.mission.lands_here,
             )
 
     def _note_return(self) -> None:

@@ -417,6 +417,41 @@ async def test_mission_whose_descent_precedes_its_lines_completes_without_a_paus
         assert w.commands(common.Stop.NAME) == []
 
 
+async def is_landing(w: World) -> None:
+    await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landing", 60.0)
+    await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.land)
+
+
+async def holds(w: World) -> int:
+    return int((await w.client.command(mav_enums.MAV_CMD_DO_SET_MODE, 1, 4, 3)).result)
+
+
+@pytest.mark.parametrize("late", [{}, {EXECUTED: 4.0}], ids=["", "lines late"])
+async def test_landing_of_a_mission_behind_a_skycontroller_is_ended_by_hold(late: dict[str, float]) -> None:
+    """It was taken for one by the Skycontroller's button, and no client could end it."""
+    async with world(speed=1.0, web=True, skycontroller=3) as w:
+        await put(w, [takeoff(6.0), way(9.0, 0.0, 6.0), LAND])
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=0)
+        w.drone.faults.late = late
+        await is_landing(w)
+        assert await holds(w) == mav_enums.MAV_RESULT_ACCEPTED
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 8.0)
+
+
+async def test_landing_by_button_on_the_way_of_a_mission_that_lands_is_not_ended_by_hold() -> None:
+    async with world(speed=1.0, web=True, skycontroller=3) as w:
+        await put(w, [takeoff(6.0), way(40.0, 0.0, 6.0), LAND])
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=0)
+        assert w.drone.skycontroller is not None
+        w.drone.skycontroller.press(1)
+        await is_landing(w)
+        assert await holds(w) == mav_enums.MAV_RESULT_TEMPORARILY_REJECTED
+        await said(w, "Hold refused: Skycontroller pilot is landing", since=0)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
+
+
 @pytest.mark.parametrize("late", [1.4, 2.5])
 async def test_mission_that_lands_before_its_start_is_reported_completes(late: float) -> None:
     async with world(web=True) as w:

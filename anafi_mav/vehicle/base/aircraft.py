@@ -159,6 +159,10 @@ class Aircraft(Conditions):
     def is_armed_by(self, client: Hashable) -> bool:
         """Return True when this client has armed the vehicle for the flight that begins now."""
 
+    @abstractmethod
+    def note_plan_landing(self) -> None:
+        """Note that a plan has ended that lands the drone, which may report the landing later."""
+
     @property
     def returning(self) -> bool:
         """True while the drone flies home, whether a client, the pilot or the drone began it."""

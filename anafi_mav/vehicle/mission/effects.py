@@ -101,6 +101,9 @@ class Select:
 class Release:
     """Release control: the drone hovers in mode Hold, unless it lands or returns."""
 
+    lands: bool = False
+    """The plan lands the drone, which may report that later."""
+
 
 @dataclass(frozen=True)
 class Suspend:

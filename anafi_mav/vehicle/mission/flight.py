@@ -281,6 +281,11 @@ class MissionFlight(PlainTask):
         return self.machine.ending
 
     @property
+    def lands_here(self) -> bool:
+        """True while the drone lands where its plan does, whose lines may be reported later."""
+        return self._lands and self.machine.lands_at(self._vehicle.place)
+
+    @property
     def owns_descent(self) -> bool:
         vehicle = self._vehicle
         if self.ending:
@@ -341,6 +346,8 @@ class MissionFlight(PlainTask):
                     if vehicle.control.active is not self:
                         vehicle.control.adopt(self)
                 case Release():
+                    if effect.lands:
+                        vehicle.note_plan_landing()
                     self._release()
                 case Suspend():
                     self._suspend(starting=effect.starting)

@@ -412,26 +412,41 @@ class MissionMachine:
 
         Lines may be reported after it, and the start of the file, too: until then only a landing where the file lands.
         """
-        if not self._leads_down:
+        prepared, leg = self.phase.prepared, self._file
+        if leg is None or not self._leads_down:
             return False
-        prepared = self.phase.prepared
         if self.state is not S.STARTING or prepared is None:
             return True
-        leg = prepared.course.parts[0]
-        assert isinstance(leg, FlightPlanFile), "STARTING begins a file"
         return all(_is_above(point, place) for point in way_points(leg, prepared.line))
+
+    def lands_at(self, place: GeoPoint | None) -> bool:
+        """Return True if the file that is flown, or about to be, lands at this place.
+
+        Not on the way to its last way point.
+        """
+        leg = self._file
+        if leg is None or not self._leads_down:
+            return False
+        points = [*way_points(leg)]
+        return not points or _is_above(points[-1], place)
 
     @property
     def _leads_down(self) -> bool:
         """The file that is flown, or about to be, has a landing as its last line."""
         return self._ends_in(mav_enums.MAV_CMD_NAV_LAND)
 
-    def _ends_in(self, command: int) -> bool:
-        """Return True if the file that is flown, or about to be, ends with this command."""
+    @property
+    def _file(self) -> FlightPlanFile | None:
+        """The file that is flown, or about to be."""
         leg: object = self.progress.leg if self.state in (S.FLYING_FILE, S.ENDING) else None
         if self.state is S.STARTING and self.phase.prepared is not None:
             leg = self.phase.prepared.course.parts[0]
-        return isinstance(leg, FlightPlanFile) and self.mission.items[leg.origins[-1]].command == command
+        return leg if isinstance(leg, FlightPlanFile) else None
+
+    def _ends_in(self, command: int) -> bool:
+        """Return True if the file that is flown, or about to be, ends with this command."""
+        leg = self._file
+        return leg is not None and self.mission.items[leg.origins[-1]].command == command
 
     @property
     def needs_gimbal(self) -> bool:
@@ -896,8 +911,9 @@ class MissionMachine:
             self.progress = ended
             yield from self._stop(texts.MISSION_LINK_LOST)
         elif following is None:
+            lands = self._ends_with(mav_enums.MAV_CMD_NAV_LAND)
             yield from self._complete()
-            yield Release()
+            yield Release(lands=lands)
         else:
             # When the mission is paused before the next part begins, the part before is not flown again.
             kept = progress.record(self.mission.identity)

@@ -10,7 +10,7 @@ CLIENT, DRONE, PILOT = Initiator.CLIENT, Initiator.DRONE, Initiator.PILOT
 
 
 def lands(who: Initiators, now: float = 100.0, *, plan: bool = False, skycontroller: bool = False) -> Initiator | None:
-    who.on_landing(now, plan_lands=plan, skycontroller=skycontroller)
+    who.on_landing(now, plan_lands=plan, pilot_may_land=skycontroller)
     return who.landing
 
 
@@ -27,6 +27,14 @@ def test_commanded_landing_is_the_clients(skycontroller: bool) -> None:
 
 def test_landing_ending_a_plan_is_the_clients() -> None:
     assert lands(Initiators(), plan=True, skycontroller=True) is CLIENT
+
+
+def test_landing_just_after_a_plan_that_lands_is_not_the_pilots() -> None:
+    who = Initiators()
+    who.plan_ended(99.0)
+    assert lands(who, skycontroller=True) is DRONE
+    who.on_landing_over(unsent=True)
+    assert lands(who, 103.0, skycontroller=True) is PILOT  # another landing
 
 
 @pytest.mark.parametrize(("skycontroller", "expected"), [(False, DRONE), (True, PILOT)])
