@@ -417,6 +417,20 @@ async def test_mission_whose_descent_precedes_its_lines_completes_without_a_paus
         assert w.commands(common.Stop.NAME) == []
 
 
+async def test_last_file_that_lands_before_its_start_is_reported_is_not_stopped() -> None:
+    """The mission is complete as soon as the start is reported; the gateway withdrew that start by Stop."""
+    async with world(speed=1.0, web=True) as w:
+        turn = Item(mav_enums.MAV_CMD_CONDITION_YAW, 0.0, 0.0, p1=90.0, frame=2)
+        await put(w, [takeoff(6.0), way(9.0, 0.0, 6.0), turn, LAND])
+        await start(w)
+        await state(w, ACTIVE, seq=1, since=0)
+        w.drone.faults.late = {PLAYING: 0.2, EXECUTED: 1.0}
+        await state(w, COMPLETE, since=0, timeout=60.0)
+        await lands(w)
+        assert reached(w) == [0, 1, 2, 3]
+        assert w.commands(common.Stop.NAME) == []
+
+
 async def is_landing(w: World) -> None:
     await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landing", 60.0)
     await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.land)

@@ -382,6 +382,8 @@ class MissionFlight(PlainTask):
         task = self._background
         if task is None or task.done() or task is asyncio.current_task():
             return []
+        if self.machine.state is State.COMPLETE:
+            return []  # it is about to handle the confirmed start of the last file: its withdrawal would stop the drone
         task.cancel()
         return [task]
 
