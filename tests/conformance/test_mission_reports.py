@@ -95,6 +95,16 @@ async def test_mission_that_ends_in_the_air_without_a_report_of_its_plans_end_is
         await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
 
 
+@pytest.mark.parametrize("uid", ["", "other"])
+async def test_plan_of_another_controller_is_shown_as_a_mission(uid: str) -> None:
+    """Also one that the drone reports without a name."""
+    async with world(speed=1.0) as w:
+        await w.take_off(6.0)
+        kind = common.MavlinkType.FLIGHT_PLAN
+        w.drone.inject(common.MavlinkFilePlayingStateChanged(common.PlayingState.PLAYING, uid, kind))
+        await w.client.heartbeat(lambda beat: beat.custom_mode == MISSION_MODE["px4"])
+
+
 @pytest.mark.parametrize("change", ["current item", "mission"])
 async def test_change_of_a_mission_whose_plans_end_was_not_reported_keeps_the_mode(change: str) -> None:
     """QGroundControl chooses the first item at the end."""

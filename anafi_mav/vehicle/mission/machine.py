@@ -317,8 +317,8 @@ class MissionMachine:
         self.mission = Mission()
         self.progress = MissionProgress()
         self.phase = MissionPhase(S.NO_MISSION, S.NO_MISSION)
-        self._unended = ""
-        """The plan whose last line is executed, and whose end the drone has not reported; empty: none.
+        self._unended: str | None = None
+        """The plan whose last line is executed, and whose end the drone has not reported; None: none.
 
         That is no progress of the mission, which may have been replaced since.
         """
@@ -400,7 +400,7 @@ class MissionMachine:
 
         Such a drone goes on reporting that it flies it. False once that plan is started again.
         """
-        return uid == self._unended
+        return uid is not None and uid == self._unended
 
     @property
     def leads_home(self) -> bool:
@@ -665,7 +665,7 @@ class MissionMachine:
         """
         if attempt is not None and attempt is not self.phase.attempt:
             return []
-        self._unended = ""
+        self._unended = None
         if attempt is not None:
             return self._playing(attempt)
         if uid == self.phase.plays:
@@ -704,7 +704,7 @@ class MissionMachine:
 
     def halted(self, *, stopped: bool, report: DroneReport, now: float) -> list[Effect]:
         """The drone reports its plan as paused, or as `stopped`."""
-        self.phase, self._unended = replace(self.phase, plays=None, stops=False), ""
+        self.phase, self._unended = replace(self.phase, plays=None, stops=False), None
         return self._halted(stopped=stopped, report=report, now=now)
 
     @_on(E.HALTED)
