@@ -160,6 +160,17 @@ async def test_conf_131_logs_are_erased_on_the_ground_alone(flavour: str) -> Non
         assert stored(w) == []
 
 
+async def test_conf_131_repeated_erasure_is_one_text() -> None:
+    async with world(web=True) as w:
+        add_log(w, 2.0)
+        mark = w.client.mark()
+        for _ in range(3):
+            w.client.send(dialect.MAVLink_log_erase_message(1, 1))
+        assert await entries(w.client) == [(0, 0, 0, 0, 0)]  # behind them
+        texts = [m.text for _, m in w.client.since(mark, "STATUSTEXT") if "erased" in m.text]
+        assert texts == ["Flight logs erased: 1"]
+
+
 async def test_conf_131_repeated_request_does_not_begin_the_list_again() -> None:
     async with world(web=True) as w:
         log = add_log(w, 2.0)

@@ -192,7 +192,8 @@ class LogService(Service):
         except AnafiMavError as error:
             self._explain(inbound, error)
         else:
-            self._text(inbound, texts.LOGS_ERASED.fill(count=len(logs)), Severity.INFO)
+            if logs:  # else it is a copy of the request, and would seem to have failed
+                self._text(inbound, texts.LOGS_ERASED.fill(count=len(logs)), Severity.INFO)
 
     def _first_id(self, inbound: Inbound) -> int:
         return flavour_of(inbound.channel).first_log_id
