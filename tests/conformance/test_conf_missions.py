@@ -17,6 +17,7 @@ from support.mav import Client
 from support.missions import (
     ACTIVE,
     COMPLETE,
+    CORNERS,
     LAND,
     MISSION_MODE,
     NOT_STARTED,
@@ -394,6 +395,31 @@ async def test_conf_072_repeated_set_current_starts_the_file_once(flavour: str) 
             mark = w.client.mark()
             w.client.send(chosen)
             await state(w, ACTIVE, seq=2, since=mark, timeout=0.2)
+        await state(w, COMPLETE, since=mark)
+        assert len(w.commands("common.Mavlink.Start")) == before + 1
+
+
+@pytest.mark.parametrize("flown", [False, True], ids=["ground", "air"])
+async def test_conf_072_set_current_to_home_is_answered_with_its_number(flown: bool) -> None:
+    """MAVSDK repeats MISSION_SET_CURRENT for each MISSION_CURRENT with another number than the one it has sent."""
+    async with world(flavour="ardupilot", web=True) as w:
+        speed = Item(dialect.MAV_CMD_DO_CHANGE_SPEED, 0.0, 0.0, p1=1.0, p2=3.0, p3=-1.0, frame=2)
+        await put(w, [speed, *CORNERS])  # the first item is over at once, so that the drone is never seen at it
+        if flown:
+            await start(w)
+            await state(w, ACTIVE, seq=3, since=0)
+        again = dialect.MAVLink_mission_set_current_message(1, 1, 0)
+        before, answered, place = len(w.commands("common.Mavlink.Start")), 0, w.client.mark() - 1
+        w.client.send(again)
+        while w.client.received[place := await w.client.place("MISSION_CURRENT", since=place + 1)][1].seq != 0:
+            answered += 1
+            assert answered < 20
+            w.client.send(again)
+        mark = w.client.mark()
+        w.client.send(again)  # as if it had been on its way
+        if not flown:
+            await w.client.wait("MISSION_CURRENT", lambda m: m.seq == 1, since=mark)  # the item that it begins with
+            return
         await state(w, COMPLETE, since=mark)
         assert len(w.commands("common.Mavlink.Start")) == before + 1
 

@@ -17,14 +17,14 @@ from anafi_mav.clock import NEVER
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.commands import Action, Altitude, Command, Effect, effect_of_mode
+from anafi_mav.services.commands import RESEND_WINDOW, Action, Altitude, Command, Effect, effect_of_mode
 from anafi_mav.services.flavours import Flavour, flavour_of
 from anafi_mav.services.plan.mission_kind import offset
-from anafi_mav.services.service import Host, MessageHandler, Service
+from anafi_mav.services.service import Host, MessageHandler, Service, channel_of
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused
-from anafi_mav.vehicle.base.right import Extent
+from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueSubscriptions
 from anafi_mav.vehicle.mission.machine import MAVLINK_STATES, State
@@ -47,13 +47,15 @@ RECORD = "mission"
 """Name of the record in the drone's file."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Choice:
     """One MISSION_SET_CURRENT and what became of it."""
 
     client: Hashable
     item: int
-    task: asyncio.Task[None]
+    chosen: float = -math.inf
+    """When the item became the current one; -inf: not yet, or refused."""
+    task: asyncio.Task[None] | None = None
 
 
 class MissionService(Service):
@@ -156,25 +158,50 @@ class MissionService(Service):
         A mission that is flown goes on from it: the same command repeated must not take it back.
         """
         item = command.params[0]
-        if self._flight.flying or math.isnan(item) or item == KEEP:
-            return True
-        return self._flight.machine.progress.current == _ours(int(item), command.client)
+        return math.isnan(item) or item == KEEP or self._holds(_ours(int(item), command.client))
+
+    def _holds(self, item: int) -> bool:
+        """Return False when another item is current than was chosen, and the mission is not flown."""
+        return self._flight.flying or self._flight.machine.progress.current == item
 
     def _set_current(self, inbound: Inbound) -> None:
         """MISSION_SET_CURRENT: MISSION_CURRENT answers it, or a text.
 
-        A repetition does not restart one that is under way: MAVSDK sends it every 0.5 s until it is answered.
+        A retransmission restarts nothing: MAVSDK repeats the message until MISSION_CURRENT has its number.
         """
-        client = inbound.client
-        item = _ours(inbound.message.seq, client)
+        client, number = inbound.client, inbound.message.seq
+        item, choice = _ours(number, client), self._choice
         self._sent = {}
-        choice = self._choice
-        if choice is not None and (choice.client, choice.item) == (client, item) and not choice.task.done():
-            return
-        task = self.host.run_action(
-            client, self._flight.choose(self.host.vehicle.right(client, Extent.COMMANDED), item)
+        if choice is not None and (choice.client, choice.item) == (client, item):
+            if choice.task is not None and not choice.task.done():
+                return
+            if self.host.clock.monotonic() - choice.chosen < RESEND_WINDOW and self._holds(item):
+                self._confirm(client, number)
+                return
+        choice = self._choice = _Choice(client, item)
+        choice.task = self.host.run_action(
+            client, self._carry_out(choice, number, self.host.vehicle.right(client, Extent.COMMANDED))
         )
-        self._choice = _Choice(client, item, task)
+
+    async def _carry_out(self, choice: _Choice, number: int, by: Right) -> None:
+        await self._flight.choose(by, choice.item)
+        choice.chosen = self.host.clock.monotonic()
+        self._confirm(choice.client, number)
+
+    def _confirm(self, client: Hashable, number: int) -> None:
+        """Answer a choice with its number to its sender, then send all clients the current item.
+
+        The two differ for ArduPilot's home, by which clients mean the first item, and where the drone has passed the
+        item already. MAVSDK repeats MISSION_SET_CURRENT at once for each MISSION_CURRENT with another number, without
+        end.
+        """
+        channel, vehicle = channel_of(client), self.host.vehicle
+        if channel is not None:
+            current, *same = _fields(vehicle, vehicle.mode)[flavour_of(channel).zero_home]
+            if current != number:
+                self.host.send(dialect.MAVLink_mission_current_message(number, *same), channel)
+        self._sent = {}
+        self.mission_changed()
 
     # MISSION_CURRENT and texts.
 
