@@ -580,9 +580,9 @@ async def test_fence_switched_on_without_a_boundary_is_reported() -> None:
 
 async def test_conf_076_a_motor_cut_needs_leave() -> None:
     async with world() as w:
-        value = await put(w, "GF_ACTION", 4)
-        assert value.get_type() == "PARAM_VALUE"
-        assert struct.unpack("<i", struct.pack("<f", value.param_value)) == (2,)
+        mark = w.client.mark()
+        assert value_of(await write(w.client, "GF_ACTION", 4, 6)) == 2
+        assert (await w.client.wait("PARAM_ERROR", since=mark)).error == mav_enums.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
         await said(w.client, "allow_kill")
     async with world(allow_kill=True) as w:
         value = await put(w, "GF_ACTION", 4)

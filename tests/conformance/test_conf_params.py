@@ -137,6 +137,11 @@ async def test_conf_044_parameter_set() -> None:
             ("RTL_RETURN_ALT", float("nan"), REAL32, OUT_OF_RANGE),
             ("ANF_RTH_END", 7, INT32, OUT_OF_RANGE),
             ("SYS_AUTOSTART", 0, INT32, READ_ONLY),
+            # Values of the listed range that are refused all the same.
+            ("GF_MAX_HOR_DIST", 0.5, REAL32, OUT_OF_RANGE),
+            ("RTL_LAND_DELAY", -0.5, REAL32, OUT_OF_RANGE),
+            ("MPC_XY_CRUISE", 0.05, REAL32, OUT_OF_RANGE),
+            ("GF_ACTION", 4, INT32, OUT_OF_RANGE),  # cuts the motors, without allow_kill
         ):
             mark = w.client.mark()
             send_set(w.client, name, number, kind)
@@ -167,6 +172,7 @@ async def test_conf_044_parameter_set_ardupilot() -> None:
             ("RTL_ALT", 100000.0, OUT_OF_RANGE),
             ("ANGLE_MAX", float("nan"), OUT_OF_RANGE),
             ("FRAME_CLASS", 2.0, READ_ONLY),
+            ("WPNAV_SPEED", 5.0, OUT_OF_RANGE),
         ):
             mark = w.client.mark()
             send_set(w.client, name, number, REAL32, "ardupilot")

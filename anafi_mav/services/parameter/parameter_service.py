@@ -45,7 +45,7 @@ from anafi_mav.services.parameter.parameter_table_px4 import PX4_NAMES
 from anafi_mav.services.service import Host, MessageHandler, Service
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import FlightSettings
-from anafi_mav.vehicle.base.refusal import reason_of
+from anafi_mav.vehicle.base.refusal import Refused, reason_of
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions
 
@@ -445,6 +445,9 @@ class ParameterService(Service):
             try:
                 await parameter.write(self.host, value)
             except AnafiMavError as error:
+                if isinstance(error, Refused) and error.lasting:  # the value, not the moment
+                    self._refuse(inbound, dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, error.reason)
+                    return
                 self.host.text(
                     Severity.WARNING, texts.PARAMETER_NOT_SET.fill(name=parameter.name, reason=reason_of(error))
                 )

@@ -479,7 +479,7 @@ def _move_speed(value: float) -> float | None:
     Raises `Refused` for one at which no move would end.
     """
     if 0.0 < value < SLOWEST:
-        raise Refused(texts.SPEED, texts.SPEED_RANGE.fill(slowest=SLOWEST, fastest=MAX_CRUISE_SPEED))
+        raise Refused(texts.SPEED, texts.SPEED_RANGE.fill(slowest=SLOWEST, fastest=MAX_CRUISE_SPEED), lasting=True)
     return value or None
 
 
