@@ -4,8 +4,9 @@ Parrot's own follow me (feature follow_me) looks for its target in the picture o
 MAVLink client cannot do. So the gateway follows: FOLLOW_TARGET says where the target is, the geometry is PX4's
 (parameters FLW_TGT_*), and the drone is flown there by the loop of `velocity_loop`, nose to the target.
 
-Between two messages the target goes on as it did, for `FORESIGHT` at most. Its course is that of its motion; while it
-stands the last one counts, and before the first one the drone keeps to the side of the target that it is on.
+Between two reports the target goes on as it did, for `FORESIGHT` at most; a repeated one does not prolong that. Its
+course is that of its motion; while it stands the last one counts, and before the first one the drone keeps to the side
+of the target that it is on.
 """
 
 from __future__ import annotations
@@ -99,9 +100,11 @@ class TargetFollower:
         self._place: tuple[float, float] | None = None
         self._velocity = (0.0, 0.0)
         self._at = self._heard_at = -math.inf
-        self._raw = self._mark = (0.0, 0.0)
-        """The newest reported position, and the position from which the velocity is measured."""
-        self._raw_at = self._mark_at = -math.inf
+        self._report: tuple[float, float, tuple[float, float] | None] | None = None
+        """The newest report that differs from the one before: north, east, velocity."""
+        self._mark = (0.0, 0.0)
+        """The position from which the velocity is measured."""
+        self._report_at = self._mark_at = -math.inf
         self._side: float | None = None
         """Direction (rad from north) from the target to the wanted position of the drone."""
         self._course: float | None = None
@@ -125,14 +128,17 @@ class TargetFollower:
         expected = self.target(now)
         heard_of, self.altitude = self._heard_at, altitude
         self._heard_at = now
+        is_repeated = (north, east, velocity) == self._report
+        if not is_repeated:
+            self._report, self._report_at = (north, east, velocity), now
         if self._place is None or expected is None or now - heard_of > SILENCE:
             self._begin(north, east, velocity or (0.0, 0.0), now)
-        elif velocity is None and (north, east) == self._raw:
-            # MAVSDK says the last position again, right before the next one. Said for longer, the target stands.
-            if now - self._raw_at > FORESIGHT:
+        elif is_repeated:
+            # QGroundControl and MAVSDK repeat the last report until their receiver has another one. If that takes
+            # longer, the target stands, whatever its velocity was: its receiver may have lost the satellites.
+            if now - self._report_at > FORESIGHT:
                 self._begin(north, east, (0.0, 0.0), now)
         else:
-            self._raw, self._raw_at = (north, east), now
             if velocity is None:
                 velocity = self._read_off(north, east, now)
             if velocity is not None:
@@ -150,9 +156,9 @@ class TargetFollower:
 
     def _begin(self, north: float, east: float, velocity: tuple[float, float], now: float) -> None:
         """Start with a new position and velocity; earlier ones no longer count."""
-        self._place = self._raw = self._mark = (north, east)
+        self._place = self._mark = (north, east)
         self._velocity = velocity
-        self._at = self._raw_at = self._mark_at = now
+        self._at = self._mark_at = now
 
     def _read_off(self, north: float, east: float, now: float) -> tuple[float, float] | None:
         """Return the velocity (m/s) since the last mark; None while the mark is too recent."""

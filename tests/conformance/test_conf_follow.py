@@ -128,6 +128,28 @@ async def test_a_target_that_falls_silent_is_hovered_for(flavour: str) -> None:
         assert idle_mode(flavour)
 
 
+@both
+async def test_target_whose_receiver_is_lost_stands_at_its_last_position(flavour: str) -> None:
+    """A station whose receiver has lost its satellites repeats the last position and velocity."""
+    async with world(speed=1.0, flavour=flavour) as w:
+        await w.take_off(8.0)
+        allow_speed(w)
+        assert await follow(w.client, flavour) == 0
+        began = now()
+
+        def place() -> float:
+            return 10.0 + 4.0 * (now() - began)
+
+        async with streaming(w.client, lambda: target(place(), 0.0, (4.0, 0.0)), 0.25):
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 20.0, 20.0)
+        last, mark = place(), now()
+        async with streaming(w.client, target(last, 0.0, (4.0, 0.0)), 0.25):
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] < -0.5, 20.0, since=mark)
+            turned = now()
+            await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["vn"]) < 0.02, 20.0, since=turned)
+        assert w.drone.pose.north == pytest.approx(last - 8.0, abs=1.0)
+
+
 async def test_follow_target_of_the_first_sender_leads() -> None:
     async with world(speed=1.0) as w:
         other = await w.connect(sysid=250)

@@ -82,6 +82,27 @@ def test_repeated_target_position_keeps_the_estimated_velocity() -> None:
     assert follower.target(10.0) == pytest.approx((10.5, 0.0))
 
 
+def test_target_whose_position_is_repeated_with_a_velocity_stands() -> None:
+    """QGroundControl repeats the last fix four times a second, also when its receiver has no newer one."""
+    follower = following(speed=8.0)
+    for quarter in range(1, 5):
+        follower.see(240.0, 0.0, 100.0, (8.0, 0.0), 30.0 + 0.25 * quarter)
+    assert follower.target(31.0) == pytest.approx((248.0, 0.0))
+    for quarter in range(5, 40):
+        follower.see(240.0, 0.0, 100.0, (8.0, 0.0), 30.0 + 0.25 * quarter)
+    wanted = follower.aim(232.0, 0.0, 8.0, 40.0)
+    assert wanted is not None
+    assert (wanted.x.position, wanted.x.velocity) == (pytest.approx(232.0), 0.0)
+    follower.see(242.0, 0.0, 100.0, (8.0, 0.0), 40.25)
+    assert follower.target(40.5) == pytest.approx((244.0, 0.0))
+
+
+def test_target_that_stops_at_its_last_position_stands_there() -> None:
+    follower = following()
+    follower.see(60.0, 0.0, 100.0, (0.0, 0.0), 30.5)
+    assert follower.target(31.0) == pytest.approx((60.0, 0.0))
+
+
 def test_two_positions_at_once_make_no_rocket() -> None:
     follower = TargetFollower(FollowSettings(responsiveness=0.0))
     follower.see(0.0, 0.0, None, None, 0.0)
