@@ -206,7 +206,7 @@ class Component:
             joined(service.files() for service in self.services),
             joined(service.folders() for service in self.services),
         )
-        self._handlers = joined(service.messages() for service in self.services)
+        self._handlers = chained(service.messages() for service in self.services)
         self._handlers[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self._heard
         self._denials = joined(service.denials() for service in self.services)
 
@@ -376,6 +376,23 @@ class Component:
         if inbound.now - self._denied_at.get(channel, -math.inf) >= DENIED_EVERY:
             self._denied_at[channel] = inbound.now
             self.text(Severity.WARNING, texts.ACCESS_DENIED.fill(access=channel.options.access), channel)
+
+
+def chained(tables: Iterable[Mapping[int, MessageHandler]]) -> dict[int, MessageHandler]:
+    """One table of all services' handlers; a message of several services goes to each of them."""
+    claims: dict[int, list[MessageHandler]] = {}
+    for table in tables:
+        for id, handler in table.items():
+            claims.setdefault(id, []).append(handler)
+    return {id: handlers[0] if len(handlers) == 1 else _each(handlers) for id, handlers in claims.items()}
+
+
+def _each(handlers: Sequence[MessageHandler]) -> MessageHandler:
+    def handle(inbound: Inbound) -> None:
+        for handler in handlers:
+            handler(inbound)
+
+    return handle
 
 
 def joined(tables: Any) -> dict[Any, Any]:

@@ -116,6 +116,9 @@ class Flavour:
     relative_long_regions: bool = False
     """Altitudes of regions of interest in a COMMAND_LONG count from the take-off point (ArduPilot, as MAVProxy's pull
     request 1154 says; dronekit sends them so); otherwise they are above mean sea level."""
+    station_position_leads: bool = False
+    """In mode Follow a station sends its GLOBAL_POSITION_INT as the target (QGroundControl APMFirmwarePlugin.cc,
+    ArduCopter AP_Follow.cpp); otherwise only FOLLOW_TARGET."""
     base_mode_in_custom0: bool = False
     """HIGH_LATENCY2.custom0 is HEARTBEAT.base_mode, as a signed byte."""
     first_log_id: int = 0
@@ -286,6 +289,7 @@ ARDUPILOT = Flavour(
     gimbal_keeps_horizon=True,
     loiter_command=True,
     relative_long_regions=True,
+    station_position_leads=True,
     base_mode_in_custom0=True,
     first_log_id=1,
     # ArduCopter sends home when it is set; programs take one that arrives later for news (dronekit2's own tests).

@@ -22,7 +22,7 @@ from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.preparation import Preparation
 from anafi_mav.vehicle.base.refusal import Refused
-from anafi_mav.vehicle.base.requester import By
+from anafi_mav.vehicle.base.requester import By, client_of
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import ValueInterest, ValueSubscriptions
 from anafi_mav.vehicle.base.velocity_loop import MotionEstimate, VelocityController
@@ -35,6 +35,8 @@ class Following:
 
     follower: TargetFollower
     controller: VelocityController
+    requester: Hashable
+    """Client that chose the mode; None: a part of the gateway."""
     leader: Hashable = None
     """Sender of the target that is followed; None: the drone hovers until a target appears."""
     kept_height: float | None = None
@@ -71,6 +73,11 @@ class FollowFlight(PlainTask):
         """True when the drone follows, or waits for its target."""
         return self._following is not None
 
+    @property
+    def requester(self) -> Hashable:
+        """Client that chose the mode; None in another mode."""
+        return None if self._following is None else self._following.requester
+
     async def engage(self, by: By) -> None:
         """Begin mode Follow; return when the drone hovers and waits for its target.
 
@@ -79,7 +86,9 @@ class FollowFlight(PlainTask):
         if not self._vehicle.in_air:
             raise Refused(texts.FOLLOW, texts.TAKE_OFF_FIRST)
         async with self._vehicle.control.acquire(self, by=by):
-            self._following = Following(TargetFollower(self.settings), VelocityController(self._motion()))
+            self._following = Following(
+                TargetFollower(self.settings), VelocityController(self._motion()), client_of(by)
+            )
             self._interest.switch(True)
             self._silence.set(self._clock.monotonic() + PATIENCE)
 

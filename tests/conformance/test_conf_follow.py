@@ -184,6 +184,46 @@ async def test_conf_107_denied_on_the_ground_and_without_gps(flavour: str) -> No
         await said(w.client, "Follow refused: no GPS fix")
 
 
+def position(north: float, east: float) -> Any:
+    """GLOBAL_POSITION_INT as QGroundControl sends it for an ArduPilot: its own place at the height of home."""
+    latitude, longitude = geo.destination(*HOME[:2], north, east)
+    return dialect.MAVLink_global_position_int_message(
+        0, round(latitude * 1e7), round(longitude * 1e7), round(HOME[2] * 1e3), 0, 0, 0, 0, 0
+    )
+
+
+async def test_conf_107_position_of_an_ardupilot_station_leads() -> None:
+    """The station that chose the mode leads; another one, and a system that it passes on, do not."""
+    async with world(speed=1.0, flavour="ardupilot") as w:
+        other = await w.connect(sysid=250)
+        system = Client(9, 1)
+
+        def positions() -> Any:
+            w.client.send_raw(system.pack(position(0.0, -60.0)))
+            return position(40.0, 0.0)
+
+        await w.take_off(8.0)
+        async with streaming(other, position(0.0, -80.0), 0.25):
+            assert await follow(w.client, "ardupilot") == 0
+            async with streaming(w.client, positions, 0.25):
+                await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 31.0, 30.0)
+                assert w.drone.pose.east == pytest.approx(0.0, abs=1.0)
+            mark = w.client.mark()
+            await w.client.heartbeat(lambda beat: beat.custom_mode == 17, since=mark)
+            await said(w.client, "target lost")
+
+
+async def test_position_of_a_px4_station_is_no_target() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off()
+        mark, began = w.client.mark(), now()
+        assert await follow(w.client, "px4") == 0
+        async with streaming(w.client, position(40.0, 0.0), 0.25):
+            await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, since=mark, timeout=15.0)
+        await said(w.client, "no target received", mark)
+        assert motion(w, began) == []
+
+
 async def test_where_it_may_not_fly_it_does_not_follow() -> None:
     async with world(speed=1.0) as w:
         await w.take_off()

@@ -26,7 +26,7 @@ INPUT_MESSAGES = frozenset(
         dialect.MAVLINK_MSG_ID_FOLLOW_TARGET,
     }
 )
-"""Their services ask `input_objection`."""
+"""Their services ask `input_objection`. So does mode Follow, for the position of a station."""
 
 GIMBAL_MESSAGES = frozenset(
     {

@@ -1,6 +1,7 @@
-"""Receives FOLLOW_TARGET (conformance A10, B2).
+"""Receives FOLLOW_TARGET, and positions of stations that are followed (conformance A10, B2).
 
-`vehicle.follow` computes the drone's place.
+QGroundControl sends an ArduPilot its GLOBAL_POSITION_INT instead of FOLLOW_TARGET. `vehicle.follow` computes the
+drone's place.
 """
 
 from __future__ import annotations
@@ -10,10 +11,12 @@ from collections.abc import Hashable, Mapping
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.dropped_inputs import InputStream
+from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.service import Host, MessageHandler, Service, input_objection
-from anafi_mav.services.setpoint.target_messages import sighting
+from anafi_mav.services.setpoint.target_messages import sighting, station_sighting
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.subscriptions import ValueSubscriptions
+from anafi_mav.vehicle.follow import Sighting
 
 
 class FollowService(Service):
@@ -26,17 +29,29 @@ class FollowService(Service):
         self._flight.drop = self._drop
 
     def messages(self) -> Mapping[int, MessageHandler]:
-        return {dialect.MAVLINK_MSG_ID_FOLLOW_TARGET: self._target}
+        return {
+            dialect.MAVLINK_MSG_ID_FOLLOW_TARGET: self._target,
+            dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._station,
+        }
 
     def value_subscriptions(self) -> ValueSubscriptions:
         return self._flight.value_subscriptions()
 
     def _target(self, inbound: Inbound) -> None:
-        if not self._flight.engaged:
-            return  # the message names no drone: others may follow its sender
+        if self._flight.engaged:  # else others may follow its sender: the message names no drone
+            self._receive(inbound, sighting(inbound.message))
+
+    def _station(self, inbound: Inbound) -> None:
+        """Take the position of the station that chose the mode.
+
+        Other systems on its link are no targets.
+        """
+        if self._flight.requester == inbound.client and flavour_of(inbound.channel).station_position_leads:
+            self._receive(inbound, station_sighting(inbound.message))
+
+    def _receive(self, inbound: Inbound, seen: Sighting | OperatorText) -> None:
         client, reason = inbound.client, input_objection(self.host.vehicle, inbound)
         if reason is None:
-            seen = sighting(inbound.message)
             reason = seen if isinstance(seen, OperatorText) else self._flight.receive(client, seen)
         if reason is None:
             self.host.use_input(client, InputStream.TARGET)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.setpoint.target_messages import sighting
+from anafi_mav.services.setpoint.target_messages import sighting, station_sighting
 from anafi_mav.vehicle.follow import FORESIGHT, FollowSettings, Sighting, TargetFollower
 
 NAN = math.nan
@@ -153,6 +153,15 @@ def test_follow_target_is_read() -> None:
     assert sighting(target(1)) == Sighting(48.8789, 2.3677, 40.0, None)  # MAVSDK says so, whatever its velocity field
     assert sighting(target(3)) == Sighting(48.8789, 2.3677, 40.0, (1.0, 2.0))
     assert sighting(target(1, (NAN, NAN, NAN), NAN)) == Sighting(48.8789, 2.3677, None, None)
+
+
+def test_position_of_a_station_is_read() -> None:
+    def position(vx: int, vy: int) -> Any:
+        return dialect.MAVLink_global_position_int_message(0, 488789000, 23677000, 40000, 0, vx, vy, 0, 0)
+
+    assert station_sighting(position(100, -250)) == Sighting(48.8789, 2.3677, 40.0, (1.0, -2.5))
+    assert station_sighting(position(0, 0)) == Sighting(48.8789, 2.3677, 40.0, None)  # QGroundControl's "unknown"
+    assert station_sighting(position(0, 2100)) == "moves at 21 m/s"
 
 
 @pytest.mark.parametrize(
