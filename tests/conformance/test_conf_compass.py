@@ -56,6 +56,17 @@ async def test_compass_calibration_is_cancelled_by_its_cancel_command() -> None:
         assert (await w.client.command(ACCEPT)).result == REJECTED
 
 
+async def test_repeated_start_of_a_compass_calibration_goes_on() -> None:
+    """A client sends it again when the acknowledgement is lost."""
+    async with world(flavour="ardupilot") as w:
+        mark = w.client.mark()
+        for _ in range(2):
+            assert (await w.client.command(START)).result == ACCEPTED
+        report = await w.client.wait("MAG_CAL_REPORT", since=mark, timeout=20.0)
+        assert report.cal_status == dialect.MAG_CAL_SUCCESS
+        assert asked(w) == [1]
+
+
 async def test_compass_calibration_forbids_arming_until_it_is_ended() -> None:
     async with world(flavour="ardupilot", speed=1.0) as w:
         mark = w.client.mark()

@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 
 from anafi_mav import texts
 from anafi_mav.drone.events import CalibrationAxis, MagnetoCalibrationStateChanged, Message
@@ -76,16 +76,19 @@ class CalibrationService(Service):
         """Run MAV_CMD_PREFLIGHT_CALIBRATION for the magnetometer or the gimbal's horizon.
 
         param2 1: magnetometer; param5 2: horizon. With all parameters 0 the calibration under way ends; in the air
-        there is none, and what flies is not disturbed. The command ends with the calibration: ACCEPTED when the drone
-        reports that it has succeeded.
+        there is none, and what flies is not disturbed. The horizon's command ends with its calibration: ACCEPTED when
+        the drone reports that it has succeeded.
         """
         values = [0.0 if math.isnan(value) else value for value in (*command.params, command.x, command.y, command.z)]
         wanted = {index: value for index, value in enumerate(values, 1) if value != 0.0}
         if not wanted:
             if self.host.vehicle.on_ground:
-                await self._acquire(command, maintenance(texts.CALIBRATION, Needs.NONE))  # ends the one that runs
+                # The acknowledgement precedes the text, as PX4's does: MAVSDK locks its texts until it arrives, and
+                # would hang.
+                ending = self._acquire(command, maintenance(texts.CALIBRATION, Needs.NONE))
+                self.host.run_action(command.client, ending)
         elif wanted == {2: _MAGNETOMETER}:
-            await self._on_ground(command, texts.CALIBRATION, self._magnetometer)
+            await self._magnetometer(command)
         elif wanted == {5: _HORIZON}:
             await self._on_ground(command, texts.CALIBRATION, self._gimbal)
         else:
@@ -102,11 +105,11 @@ class CalibrationService(Service):
         async with self.host.vehicle.control.acquire(task, by=command.right):
             pass
 
-    async def _run(self, name: str, work: Callable[[], Awaitable[None]], undo: Callable[[], Awaitable[object]]) -> None:
-        """Run one calibration and send its texts; undo it when it fails or is cancelled."""
-        self._say(texts.CAL_STARTED.fill(version=VERSION, name=name))
+    @contextlib.asynccontextmanager
+    async def _reported(self, undo: Callable[[], Awaitable[object]]) -> AsyncIterator[None]:
+        """Send the text of a calibration that fails or is cancelled, and undo it."""
         try:
-            await work()
+            yield
         except asyncio.CancelledError:
             self._say(texts.CAL_CANCELLED)
             await self._undone(undo)
@@ -115,25 +118,38 @@ class CalibrationService(Service):
             self.host.text(Severity.ERROR, texts.CAL_FAILED.fill(error=error))
             await self._undone(undo)
             raise
-        self._say(texts.CAL_DONE.fill(name=name))
 
     @staticmethod
     async def _undone(undo: Callable[[], Awaitable[object]]) -> None:
         with contextlib.suppress(AnafiMavError):  # no client waits for it, and the drone reports its state
             await undo()
 
-    async def _magnetometer(self) -> None:
+    async def _magnetometer(self, command: Command) -> None:
+        """Start the calibration; ACCEPTED when the drone waits to be turned, as in PX4.
+
+        The texts report the rest. QGroundControl and MAVSDK send a command only when the one before with its number is
+        answered, and the one that cancels has the same number.
+        """
+        await self._acquire(command, maintenance(texts.CALIBRATION))
         element = self.host.drone.calibration
-
-        async def turn() -> None:
+        self._say(texts.CAL_STARTED.fill(version=VERSION, name="mag"))
+        async with self._reported(element.abort_magnetometer):
             await element.start_magnetometer()
-            watching = self.host.spawn(self._watch_axes())
-            try:
-                await element.magnetometer_done()
-            finally:
-                watching.cancel()
+        self.host.run_action(command.client, self._turn())
 
-        await self._run("mag", turn, element.abort_magnetometer)
+    async def _turn(self) -> None:
+        """Report the calibration of the magnetometer to its end.
+
+        A newer command ends it on the drone, too.
+        """
+        element = self.host.drone.calibration
+        watching = self.host.spawn(self._watch_axes())
+        try:
+            async with self._reported(element.abort_magnetometer):
+                await element.magnetometer_done()
+        finally:
+            watching.cancel()
+        self._say(texts.CAL_DONE.fill(name="mag"))
 
     async def _watch_axes(self) -> None:
         """Send the direction to turn, the finished axes and the progress, whenever one changes.
@@ -171,7 +187,10 @@ class CalibrationService(Service):
 
     async def _gimbal(self) -> None:
         gimbal = self.host.drone.gimbal
-        await self._run("level", gimbal.calibrate, gimbal.cancel_calibration)
+        self._say(texts.CAL_STARTED.fill(version=VERSION, name="level"))
+        async with self._reported(gimbal.cancel_calibration):
+            await gimbal.calibrate()
+        self._say(texts.CAL_DONE.fill(name="level"))
 
     async def _reboot(self, command: Command) -> None:
         """MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: param1 1.

@@ -225,8 +225,11 @@ class CommandService(Service):
         is_order: bool = True,
         group: ActionGroup = ActionGroup.FLIGHT,
     ) -> asyncio.Task[None]:
-        """Run an action of a message that has no acknowledgement; its refusal is sent as a text."""
-        if group is ActionGroup.FLIGHT:
+        """Run an action of a message that has no acknowledgement; its refusal is sent as a text.
+
+        Or the rest of a command that is acknowledged: it calls from its own action.
+        """
+        if group is ActionGroup.FLIGHT and self._all.actions.current is None:
             self._all.forget(client)  # it used other means than its newest command
         running = RunningAction(client, is_order, flies=group is ActionGroup.FLIGHT, group=group)
         task = self._spawn(self._explained(work), running)
