@@ -80,6 +80,18 @@ async def test_conf_129_calibration_of_the_compass_is_cancelled() -> None:
         await w.drone.wait_log(lambda e: e.kind == "command" and e.name == asked and e.args["calibrate"] == 0)
 
 
+async def test_refused_calibration_is_no_failure_of_another_clients() -> None:
+    async with world() as w:
+        other = await w.connect(sysid=250)
+        mark, failed = w.client.mark(), "[cal] calibration failed: only compass and gimbal"
+        assert (await w.client.command(CALIBRATE, 0, 1, 0, 0, **MAGNETOMETER)).result == ACCEPTED
+        refused = other.mark()
+        assert (await other.command(CALIBRATE, 1, 0, 0, 0, **MAGNETOMETER)).result == DENIED
+        await other.wait("STATUSTEXT", lambda m: m.text == failed, since=refused)
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "[cal] calibration done: mag", since=mark, timeout=20.0)
+        assert failed not in texts(w, mark)
+
+
 async def test_repeated_calibration_of_the_compass_goes_on() -> None:
     """MAVSDK sends it again when the acknowledgement is lost."""
     async with world() as w:

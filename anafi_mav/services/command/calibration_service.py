@@ -92,8 +92,10 @@ class CalibrationService(Service):
         elif wanted == {5: _HORIZON}:
             await self._on_ground(command, texts.CALIBRATION, self._gimbal)
         else:
-            # MAVSDK takes a refusal alone for a success; it believes the texts.
-            self.host.text(Severity.ERROR, texts.CAL_FAILED.fill(error=texts.CALIBRATIONS))
+            # MAVSDK takes a refusal alone for a success; it believes the texts. Another client would take the text for
+            # the end of its own calibration.
+            channel = command.client[0] if isinstance(command.client, tuple) else None
+            self.host.text(Severity.ERROR, texts.CAL_FAILED.fill(error=texts.CALIBRATIONS), channel)
             raise Refused(texts.CALIBRATION, texts.CALIBRATIONS, lasting=True)
 
     async def _on_ground(self, command: Command, what: Subject, work: Work) -> None:
