@@ -28,6 +28,10 @@ HTTP_PORT = 80
 ANSWER_LIMIT = 1 << 24
 """Bytes of an answer that is read as a whole: the list of ten thousand media is a third of it."""
 
+JSON_LIMIT = 1 << 20
+"""Bytes of an answer that is decoded in the event loop, which controls all drones: the worst content takes 0.1 s. A
+media with a thousand files is half of it."""
+
 ANSWER_TIMEOUT = 10.0
 """s for an answer, and between two pieces of a file: the drone reads a slow card."""
 
@@ -128,8 +132,8 @@ class Rest:
         query: Mapping[str, str] | None = None,
         work: float = 0.0,
     ) -> Any:
-        """The answer to a question, decoded; None for an empty one. `work` as in `read`."""
-        body = await self.read(method, path, data, query, work=work)
+        """Return the decoded answer to a request; None for an empty one. `work` as in `read`."""
+        body = await self.read(method, path, data, query, JSON_LIMIT, work)
         if not body:
             return None
         try:

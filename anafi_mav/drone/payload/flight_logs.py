@@ -10,17 +10,18 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import AsyncGenerator, Callable
-from contextlib import aclosing, suppress
+from contextlib import aclosing
 from pathlib import Path
 from typing import NamedTuple
 
 import msgspec
 
 from anafi_mav.drone.expectation import Commander, loop_time
+from anafi_mav.drone.payload.item_list import decode_items
 from anafi_mav.drone.payload.media_file import Resource, fetch, file_name
 from anafi_mav.drone.payload.media_reader import MediaReader
-from anafi_mav.drone.rest import UNREADABLE, NotFound, Rest
-from anafi_mav.errors import NotSupported, RemoteProtocolError
+from anafi_mav.drone.rest import JSON_LIMIT, NotFound, Rest
+from anafi_mav.errors import NotSupported
 
 log = logging.getLogger("anafi_mav")
 
@@ -68,17 +69,9 @@ _LOG = msgspec.json.Decoder(FlightLog, strict=False)
 
 def _logs(body: bytes) -> tuple[list[FlightLog], int]:
     """Return the logs of a list, and how many are left out. Raises `RemoteProtocolError`."""
-    try:
-        parts = msgspec.json.decode(body, type=list[msgspec.Raw])
-    except UNREADABLE as error:
-        raise RemoteProtocolError("the drone's list of flight logs is not readable") from error
-    logs = []
-    for part in parts:
-        with suppress(*UNREADABLE):
-            found = _LOG.decode(part)
-            if found.size and found.file.is_usable:
-                logs.append(found)
-    return logs, len(parts) - len(logs)
+    received, unreadable = decode_items(body, _LOG, "flight logs")
+    logs = [found for found in received if found.size and found.file.is_usable]
+    return logs, unreadable + len(received) - len(logs)
 
 
 class FlightLogs:
@@ -115,7 +108,7 @@ class FlightLogs:
 
     async def _request(self) -> tuple[FlightLog, ...]:
         try:
-            logs, dropped = _logs(await self._rest.read("GET", API))
+            logs, dropped = _logs(await self._rest.read("GET", API, limit=JSON_LIMIT))
         except NotFound as error:
             raise NotSupported("flight logs") from error
         if dropped:

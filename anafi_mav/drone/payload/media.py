@@ -23,6 +23,7 @@ from anafi_mav.arsdk.messages import mediastore
 from anafi_mav.arsdk.messages.mediastore import MediastoreState
 from anafi_mav.drone.element import Reducer
 from anafi_mav.drone.expectation import Commander
+from anafi_mav.drone.payload.item_list import decode_items
 from anafi_mav.drone.payload.media_file import Place as Place
 from anafi_mav.drone.payload.media_file import Resource as Resource
 from anafi_mav.drone.payload.media_file import fetch, file_name
@@ -120,20 +121,10 @@ def _items(body: bytes) -> tuple[tuple[MediaItem, ...], int]:
 
     Decoded one by one, so that a thread does it beside the event loop. Raises `RemoteProtocolError`.
     """
-    items, dropped = [], 0
-    try:
-        parts = msgspec.json.decode(body, type=list[msgspec.Raw])
-    except UNREADABLE as error:
-        raise RemoteProtocolError("the drone's list of media is not readable") from error
-    for part in parts:
-        try:
-            received = _ITEM.decode(part)
-        except UNREADABLE:
-            dropped += 1
-        else:
-            items.append(_usable(received))
-            dropped += len(received.resources) - len(items[-1].resources)
-    return tuple(items), dropped
+    received, dropped = decode_items(body, _ITEM, "media")
+    items = tuple(map(_usable, received))
+    dropped += sum(len(item.resources) for item in received) - sum(len(item.resources) for item in items)
+    return items, dropped
 
 
 class MediaClient:

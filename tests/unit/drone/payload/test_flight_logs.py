@@ -11,6 +11,8 @@ from aiohttp import web
 from support.simulated import connected
 from support.web_answers import serving
 
+from anafi_mav.drone.payload.item_list import MAX_ITEMS
+from anafi_mav.drone.rest import JSON_LIMIT
 from anafi_mav.errors import CommandRejected, LinkLost, NotSupported, RemoteProtocolError
 
 DATE = "20261121T101112+0100"
@@ -70,6 +72,13 @@ async def test_log_that_is_not_readable_is_left_out(caplog: pytest.LogCaptureFix
 async def test_list_that_is_not_readable_is_an_error(body: bytes) -> None:
     async with serving(lite_records=web.Response(body=body)) as (drone, _):
         with pytest.raises(RemoteProtocolError, match="list of flight logs"):
+            await drone.flight_logs.list()
+
+
+@pytest.mark.parametrize("body", [b"[" + b"0," * MAX_ITEMS + b"0]", b" " * JSON_LIMIT + b"[]"])
+async def test_list_that_would_stop_the_event_loop_is_refused(body: bytes) -> None:
+    async with serving(lite_records=web.Response(body=body)) as (drone, _):
+        with pytest.raises(RemoteProtocolError, match=f"length <= {MAX_ITEMS}|more than {JSON_LIMIT} bytes"):
             await drone.flight_logs.list()
 
 

@@ -19,9 +19,10 @@ from anafi_mav.arsdk.messages.mediastore import MediastoreState
 from anafi_mav.drone import Drone
 from anafi_mav.drone.payload.camera_enums import CameraMode, PhotoFile, PhotoMode
 from anafi_mav.drone.payload.camera_state import PhotoSettings
+from anafi_mav.drone.payload.item_list import MAX_ITEMS
 from anafi_mav.drone.payload.media import MediaItem, Notification, Resource
 from anafi_mav.drone.payload.media_index import SORTED_IN_LOOP, MediaIndex
-from anafi_mav.drone.rest import MUX_RANGE, Rest
+from anafi_mav.drone.rest import JSON_LIMIT, MUX_RANGE, Rest
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
 
 
@@ -269,6 +270,18 @@ async def test_an_answer_without_measure(monkeypatch: pytest.MonkeyPatch) -> Non
     async with serving(medias=web.Response(body=b" " * 1001)) as (drone, _):
         with pytest.raises(RemoteProtocolError, match="1000"):
             await drone.media.list()
+
+
+async def test_list_of_too_many_items_is_refused() -> None:
+    async with serving(medias=web.Response(body=b"[" + b"0," * MAX_ITEMS + b"0]")) as (drone, _):
+        with pytest.raises(RemoteProtocolError, match=f"length <= {MAX_ITEMS}"):
+            await drone.media.list()
+
+
+async def test_answer_that_would_stop_the_event_loop_is_refused() -> None:
+    async with serving(f5=web.Response(body=b'{"media_id": "5"}' + b" " * JSON_LIMIT)) as (drone, _):
+        with pytest.raises(RemoteProtocolError, match=f"more than {JSON_LIMIT} bytes"):
+            await drone.media.get("5")
 
 
 async def test_a_copy_that_is_not_what_the_drone_has(tmp_path: Path) -> None:
