@@ -983,8 +983,12 @@ class Vehicle(Aircraft):
         await self.control.perform(self._stay())
 
     async def _stay(self) -> None:
-        """Hover, or stay on the ground."""
-        rising, hover = self.drone.piloting.about_to_fly, Hover()
+        """Hover, or stay on the ground.
+
+        A drone whose motors start by a command of this program is landed: it would rise and hover without a program.
+        """
+        piloting, hover = self.drone.piloting, Hover()
+        rising = piloting.about_to_fly or (self.may_rise and piloting.has_launched)
         rules = replace(hover.rules, start=Preparation.AS_IT_IS) if rising else None
         async with self.control.acquire(hover, by=Source.GATEWAY, rules=rules):
             if rising:

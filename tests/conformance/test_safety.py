@@ -575,6 +575,18 @@ async def test_end_of_the_gateway_lands_a_takeoff_that_the_drone_has_not_receive
         assert w.drone.flying_state.name == "LANDED"
 
 
+async def test_end_of_the_gateway_lands_a_drone_that_starts_its_motors() -> None:
+    async with world(speed=1.0) as w:
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        mark = w.client.mark()
+        w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
+        await being_tried(w.client, mark, TAKEOFF_CMD)
+        await w.drone.wait_log(lambda e: w.drone.flying_state.name == "MOTOR_RAMPING", 5.0)
+        await w.gateway.close()
+        await watched(10.0)
+        assert w.drone.flying_state.name == "LANDED"
+
+
 # Values that no one foresaw.
 
 
