@@ -67,6 +67,8 @@ def reduce_offer(offer: str, sps: bytes) -> ReducedOffer:
         raise OfferError(f"expected {_PROTOCOL}")
     if "a=sendonly" in lines or "a=inactive" in lines:
         raise OfferError("expected an offer to receive")
+    if not any(line.startswith("a=fingerprint:") for line in lines):
+        raise OfferError("expected the fingerprint of a certificate")
     stream = f"{sps[1]:02x}{sps[2]:02x}{sps[3]:02x}" if len(sps) > 3 else PLAIN_PROFILE
     codec = _choose(_codecs(lines, parts[3:]), stream)
     again = _retransmission(lines, codec.payload_type)
