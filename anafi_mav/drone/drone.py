@@ -410,12 +410,14 @@ class Drone:
         """Keep the facts that distinguish another controller's handshake from other losses.
 
         Such a handshake silences us. The one connection of a Skycontroller 4 is closed by it. A Skycontroller that
-        loses its drone, and a drone that is switched off, do not count as one.
+        loses its drone, and a drone that is switched off, do not count as one. Neither does one that was never heard
+        after the handshake: its UDP does not arrive here.
         """
         self.last_heard = session.last_received
         known = self._dismissed in (common.DisconnectionCause.OFF_BUTTON, common.DisconnectionCause.RESET_FACTORY)
         closed = session.closed_by_peer and isinstance(session, mux_link.MuxControllerSession)
-        self.may_be_displaced = not known and (silent or closed or self._dismissed is not None)
+        is_silenced = silent and session.has_received
+        self.may_be_displaced = not known and (is_silenced or closed or self._dismissed is not None)
 
     def _on_dismissal(self, message: common.Disconnection, now: float) -> None:
         self._dismissed = message.cause

@@ -12,7 +12,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.fault_scenarios import GOTO, goto, watched
 from support.mav import Client
-from support.world import World, loopback, world
+from support.world import HOME, World, loopback, world
 
 from anafi_mav.arsdk.link import controller
 from anafi_mav.arsdk.messages import common
@@ -20,6 +20,8 @@ from anafi_mav.config import Config, DroneConfig
 from anafi_mav.drone.contention import SHORT
 from anafi_mav.errors import LinkLost
 from anafi_mav.gateway import Gateway
+from anafi_mav.sim import DroneSpec, Simulator
+from anafi_mav.sim.world.faults import Impairment
 
 TAKEN = "Drone connected to another controller"
 
@@ -142,6 +144,27 @@ async def test_bad_radio_twice_is_no_second_controller_with_a_long_connection_be
                 await w.drone.wait_log(lambda e: (e.kind, e.name) == ("session", "up"), 10.0, since=mark)
                 await w.client.heartbeat(lambda beat: True, timeout=10.0)
         assert TAKEN not in [m.text for _, m in w.client.since(0, "STATUSTEXT")]
+
+
+async def test_drone_that_is_never_heard_after_its_handshake_is_no_second_controller() -> None:
+    """Its answers by UDP do not arrive: a gateway that stayed away would miss the moment at which they do."""
+    address, local = loopback(), loopback()
+    spec = DroneSpec(model="4k", address=address, home=HOME, http_port=None, rtsp_port=None)
+    config = Config(
+        endpoints=(f"tcpin://{local}:5760",), drones=(DroneConfig(name="alpha", sysid=1, address=address),), video=False
+    )
+    async with Simulator([spec], speed=1.0, seed=1) as simulator:
+        drone, client = simulator.drones[0], Client()
+        drone.faults.down = Impairment(loss=1.0)
+        async with Gateway(config):
+            await client.connect(5760, local)
+            for _ in range(3):
+                mark = now()
+                await drone.wait_log(lambda e: (e.kind, e.name) == ("session", "up"), 15.0, since=mark)
+            drone.faults.down = Impairment()
+            await client.heartbeat(lambda beat: True, timeout=10.0)
+            assert TAKEN not in [m.text for _, m in client.since(0, "STATUSTEXT")]
+            await client.close()
 
 
 @pytest.mark.parametrize(

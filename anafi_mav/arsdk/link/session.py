@@ -140,6 +140,11 @@ class Session(asyncio.DatagramProtocol):
         return self._transport.last_received
 
     @property
+    def has_received(self) -> bool:
+        """True once the peer has sent anything but acknowledgements and pings."""
+        return self._transport.has_received
+
+    @property
     def round_trip(self) -> RoundTrip:
         """Measured while sticks are sent."""
         return self._transport.round_trip

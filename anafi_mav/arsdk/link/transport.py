@@ -258,6 +258,11 @@ class Transport:
         return self._last_received
 
     @property
+    def has_received(self) -> bool:
+        """True once the peer has sent anything but acknowledgements and pings."""
+        return bool(self._last_seq)
+
+    @property
     def silent(self) -> bool:
         """The peer has not been heard for too long, and commands are dropped."""
         return self._silent
