@@ -92,8 +92,9 @@ class RtspClient:
         return response
 
     async def close(self) -> None:
-        """End the connection. Idempotent."""
+        """End the connection, whether the server reads what is left or not. Idempotent."""
         self._end(LinkLost("closed"))
+        self._writer.transport.abort()
         self._task.cancel()
         await asyncio.wait({self._task})
 

@@ -22,6 +22,7 @@ from anafi_mav.arsdk.video.video_metadata import PROTO_PROFILE, V3_PROFILE, Quat
 from anafi_mav.drone import Drone
 from anafi_mav.drone.video import stream as stream_module
 from anafi_mav.drone.video import video as video_module
+from anafi_mav.drone.video.rtsp_client import RtspClient
 from anafi_mav.drone.video.video import VideoFrame, VideoState
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
 from anafi_mav.sim import DroneSpec, Simulator
@@ -362,6 +363,25 @@ async def test_requests_of_the_rtsp_server_are_answered() -> None:
 
 
 # -- the link
+
+
+async def test_connection_to_a_server_that_asks_and_does_not_read_is_closed() -> None:
+    """Our answers fill the buffers: a socket that waited until they are read would be left open at each attempt."""
+    reset = asyncio.Event()
+
+    async def ask_without_end(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        with suppress(ConnectionError):
+            while True:
+                writer.write(b"OPTIONS * RTSP/1.0\r\nCSeq: 1\r\n\r\n" * 1000)
+                await writer.drain()
+        reset.set()
+
+    server = await asyncio.start_server(ask_without_end, "127.0.0.1", 0, limit=1024)
+    client = await RtspClient.connect(*server.sockets[0].getsockname())
+    assert await asyncio.wait_for(client.ended, 20.0) == "the drone's video server asks and does not listen"
+    await client.close()
+    await asyncio.wait_for(reset.wait(), 20.0)
+    server.close()
 
 
 async def test_nothing_of_it_survives_the_link() -> None:
