@@ -139,6 +139,6 @@ class FlightLogs:
         """Delete a log on the drone."""
         self._commander.require_link()
         try:
-            await self._rest.json("DELETE", f"{API}/{file_name(log.name)}")
+            await self._rest.read("DELETE", f"{API}/{file_name(log.name)}")
         finally:
             self._listed = None

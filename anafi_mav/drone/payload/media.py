@@ -200,15 +200,15 @@ class MediaClient:
 
     async def delete(self, media_id: str) -> None:
         """Delete a media with all its files."""
-        await self._rest.json("DELETE", f"{API}/medias/{file_name(media_id)}")
+        await self._rest.read("DELETE", f"{API}/medias/{file_name(media_id)}")
 
     async def delete_resource(self, resource_id: str) -> None:
         """Delete one file."""
-        await self._rest.json("DELETE", f"{API}/resources/{file_name(resource_id)}")
+        await self._rest.read("DELETE", f"{API}/resources/{file_name(resource_id)}")
 
     async def delete_all(self) -> None:
         """Delete all media."""
-        await self._rest.json("DELETE", f"{API}/medias")
+        await self._rest.read("DELETE", f"{API}/medias")
 
     @asynccontextmanager
     async def listen(self) -> AsyncIterator[AsyncIterator[Notification]]:
@@ -330,18 +330,27 @@ class Media(Commanding[MediaState]):
 
     async def delete(self, media_id: str) -> None:
         """Delete a media with all its files."""
-        await self._available().delete(media_id)
-        self._index.changed()
+        client = self._available()
+        try:
+            await client.delete(media_id)
+        finally:
+            self._index.changed()
 
     async def delete_resource(self, resource_id: str) -> None:
         """Delete one file."""
-        await self._available().delete_resource(resource_id)
-        self._index.changed()
+        client = self._available()
+        try:
+            await client.delete_resource(resource_id)
+        finally:
+            self._index.changed()
 
     async def delete_all(self) -> None:
         """Delete all media."""
-        await self._available().delete_all()
-        self._index.changed()
+        client = self._available()
+        try:
+            await client.delete_all()
+        finally:
+            self._index.changed()
 
     # -- news
 

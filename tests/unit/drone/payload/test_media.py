@@ -181,6 +181,24 @@ async def test_list_requested_after_a_deletion_is_not_an_older_one() -> None:
     assert (await after).file("1.JPG") is None
 
 
+async def test_failed_deletion_forgets_the_listing() -> None:
+    """The drone may have deleted the file, or some of the files, all the same."""
+    async with serving(f5=web.Response(status=500), medias=json_answer([])) as (drone, _):
+        for delete in (drone.media.delete, drone.media.delete_resource):
+            await drone.media.listing()
+            assert drone.media.kept_listing is not None
+            with pytest.raises(CommandRejected, match="500"):
+                await delete("5")
+            assert drone.media.kept_listing is None
+
+
+async def test_answer_to_a_deletion_need_not_be_json() -> None:
+    async with serving(f5=web.Response(body=b"deleted"), medias=web.Response(body=b"deleted")) as (drone, _):
+        await drone.media.delete("5")
+        await drone.media.delete_resource("5")
+        await drone.media.delete_all()
+
+
 async def test_missing_md5_differs_from_failed_md5_request() -> None:
     answers = {
         "path": json_answer({"md5": "../../x"}),
