@@ -38,6 +38,7 @@ from support.fault_scenarios import (
     watched,
 )
 from support.mav import NAN, Client
+from support.params import write
 from support.world import HOLD, HOME, LAND, OFFBOARD, RETURN, World, world
 
 from anafi_mav import geo, mav_enums
@@ -582,6 +583,17 @@ async def test_end_of_the_gateway_lands_a_drone_that_starts_its_motors() -> None
         w.client.send_command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)
         await being_tried(w.client, mark, TAKEOFF_CMD)
         await w.drone.wait_log(lambda e: w.drone.flying_state.name == "MOTOR_RAMPING", 5.0)
+        await w.gateway.close()
+        await watched(10.0)
+        assert w.drone.flying_state.name == "LANDED"
+
+
+async def test_end_of_the_gateway_stops_the_motors_of_a_drone_in_a_hand() -> None:
+    """A throw after it would be a take-off without a program."""
+    async with world(speed=1.0) as w:
+        await write(w.client, "ANF_HAND_LAUNCH", 1, dialect.MAV_PARAM_TYPE_INT32)
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        assert w.drone.flying_state.name == "USERTAKEOFF"
         await w.gateway.close()
         await watched(10.0)
         assert w.drone.flying_state.name == "LANDED"
