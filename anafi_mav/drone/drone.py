@@ -480,6 +480,8 @@ class Drone:
             try:
                 address, port = await session.open_tcp("drone", self._http_port)
             except LinkLost as error:
+                if session.lost.done():
+                    raise LinkLost(session.lost.result()) from error
                 log.warning("%s: no web server: %s", self.name, error)
             else:
                 await self._rest.aim(address, port, is_behind_mux=True)

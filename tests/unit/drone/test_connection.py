@@ -14,6 +14,7 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import drone_manager
 from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState
 from anafi_mav.arsdk.messages.proto import device_manager
+from anafi_mav.arsdk.mux import mux
 from anafi_mav.drone import CommandTimeout, Drone, FlyingState, LinkLost, LocalProtocolError, connect
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
 
@@ -263,3 +264,28 @@ async def test_port_out_of_range_is_an_error_of_the_program(name: str, port: int
     with pytest.raises(LocalProtocolError, match=rf"expected a port from 1 to 65535, got {port}"):
         async with connect(loopback(), **{name: port}):
             pass
+
+
+async def test_skycontroller_4_that_falls_silent_after_its_handshake_is_a_lost_link_with_its_reason() -> None:
+    found: list[tuple[str, mux.Argument]] = [("%s", "ANAFI"), ("%u", 0x0914), ("%s", "PI040416AA0A000001")]
+    accepted: list[tuple[str, mux.Argument]] = [("%d", 0), ("%s", '{"proto_v": 1}')]
+
+    async def fall_silent(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        for channel, id, arguments in (
+            (mux.DISCOVERY, mux.DEVICE_ADDED, found),
+            (mux.BACKEND, mux.CONN_RESP, accepted),
+        ):
+            received = b""
+            while b"POMP" not in received:  # the request for it
+                received += await reader.readexactly(1)
+            writer.write(mux.encode_frame(channel, mux.encode_pomp(id, arguments)))
+        while await reader.read(4096):
+            pass
+        writer.close()
+
+    address = loopback()
+    async with await asyncio.start_server(fall_silent, address, mux.PORT):
+        drone = Drone(address)
+        with pytest.raises(LinkLost, match="nothing received"):
+            await drone.connect()
+        await drone.close()
