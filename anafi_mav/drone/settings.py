@@ -3,7 +3,7 @@
 A drone answers a setting with an event that carries the value it now has: the one asked for, one clamped to its range,
 or the old one when it did not want the new. There is no other answer, so that the event's value is the result of the
 verb. Another value than the one asked for is the result if no event with that one follows. A setting that the drone did
-not report when it connected does not exist: `NotSupported`.
+not report when it connected does not exist: `NotSupported`. `Commanding._change` is the only place with these rules.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from typing import Any, TypeAlias, TypeVar
 import msgspec
 
 from anafi_mav.arsdk.codec.wire import Message
-from anafi_mav.drone.element import Element, StateT
+from anafi_mav.drone.element import Element, Range, StateT, setting
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation
-from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
-from anafi_mav.units import is_finite
+from anafi_mav.errors import AnafiMavError, CommandRejected, LocalProtocolError, NotSupported
+from anafi_mav.units import clip, is_finite
 
 T = TypeVar("T")
 
 Question: TypeAlias = tuple[Message, type[Message], Callable[[Any], bool | None]]
 """Something to ask after connecting: the question, the kind of event that answers it, and its judge."""
 
-KEPT_AFTER = 0.5
-"""s until an answer with another value than the wanted one counts, after it and the drone's receipt of the change: the
-drone may have sent that event before."""
+ANSWERED_WITHIN = 1.5
+"""s after the drone's receipt of a change in which it has answered. Events may be a second late, and need a few
+retransmissions of 150 ms."""
 
 REPEAT = 0.5
 """s after which an unacknowledged target is sent again while no event shows its effect.
@@ -62,6 +62,16 @@ def is_same(one: object, other: object) -> bool:
     return one == other
 
 
+def same_as(value: T) -> Callable[[T], bool]:
+    """Return the check for this value."""
+    return lambda result: is_same(result, value)
+
+
+def is_limited(setting: Range, wanted: float) -> bool:
+    """Return True for the wanted value, or the end of the setting's range that is nearest to it."""
+    return is_same(setting.current, float(clip(wanted, setting.min, setting.max)))
+
+
 class Commanding(Element[StateT]):
     """An element that sends commands."""
 
@@ -83,79 +93,53 @@ class Commanding(Element[StateT]):
 
     async def _change(
         self,
-        command: Message,
+        command: Message | Callable[[], Message],
         answer: type[Message],
         judge: Callable[[Any], T | AnafiMavError | None],
-        timeout: float = ANSWER_TIMEOUT,
+        is_wanted: Callable[[T], bool] = lambda result: True,
         *,
-        stops: bool = False,
-        wanted: T | None = None,
-        is_done: Callable[[T], bool] | None = None,
-    ) -> T:
-        """Send a setting and return what the judge makes of its answer.
-
-        `stops`: it ends something that goes on. `wanted`: another result counts if this one does not follow; or one for
-        which `is_done` is True.
-        """
-        async with self._setting_lock(answer):
-            return await self._answered(
-                command,
-                answer,
-                judge,
-                is_done or (lambda result: wanted is None or is_same(wanted, result)),
-                timeout,
-                stops=stops,
-                is_setting=not stops,
-            )
-
-    async def _answered(
-        self,
-        command: Message,
-        answer: type[Message],
-        judge: Callable[[Any], T | AnafiMavError | None],
-        is_done: Callable[[T], bool],
         timeout: float = ANSWER_TIMEOUT,
-        *,
         stops: bool = False,
-        is_setting: bool = False,
+        silence: AnafiMavError | None = None,
     ) -> T:
-        """Send a change and return the judge's result.
+        """Send a change and return the judge's result of its answer.
 
-        One that is not done counts if no other follows.
+        Changes with the same kind of answer are sent one after the other. A result counts at once if `is_wanted`.
+        Another one counts `ANSWERED_WITHIN` after the drone's receipt of the command, if no wanted one has followed:
+        before that it may be of an older event. `command` is called when it is its turn: a command of several settings
+        repeats those that the change before it has left. `stops`: it ends something that goes on. `silence`: the error
+        if the drone has reported nothing by then; without it, it may still answer until `timeout`. Raises
+        `CommandTimeout`, too, if the drone has not received the command by then.
         """
-        kept: list[T] = []
+        async with self._setting_locks.setdefault(answer, asyncio.Lock()):  # else whose answer would it be
+            sent = command if isinstance(command, Message) else command()
+            kept: list[T] = []
+            has_answered = False
 
-        def listen(message: Any) -> T | AnafiMavError | None:
-            result = judge(message)
-            if result is None or isinstance(result, AnafiMavError) or is_done(result):
-                return result
-            if not kept and delivery.done():
-                expectation.expire_after(KEPT_AFTER, command.NAME)
-            kept[:] = [result]
-            return None
+            def listen(message: Any) -> T | AnafiMavError | None:
+                result = judge(message)
+                if result is None or isinstance(result, AnafiMavError) or has_answered or is_wanted(result):
+                    return result
+                kept[:] = [result]
+                return None
 
-        def delivered(delivery: asyncio.Future[None]) -> None:
-            if kept and not delivery.cancelled() and not expectation.future.done():
-                expectation.expire_after(KEPT_AFTER, command.NAME)
+            def settle() -> None:
+                nonlocal has_answered
+                has_answered = True
+                if kept:
+                    expectation.succeed(kept[0])
+                elif silence is not None:
+                    expectation.fail(silence)
 
-        expectation = self._commander.expect((answer,), listen)
-        self._commander.dispatch(expectation, command, timeout, stops=stops, is_setting=is_setting)
-        assert expectation.token is not None
-        delivery = self._commander.delivery(expectation.token)
-        delivery.add_done_callback(delivered)
-        try:
+            def delivered(delivery: asyncio.Future[None]) -> None:
+                if not delivery.cancelled() and delivery.exception() is None:
+                    delivery.get_loop().call_later(ANSWERED_WITHIN, settle)
+
+            expectation = self._commander.expect((answer,), listen)
+            self._commander.dispatch(expectation, sent, timeout, stops=stops, is_setting=not stops)
+            assert expectation.token is not None
+            self._commander.delivery(expectation.token).add_done_callback(delivered)
             return await expectation.wait()
-        except CommandTimeout:
-            if not kept:
-                raise
-            return kept[0]
-
-    def _setting_lock(self, answer: type[Message]) -> asyncio.Lock:
-        """Return the lock that allows one change at a time.
-
-        The answers of two changes could not be distinguished.
-        """
-        return self._setting_locks.setdefault(answer, asyncio.Lock())
 
     def _order(self, subject: Hashable, command: Message) -> int:
         """Send a target that is not acknowledged; every older one for the same subject is over."""
@@ -182,16 +166,9 @@ class Commanding(Element[StateT]):
     async def _set(self, command: Message, answer: type[Message], reported: object) -> float:
         """Change a setting with a range and return its value then.
 
-        The command has one argument; the answer has `current`.
+        The command has one argument; the answer has `current`, `min` and `max`.
         """
         (value,) = (getattr(command, name) for name in command.__struct_fields__)
         number(value, command.NAME)
         self._require(reported, command.NAME)
-        async with self._setting_lock(answer):
-            return await self._answered(
-                command,
-                answer,
-                lambda message: float(message.current) if math.isfinite(message.current) else None,
-                lambda result: is_same(result, value),
-                is_setting=True,
-            )
+        return (await self._change(command, answer, setting, lambda result: is_limited(result, value))).current

@@ -22,7 +22,7 @@ from anafi_mav.drone.element import Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, loop_time
 from anafi_mav.drone.rest import Rest
 from anafi_mav.drone.sent_commands import PLAN_MEMORY, Phase, SentCommand, Slot
-from anafi_mav.drone.settings import Commanding
+from anafi_mav.drone.settings import Commanding, same_as
 from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, NotSupported, RemoteProtocolError
 from anafi_mav.models import NO_MODEL, Model
@@ -321,7 +321,7 @@ class FlightPlan(Commanding[FlightPlanState]):
             common.ReturnHomeOnDisconnect(int(on)),
             common.ReturnHomeOnDisconnectChanged,
             lambda message: bool(message.state),
-            wanted=on,
+            same_as(on),
         )
 
     def _available(self) -> None:

@@ -17,7 +17,7 @@ from anafi_mav.arsdk.messages.follow_me import Behavior, Input, Mode
 from anafi_mav.drone.element import Position, Reducer, members, position, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, loop_time
 from anafi_mav.drone.sent_commands import SentCommand, Slot
-from anafi_mav.drone.settings import Commanding, number
+from anafi_mav.drone.settings import Commanding, number, same_as
 from anafi_mav.drone.status.alerts import spoken
 from anafi_mav.errors import (
     AnafiMavError,
@@ -159,5 +159,5 @@ class FollowMe(Commanding[FollowMeState]):
             follow_me.SetTargetIsController(int(on)),
             follow_me.TargetIsController,
             lambda m: bool(m.state),
-            wanted=on,
+            same_as(on),
         )

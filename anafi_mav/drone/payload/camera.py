@@ -42,7 +42,7 @@ from anafi_mav.drone.payload.camera_state import (
     RecordingSettings,
     StyleSettings,
 )
-from anafi_mav.drone.settings import Commanding, Question, is_same, number
+from anafi_mav.drone.settings import Commanding, Question, is_same, number, same_as
 from anafi_mav.errors import (
     AnafiMavError,
     CommandRejected,
@@ -431,7 +431,7 @@ class Camera(Commanding[CamerasState]):
     ) -> tuple[WhiteBalance | None, float | None]:
         """Set the white balance; `temperature_k` (to the nearest 250 K) is for CUSTOM. Return both."""
 
-        def is_done(state: CameraState) -> bool:
+        def is_wanted(state: CameraState) -> bool:
             if state.white_balance is not mode or temperature_k is None or state.temperature_k is None:
                 return state.white_balance is mode
             return abs(state.temperature_k - temperature_k) <= TEMPERATURE_STEP / 2
@@ -440,7 +440,7 @@ class Camera(Commanding[CamerasState]):
             id,
             "white_balance",
             lambda s, now: s.white_balance(id, now, mode, temperature_k),
-            is_done,
+            is_wanted,
         )
         return state.white_balance, state.temperature_k
 
@@ -477,7 +477,7 @@ class Camera(Commanding[CamerasState]):
         for value in (saturation, contrast, sharpness):
             number(value, "style")
 
-        def is_done(state: CameraState) -> bool:
+        def is_wanted(state: CameraState) -> bool:
             style = state.style or StyleSettings()
             levels = [
                 None if one is None else one.current for one in (style.saturation, style.contrast, style.sharpness)
@@ -485,7 +485,7 @@ class Camera(Commanding[CamerasState]):
             return is_same(tuple(levels), (float(saturation), float(contrast), float(sharpness)))
 
         return await self._ask(
-            id, "style", lambda s, now: s.style_params(id, now, saturation, contrast, sharpness), is_done
+            id, "style", lambda s, now: s.style_params(id, now, saturation, contrast, sharpness), is_wanted
         )
 
     async def set_streaming(self, mode: Streaming, id: int = MAIN) -> Streaming | None:
@@ -512,7 +512,7 @@ class Camera(Commanding[CamerasState]):
         self._require(self.state.antiflicker, "antiflicker")
         speech, _ = self._known(min(self.state.cameras, default=MAIN))
         command, answer = speech.antiflicker(mode)
-        return await self._change(command, answer, lambda message: self.state.antiflicker, wanted=mode)
+        return await self._change(command, answer, lambda message: self.state.antiflicker, same_as(mode))
 
     # -- the connection
 
@@ -570,27 +570,24 @@ class Camera(Commanding[CamerasState]):
         id: int,
         field: str,
         ask: Callable[[type[ClassicCamera] | type[ModernCamera], CameraState], Ask],
-        is_done: Callable[[CameraState], bool] = lambda state: True,
+        is_wanted: Callable[[CameraState], bool],
     ) -> CameraState:
         """Change a setting; returns the state after the drone's answer.
 
-        `field` must have been reported. An answer for which `is_done` is False counts if no other follows.
+        `field` must have been reported.
         """
         speech, now = self._known(id)
         self._require(getattr(now, field), f"camera {id}: {field.replace('_', ' ')}")
-        _, answer = ask(speech, now)
-        async with self._setting_lock(answer):
-            # A command carries several settings: those it leaves alone are as the change before this one left them.
-            command, _ = ask(speech, self[id])
-            if isinstance(command, camera2.Configure) and command.config == camera2.Config():
-                raise LocalProtocolError("nothing to change")
+        first, answer = ask(speech, now)
+        if isinstance(first, camera2.Configure) and first.config == camera2.Config():
+            raise LocalProtocolError("nothing to change")
 
-            def judge(message: Any) -> CameraState | None:
-                # A state of camera2 can be about something else, such as the end of a photo.
-                is_other = isinstance(command, camera2.Configure) and message.config is None
-                return None if is_other or speech.camera_of(message) != id else self[id]
+        def judge(message: Any) -> CameraState | None:
+            # A state of camera2 can be about something else, such as the end of a photo.
+            is_other = isinstance(first, camera2.Configure) and message.config is None
+            return None if is_other or speech.camera_of(message) != id else self[id]
 
-            return await self._answered(command, answer, judge, is_done)
+        return await self._change(lambda: ask(speech, self[id])[0], answer, judge, is_wanted)
 
     async def _capture(
         self,

@@ -30,7 +30,7 @@ from anafi_mav.arsdk.messages.gimbal import (
 )
 from anafi_mav.drone.element import Range, Reducer, members, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, require_number
-from anafi_mav.drone.settings import Commanding, is_same
+from anafi_mav.drone.settings import Commanding, is_limited, same_as
 from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError, CommandRejected, LocalProtocolError, NotSupported
 from anafi_mav.units import clip, is_finite
@@ -138,11 +138,6 @@ def _ranges(message: gimbal.MaxSpeed | gimbal.Offsets) -> dict[Axis, Range]:
         Axis.ROLL: (message.current_roll, message.min_bound_roll, message.max_bound_roll),
     }
     return {axis: Range(*numbers) for axis, numbers in values.items() if all(map(math.isfinite, numbers))}
-
-
-def _is_set(setting: Range, wanted: float) -> bool:
-    """Return True for the wanted setting, or the end of its range that is nearest to it."""
-    return is_same(setting.current, float(clip(wanted, setting.min, setting.max)))
 
 
 def _bounds(message: gimbal.RelativeAttitudeBounds | gimbal.AbsoluteAttitudeBounds) -> dict[Axis, tuple[float, float]]:
@@ -359,7 +354,7 @@ class Gimbal(Commanding[Gimbals]):
             gimbal.SetMaxSpeed(id, degrees_per_second, degrees_per_second, degrees_per_second),
             gimbal.MaxSpeed,
             lambda message: self[id].max_speed if message.gimbal_id == id else None,
-            is_done=lambda speeds: all(_is_set(speed, degrees_per_second) for speed in speeds.values()),
+            lambda speeds: all(is_limited(speed, degrees_per_second) for speed in speeds.values()),
         )
 
     async def open_offsets(self, on: bool, id: int = MAIN) -> bool:
@@ -369,7 +364,7 @@ class Gimbal(Commanding[Gimbals]):
             gimbal.StartOffsetsUpdate(id) if on else gimbal.StopOffsetsUpdate(id),
             gimbal.Offsets,
             lambda message: message.update_state == gimbal.State.ACTIVE if message.gimbal_id == id else None,
-            wanted=on,
+            same_as(on),
         )
 
     async def set_offsets(
@@ -388,7 +383,7 @@ class Gimbal(Commanding[Gimbals]):
             gimbal.SetOffsets(id, *wanted.values()),
             gimbal.Offsets,
             lambda message: self[id].offsets if message.gimbal_id == id else None,
-            is_done=lambda offsets: all(_is_set(offset, wanted[axis]) for axis, offset in offsets.items()),
+            lambda offsets: all(is_limited(offset, wanted[axis]) for axis, offset in offsets.items()),
         )
 
     # -- calibration

@@ -309,7 +309,7 @@ class Storage(Commanding[Storages]):
             speech.start(storage, period_s),
             speech.monitors[0],
             lambda message: self[storage].available if _id(message) == storage else None,
-            ANSWER_TIMEOUT + period_s,
+            timeout=ANSWER_TIMEOUT + period_s,
         )
 
     async def stop_monitoring(self, id: int | None = None) -> None:

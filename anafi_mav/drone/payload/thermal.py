@@ -25,7 +25,7 @@ from anafi_mav.arsdk.messages.thermal import (
 from anafi_mav.arsdk.messages.thermal import Range as Sensitivity
 from anafi_mav.drone.element import EMPTY, FIRST, LAST, Reducer, finite, members
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
-from anafi_mav.drone.settings import Commanding, number
+from anafi_mav.drone.settings import Commanding, number, same_as
 from anafi_mav.errors import LocalProtocolError
 
 MAX_COLOURS = 256
@@ -113,7 +113,7 @@ class Thermal(Commanding[ThermalState]):
     async def set_mode(self, mode: ThermalMode) -> ThermalMode:
         """Switch the thermal camera on or off, or blend it with the visible picture."""
         self._require(self.state.mode, "thermal camera")
-        return await self._change(thermal.SetMode(mode), thermal.Mode, lambda m: ThermalMode(m.mode), wanted=mode)
+        return await self._change(thermal.SetMode(mode), thermal.Mode, lambda m: ThermalMode(m.mode), same_as(mode))
 
     async def set_rendering(self, mode: RenderingMode, blending: float | None = None) -> tuple[RenderingMode, float]:
         """Set the mixture of thermal and visible picture; `blending` None keeps its share.
@@ -126,7 +126,7 @@ class Thermal(Commanding[ThermalState]):
             thermal.SetRendering(mode, share),
             thermal.Rendering,
             lambda m: (RenderingMode(m.mode), float(m.blending_rate)),
-            wanted=(mode, share),
+            same_as((mode, share)),
         )
 
     async def set_palette(self, palette: Palette) -> Palette:
@@ -143,7 +143,7 @@ class Thermal(Commanding[ThermalState]):
             palette.spot,
             palette.spot_threshold,
         )
-        return await self._change(command, thermal.PaletteSettings, _palette, wanted=palette)
+        return await self._change(command, thermal.PaletteSettings, _palette, same_as(palette))
 
     async def set_colours(self, colours: Sequence[Colour]) -> tuple[Colour, ...]:
         """Set the colours of the palette; return those of the drone."""
@@ -173,7 +173,7 @@ class Thermal(Commanding[ThermalState]):
         """Set the emissivity of the objects, 0 to 1."""
         self._require(self.state.emissivity, "thermal camera")
         command = thermal.SetEmissivity(number(emissivity, "emissivity"))
-        return await self._change(command, thermal.Emissivity, lambda m: float(m.emissivity), wanted=emissivity)
+        return await self._change(command, thermal.Emissivity, lambda m: float(m.emissivity), same_as(emissivity))
 
     async def set_background(self, kelvin: float) -> float:
         """Set the temperature of the background that objects reflect, K."""
@@ -182,7 +182,7 @@ class Thermal(Commanding[ThermalState]):
             thermal.SetBackgroundTemperature(number(kelvin, "temperature")),
             thermal.BackgroundTemperature,
             lambda m: float(m.background_temperature),
-            wanted=kelvin,
+            same_as(kelvin),
         )
 
     async def set_sensitivity(self, sensitivity: Sensitivity) -> Sensitivity:
@@ -192,7 +192,7 @@ class Thermal(Commanding[ThermalState]):
             thermal.SetSensitivity(sensitivity),
             thermal.Sensitivity,
             lambda m: Sensitivity(m.current_range),
-            wanted=sensitivity,
+            same_as(sensitivity),
         )
 
     async def set_shutter(self, trigger: ShutterTrigger) -> ShutterTrigger:
@@ -202,7 +202,7 @@ class Thermal(Commanding[ThermalState]):
             thermal.SetShutterMode(trigger),
             thermal.ShutterMode,
             lambda m: ShutterTrigger(m.current_trigger),
-            wanted=trigger,
+            same_as(trigger),
         )
 
     def trigger_shutter(self) -> None:

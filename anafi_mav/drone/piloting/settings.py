@@ -9,7 +9,7 @@ from anafi_mav.arsdk.messages import ardrone3, obstacle_avoidance, piloting_styl
 from anafi_mav.arsdk.messages.obstacle_avoidance import Mode as AvoidanceMode
 from anafi_mav.arsdk.messages.piloting_style import PilotingStyleStyle
 from anafi_mav.drone.piloting.state import PilotingState
-from anafi_mav.drone.settings import Commanding
+from anafi_mav.drone.settings import Commanding, same_as
 
 
 class PilotingSettings(Commanding[PilotingState]):
@@ -45,7 +45,7 @@ class PilotingSettings(Commanding[PilotingState]):
             ardrone3.NoFlyOverMaxDistance(int(on)),
             ardrone3.NoFlyOverMaxDistanceChanged,
             lambda message: bool(message.shouldNotFlyOver),
-            wanted=on,
+            same_as(on),
         )
 
     async def set_max_vertical_speed(self, metres_per_second: float) -> float:
@@ -79,7 +79,7 @@ class PilotingSettings(Commanding[PilotingState]):
         """Switch banked turns, in which the drone leans into a turn."""
         self._require(self.state.banked_turn, ardrone3.BankedTurn.NAME)
         return await self._change(
-            ardrone3.BankedTurn(int(on)), ardrone3.BankedTurnChanged, lambda message: bool(message.state), wanted=on
+            ardrone3.BankedTurn(int(on)), ardrone3.BankedTurnChanged, lambda message: bool(message.state), same_as(on)
         )
 
     async def set_style(self, style: PilotingStyleStyle) -> PilotingStyleStyle:
@@ -89,7 +89,7 @@ class PilotingSettings(Commanding[PilotingState]):
             piloting_style.SetStyle(style),
             piloting_style.Style,
             lambda message: PilotingStyleStyle(message.style),
-            wanted=style,
+            same_as(style),
         )
 
     async def set_obstacle_avoidance(self, on: bool) -> bool:
@@ -99,5 +99,5 @@ class PilotingSettings(Commanding[PilotingState]):
             obstacle_avoidance.SetMode(AvoidanceMode.STANDARD if on else AvoidanceMode.DISABLED),
             obstacle_avoidance.Status,
             lambda message: message.mode == AvoidanceMode.STANDARD,
-            wanted=on,
+            same_as(on),
         )

@@ -89,7 +89,7 @@ class Calibration(Commanding[CalibrationState]):
             common.MagnetoCalibration(1),
             common.MagnetoCalibrationStartedChanged,
             lambda message: True if message.started else None,
-            timeout,
+            timeout=timeout,
         )
 
     async def abort_magnetometer(self, timeout: float = ANSWER_TIMEOUT) -> None:
@@ -99,7 +99,7 @@ class Calibration(Commanding[CalibrationState]):
             common.MagnetoCalibration(0),
             common.MagnetoCalibrationStartedChanged,
             lambda message: None if message.started else True,
-            timeout,
+            timeout=timeout,
             stops=True,
         )
 

@@ -28,8 +28,7 @@ from anafi_mav.arsdk.messages.rth import (
 )
 from anafi_mav.drone.element import Position, Range, Reducer, members, position, setting
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, require_number
-from anafi_mav.drone.sent_commands import QUIET
-from anafi_mav.drone.settings import Commanding
+from anafi_mav.drone.settings import ANSWERED_WITHIN, Commanding, same_as
 from anafi_mav.errors import CommandRejected, CommandTimeout, LocalProtocolError, NotSupported
 
 _SAME_PLACE_DEG = 1e-7
@@ -184,7 +183,7 @@ class Home(Commanding[HomeState]):
             rth.SetEndingBehavior(ending),
             rth.EndingBehavior,
             lambda message: RthEndingBehavior(message.ending_behavior),
-            wanted=ending,
+            same_as(ending),
         )
 
     async def set_ending_altitude(self, metres: float) -> float:
@@ -196,7 +195,7 @@ class Home(Commanding[HomeState]):
     async def set_delay(self, seconds: int) -> int:
         """Set the time between the loss of the link and the return, s."""
         self._require(self.state.delay_s, rth.SetDelay.NAME)
-        return await self._change(rth.SetDelay(seconds), rth.Delay, lambda message: int(message.delay), wanted=seconds)
+        return await self._change(rth.SetDelay(seconds), rth.Delay, lambda m: int(m.delay), same_as(seconds))
 
     async def set_by_itself(self, allowed: bool) -> bool:
         """Allow or forbid the drone's own return at low battery."""
@@ -205,7 +204,7 @@ class Home(Commanding[HomeState]):
             rth.SetAutoTriggerMode(RthAutoTriggerMode.ON if allowed else RthAutoTriggerMode.OFF),
             rth.AutoTriggerMode,
             lambda message: message.mode == RthAutoTriggerMode.ON,
-            wanted=allowed,
+            same_as(allowed),
         )
 
     async def cancel_auto_trigger(self, timeout: float = ANSWER_TIMEOUT) -> None:
@@ -216,7 +215,7 @@ class Home(Commanding[HomeState]):
             rth.CancelAutoTrigger(),
             rth.RthAutoTrigger,
             lambda message: True if message.reason == AutoTriggerReason.NONE else None,
-            timeout,
+            timeout=timeout,
         )
 
     async def set_preferred_type(self, kind: RthHomeType) -> RthHomeType:
@@ -231,7 +230,7 @@ class Home(Commanding[HomeState]):
             rth.SetPreferredHomeType(kind),
             rth.PreferredHomeType,
             lambda message: RthHomeType(message.type),
-            wanted=kind,
+            same_as(kind),
         )
 
     async def set_custom_location(
@@ -240,9 +239,9 @@ class Home(Commanding[HomeState]):
         """Choose a place (deg, deg, m above take-off) for homes of type custom.
 
         The drone flies there only while `preferred_type` is CUSTOM. One that does not accept the place (it is too far
-        away, or the drone does not know where it is itself) reports its old one: `CommandRejected`, `QUIET` after it
-        has received the command, for a report of the old place may be from before that. `CommandTimeout` when it
-        reports none until then, for it may have obeyed, and when the command did not arrive.
+        away, or the drone does not know where it is itself) reports its old one: `CommandRejected`, `ANSWERED_WITHIN`
+        after it has received the command, for a report of the old place may be from before that. `CommandTimeout` when
+        it reports none until then, for it may have obeyed, and when the command did not arrive.
         """
         require_number(timeout)
         wanted = position(latitude, longitude, altitude)
@@ -252,30 +251,23 @@ class Home(Commanding[HomeState]):
         if self.state.types is not None and RthHomeType.CUSTOM not in self.state.types:
             raise NotSupported("home of type custom")
 
-        reports_old = False
-
-        def judge(message: rth.CustomLocation) -> Position | None:
-            nonlocal reports_old
-            reports_old = True
-            same = math.isclose(message.latitude, latitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG) and math.isclose(
-                message.longitude, longitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG
+        def is_wanted(place: Position) -> bool:
+            return math.isclose(place.latitude, latitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG) and math.isclose(
+                place.longitude, longitude, rel_tol=0.0, abs_tol=_SAME_PLACE_DEG
             )
-            return position(message.latitude, message.longitude, message.altitude) if same else None
 
         command = rth.SetCustomLocation(latitude, longitude, altitude)
-        async with self._setting_lock(rth.CustomLocation):
-            answer = self._commander.expect((rth.CustomLocation,), judge)
-            delivery = self._commander.deliver(command)
-            try:
-                if not await answer.wait_or_quiet(delivery, command.NAME, timeout):
-                    if not reports_old:
-                        raise CommandTimeout(command.NAME, QUIET)
-                    raise CommandRejected("Home refused: the drone does not accept the place")
-                return answer.future.result()
-            finally:
-                answer.close()
-                if not delivery.done():
-                    self._commander.withdraw(delivery, CommandTimeout(command.NAME, timeout))
+        place = await self._change(
+            command,
+            rth.CustomLocation,
+            lambda message: position(message.latitude, message.longitude, message.altitude),
+            is_wanted,
+            timeout=timeout,
+            silence=CommandTimeout(command.NAME, ANSWERED_WITHIN),
+        )
+        if not is_wanted(place):
+            raise CommandRejected("Home refused: the drone does not accept the place")
+        return place
 
     async def set_precise(self, on: bool) -> bool:
         """Switch the precise return, which looks for the picture of the take-off place."""
@@ -284,5 +276,5 @@ class Home(Commanding[HomeState]):
             precise_home.SetMode(PreciseHomeMode.STANDARD if on else PreciseHomeMode.DISABLED),
             precise_home.Mode,
             lambda message: message.mode == PreciseHomeMode.STANDARD,
-            wanted=on,
+            same_as(on),
         )

@@ -190,11 +190,22 @@ async def test_refused_custom_home_is_reported_before_the_timeout(device: Script
     with pytest.raises(CommandRejected, match="does not accept the place"):
         await drone.home.set_custom_location(48.5, 2.25, 0.0, timeout=60.0)
     device.script[rth.SetCustomLocation] = lambda _: []
-    with pytest.raises(CommandTimeout, match="within 1 s"):
+    with pytest.raises(CommandTimeout, match="within 1.5 s"):
         await drone.home.set_custom_location(48.5, 2.25, 0.0, timeout=60.0)
     device.session.air = lambda data, inward, hand_on: None if inward else hand_on(data)
     with pytest.raises(CommandTimeout):
         await drone.home.set_custom_location(48.5, 2.25, 0.0, timeout=0.3)
+
+
+async def test_older_report_of_a_setting_that_is_not_received_is_no_answer(
+    device: ScriptedDevice, drone: Drone
+) -> None:
+    device.session.air = lambda data, inward, hand_on: None if inward else hand_on(data)
+    setting = asyncio.ensure_future(drone.piloting.set_banked_turn(True))
+    await asyncio.sleep(0)
+    device.say(ardrone3.BankedTurnChanged(0))
+    with pytest.raises(CommandTimeout):
+        await setting
 
 
 async def test_hand_launch(device: ScriptedDevice, drone: Drone) -> None:

@@ -21,7 +21,7 @@ from anafi_mav.arsdk.messages.thermal import (
 )
 from anafi_mav.arsdk.messages.thermal import Range as Sensitivity
 from anafi_mav.drone.payload.thermal import MAX_COLOURS, Colour, Palette, Thermal
-from anafi_mav.drone.settings import KEPT_AFTER
+from anafi_mav.drone.settings import ANSWERED_WITHIN
 from anafi_mav.errors import LocalProtocolError, NotSupported
 
 FIRST, LAST, EMPTY = 1, 2, 4
@@ -116,7 +116,7 @@ async def test_report_of_before_a_thermal_setting_is_not_its_answer(
             began = asyncio.get_running_loop().time()
             result = await call(drone.thermal)
             assert result in (ThermalMode.BLENDED, pytest.approx(0.3), (RenderingMode.BLENDED, pytest.approx(0.3)))
-            assert asyncio.get_running_loop().time() - began < KEPT_AFTER
+            assert asyncio.get_running_loop().time() - began < ANSWERED_WITHIN
 
 
 async def test_a_drone_without() -> None:
