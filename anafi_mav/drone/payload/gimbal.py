@@ -371,19 +371,21 @@ class Gimbal(Commanding[Gimbals]):
         self, *, yaw: float | None = None, pitch: float | None = None, roll: float | None = None, id: int = MAIN
     ) -> Mapping[Axis, Range]:
         """Set the offsets, deg, while they are open; None keeps one. Return those of the drone."""
-        now = self[id].offsets
-        self._require(now, gimbal.SetOffsets.NAME)
-        wanted = {}
-        for axis, value in ((Axis.YAW, yaw), (Axis.PITCH, pitch), (Axis.ROLL, roll)):
-            kept = now[axis].current if axis in now else 0.0
-            wanted[axis] = kept if value is None else value
+        self._require(self[id].offsets, gimbal.SetOffsets.NAME)
+        wishes = {Axis.YAW: yaw, Axis.PITCH: pitch, Axis.ROLL: roll}
+        wanted = {axis: value for axis, value in wishes.items() if value is not None}
         if not is_finite(*wanted.values()):
             raise LocalProtocolError("an offset is not a number")
+
+        def command() -> Message:
+            offsets = {axis: setting.current for axis, setting in self[id].offsets.items()} | wanted
+            return gimbal.SetOffsets(id, *(offsets.get(axis, 0.0) for axis in wishes))
+
         return await self._change(
-            gimbal.SetOffsets(id, *wanted.values()),
+            command,
             gimbal.Offsets,
             lambda message: self[id].offsets if message.gimbal_id == id else None,
-            lambda offsets: all(is_limited(offset, wanted[axis]) for axis, offset in offsets.items()),
+            lambda offsets: all(is_limited(offset, wanted[axis]) for axis, offset in offsets.items() if axis in wanted),
         )
 
     # -- calibration

@@ -25,7 +25,7 @@ from anafi_mav.arsdk.messages.thermal import (
 from anafi_mav.arsdk.messages.thermal import Range as Sensitivity
 from anafi_mav.drone.element import EMPTY, FIRST, LAST, Reducer, finite, members
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
-from anafi_mav.drone.settings import Commanding, number, same_as
+from anafi_mav.drone.settings import Commanding, is_same, number, same_as
 from anafi_mav.errors import LocalProtocolError
 
 MAX_COLOURS = 256
@@ -121,12 +121,13 @@ class Thermal(Commanding[ThermalState]):
         Return both.
         """
         self._require(self.state.rendering, "thermal camera")
-        share = (self.state.blending or 0.0) if blending is None else number(blending, "share of the thermal picture")
+        if blending is not None:
+            number(blending, "share of the thermal picture")
         return await self._change(
-            thermal.SetRendering(mode, share),
+            lambda: thermal.SetRendering(mode, (self.state.blending or 0.0) if blending is None else blending),
             thermal.Rendering,
             lambda m: (RenderingMode(m.mode), float(m.blending_rate)),
-            same_as((mode, share)),
+            lambda result: is_same(result, (mode, result[1] if blending is None else float(blending))),
         )
 
     async def set_palette(self, palette: Palette) -> Palette:

@@ -210,3 +210,11 @@ async def test_report_of_before_a_change_of_the_speed_is_not_its_answer() -> Non
         await asyncio.sleep(0)
         simulator.inject(gimbal.MaxSpeed(0, *(1.0, 180.0, 60.0) * 3))  # as it was
         assert (await change)[Axis.PITCH].current == pytest.approx(33.3)
+
+
+async def test_offsets_of_two_axes_set_at_once_are_both_kept() -> None:
+    async with connected("4k") as (drone, simulator):
+        await drone.gimbal.open_offsets(True)
+        await asyncio.gather(drone.gimbal.set_offsets(pitch=1.5), drone.gimbal.set_offsets(roll=2.0))
+        sent = [entry.args for entry in simulator.log if entry.name == gimbal.SetOffsets.NAME]
+        assert [(one["pitch"], one["roll"]) for one in sent] == [(1.5, 0.0), (1.5, 2.0)]

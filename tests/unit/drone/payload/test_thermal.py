@@ -126,3 +126,13 @@ async def test_a_drone_without() -> None:
             await drone.thermal.set_mode(ThermalMode.STANDARD)
         with pytest.raises(NotSupported):
             drone.thermal.trigger_shutter()
+
+
+async def test_rendering_mode_set_at_once_with_a_share_keeps_the_share() -> None:
+    async with connected("thermal") as (drone, simulator):
+        camera = drone.thermal
+        await asyncio.gather(
+            camera.set_rendering(RenderingMode.BLENDED, 0.25), camera.set_rendering(RenderingMode.THERMAL)
+        )
+        assert simulator.firmware.payload.thermal is not None
+        assert thermal.Rendering(RenderingMode.THERMAL, 0.25) in simulator.firmware.payload.thermal.states_report()
