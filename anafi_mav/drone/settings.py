@@ -16,7 +16,7 @@ from typing import Any, TypeAlias, TypeVar
 
 import msgspec
 
-from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.codec.wire import Buffer, Message
 from anafi_mav.drone.element import Element, Range, StateT, setting
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation
 from anafi_mav.errors import AnafiMavError, CommandRejected, LocalProtocolError, NotSupported
@@ -106,15 +106,17 @@ class Commanding(Element[StateT]):
 
         Changes with the same kind of answer are sent one after the other. A result counts at once if `is_wanted`.
         Another one counts `ANSWERED_WITHIN` after the drone's receipt of the command, if no wanted one has followed:
-        before that it may be of an older event. `command` is called when it is its turn: a command of several settings
-        repeats those that the change before it has left. `stops`: it ends something that goes on. `silence`: the error
-        if the drone has reported nothing by then; without it, it may still answer until `timeout`. Raises
-        `CommandTimeout`, too, if the drone has not received the command by then.
+        before that it may be of an older event. An answer of a kind that the link does not acknowledge may be lost: the
+        command is sent once more first. `command` is called when it is its turn: a command of several settings repeats
+        those that the change before it has left. `stops`: it ends something that goes on. `silence`: the error if the
+        drone has reported nothing by then; without it, it may still answer until `timeout`. Raises `CommandTimeout`,
+        too, if the drone has not received the command by then.
         """
         async with self._setting_locks.setdefault(answer, asyncio.Lock()):  # else whose answer would it be
             sent = command if isinstance(command, Message) else command()
             kept: list[T] = []
             has_answered = False
+            is_answer_losable = answer.BUFFER is Buffer.NON_ACK
 
             def listen(message: Any) -> T | AnafiMavError | None:
                 result = judge(message)
@@ -123,22 +125,30 @@ class Commanding(Element[StateT]):
                 kept[:] = [result]
                 return None
 
+            def watch_delivery() -> None:
+                assert expectation.token is not None
+                self._commander.delivery(expectation.token).add_done_callback(delivered)
+
+            def delivered(delivery: asyncio.Future[None]) -> None:
+                if not delivery.cancelled() and delivery.exception() is None:
+                    delivery.get_loop().call_later(ANSWERED_WITHIN, settle)
+
             def settle() -> None:
-                nonlocal has_answered
+                nonlocal has_answered, is_answer_losable
+                if is_answer_losable and not expectation.future.done():
+                    is_answer_losable = False
+                    expectation.token = self._commander.send(sent, stops=stops, is_setting=not stops)
+                    watch_delivery()
+                    return
                 has_answered = True
                 if kept:
                     expectation.succeed(kept[0])
                 elif silence is not None:
                     expectation.fail(silence)
 
-            def delivered(delivery: asyncio.Future[None]) -> None:
-                if not delivery.cancelled() and delivery.exception() is None:
-                    delivery.get_loop().call_later(ANSWERED_WITHIN, settle)
-
             expectation = self._commander.expect((answer,), listen)
             self._commander.dispatch(expectation, sent, timeout, stops=stops, is_setting=not stops)
-            assert expectation.token is not None
-            self._commander.delivery(expectation.token).add_done_callback(delivered)
+            watch_delivery()
             return await expectation.wait()
 
     def _order(self, subject: Hashable, command: Message) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as stock
 from support.ext_params import CHOICE, value_of, write
@@ -45,3 +47,15 @@ async def test_home_that_the_drone_reports_late_is_accepted() -> None:
         custom = w.drone.firmware.homing.custom
         assert custom is not None
         assert (ack.result, custom.latitude) == (stock.MAV_RESULT_ACCEPTED, pytest.approx(north, abs=1e-6))
+
+
+async def test_exposure_lock_whose_report_is_lost_is_accepted() -> None:
+    """The report is not acknowledged, so that a lost one is not sent again."""
+    async with world(model="thermal") as w:
+        w.drone.faults.unreported = frozenset({camera.Exposure.NAME})
+        setting = asyncio.ensure_future(write(w.client, "CAM_AELOCK", 1.0, CHOICE))
+        await w.drone.wait_log(lambda e: e.name == camera.LockExposure.NAME)
+        w.drone.faults.unreported = frozenset()
+        ack = await setting
+        assert (ack.param_result, value_of(ack)) == (dialect.PARAM_ACK_ACCEPTED, 1.0)
+        assert sim_value(w.drone, "CAM_AELOCK") == 1.0
