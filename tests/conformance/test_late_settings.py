@@ -3,23 +3,33 @@
 from __future__ import annotations
 
 import asyncio
+from functools import partial
+from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as stock
 from support.ext_params import CHOICE, value_of, write
+from support.params import send_set
+from support.params import write as param_write
 from support.sim_settings import sim_value
 from support.world import HOME, world
 
-from anafi_mav.arsdk.messages import camera, rth
+from anafi_mav.arsdk.messages import ardrone3, camera, rth
 from anafi_mav.mavlink import dialect
 
 PREFER_ISO = 2.0
 """Of CAM_EXPMODE, an option of all models."""
 
+REAL32 = stock.MAV_PARAM_TYPE_REAL32
 SET_HOME, GLOBAL = stock.MAV_CMD_DO_SET_HOME, stock.MAV_FRAME_GLOBAL
 
 LATE = 1.15
 """s, the latest event of the quirk `scramble`, and one retransmission."""
+
+
+def reports(name: str, value: float, message: Any) -> bool:
+    """Return True for a PARAM_VALUE of this parameter with this value."""
+    return bool(message.param_id == name and message.param_value == value)
 
 
 @pytest.mark.parametrize("model", ["4k", "usa"])
@@ -59,3 +69,30 @@ async def test_exposure_lock_whose_report_is_lost_is_accepted() -> None:
         ack = await setting
         assert (ack.param_result, value_of(ack)) == (dialect.PARAM_ACK_ACCEPTED, 1.0)
         assert sim_value(w.drone, "CAM_AELOCK") == 1.0
+
+
+async def test_parameter_that_its_client_repeats_does_not_undo_the_newer_one_of_another() -> None:
+    """MAVSDK repeats PARAM_SET every 0.5 s until the value is reported."""
+    async with world(clients=2) as w:
+        first, second = w.clients
+        w.drone.faults.late = {ardrone3.MaxAltitudeChanged.NAME: 0.8}
+        send_set(first, "ANF_MAX_ALT", 66.0, REAL32)
+        await w.drone.wait_log(lambda e: e.name == ardrone3.MaxAltitude.NAME)
+        send_set(second, "ANF_MAX_ALT", 55.0, REAL32)
+        send_set(first, "ANF_MAX_ALT", 66.0, REAL32)
+        for client in w.clients:
+            await client.wait("PARAM_VALUE", partial(reports, "ANF_MAX_ALT", 55.0), since=0)
+        await param_write(first, "ANF_YAW_RATE", 30.0)
+        assert [entry.args["current"] for entry in w.commands(ardrone3.MaxAltitude.NAME)] == [66.0, 55.0]
+
+
+async def test_parameter_that_its_client_sets_back_while_two_writes_wait_is_set_back() -> None:
+    async with world() as w:
+        w.drone.faults.late = {ardrone3.MaxAltitudeChanged.NAME: 0.8}
+        for value in (66.0, 70.0, 66.0):
+            send_set(w.client, "ANF_MAX_ALT", value, REAL32)
+            await param_write(w.client, "ANF_YAW_RATE", value / 2.0)  # the write before is under way
+        place = 0
+        for value in (70.0, 66.0):
+            place = await w.client.place("PARAM_VALUE", partial(reports, "ANF_MAX_ALT", value), since=place)
+        assert [entry.args["current"] for entry in w.commands(ardrone3.MaxAltitude.NAME)] == [66.0, 70.0, 66.0]

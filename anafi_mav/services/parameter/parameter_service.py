@@ -89,6 +89,18 @@ _UNREPORTED = _RAW.pack(math.nan)
 """In place of a value that no client has received: no parameter has it."""
 
 
+class ParameterWrite(NamedTuple):
+    """A PARAM_SET that is to be carried out."""
+
+    inbound: Inbound
+    parameter: Parameter
+    value: float
+
+    def is_like(self, other: ParameterWrite) -> bool:
+        """Return True for a write of the same parameter by the same client."""
+        return self.parameter is other.parameter and self.inbound.client == other.inbound.client
+
+
 class ParameterTable(NamedTuple):
     """Parameters in the sequence of their list, and what follows from them."""
 
@@ -205,7 +217,8 @@ class ParameterService(Service):
         self._sender = PacedSender(host)
         self._refused_at: dict[Channel, float] = {}
         """When a text was last sent about a refused write."""
-        self._waiting: deque[tuple[Inbound, Parameter, float]] = deque()
+        self._waiting: deque[ParameterWrite] = deque()
+        self._under_way: list[ParameterWrite] = []
         self._writers: set[asyncio.Task[None]] = set()
         self._restored = -1
         """Generation of the stored data that the settings are from."""
@@ -408,20 +421,23 @@ class ParameterService(Service):
         if not parameter.accepts(self.host, value):
             self._refuse(inbound, dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, texts.OUT_OF_RANGE)
             return
-        self._queue(inbound, parameter, value)
+        self._queue(ParameterWrite(inbound, parameter, value))
 
-    def _queue(self, inbound: Inbound, parameter: Parameter, value: float) -> None:
+    def _queue(self, write: ParameterWrite) -> None:
         """Write when it is its turn.
 
-        What a client says again while it still waits takes the old one's place.
+        What a client repeats while it still waits replaces the old one. What it repeats of a write under way will be
+        answered by that: written once more, it would undo what another client has set since.
         """
-        client = inbound.client
-        for place, (waiting, other, _) in enumerate(self._waiting):
-            if other is parameter and waiting.client == client:
-                self._waiting[place] = (inbound, parameter, value)
+        for place, waiting in enumerate(self._waiting):
+            if waiting.is_like(write):
+                self._waiting[place] = write
                 return
+        newest = next((one for one in reversed(self._under_way) if one.is_like(write)), None)
+        if newest is not None and newest.value == write.value:
+            return
         if len(self._waiting) < MAX_WAITING:
-            self._waiting.append((inbound, parameter, value))
+            self._waiting.append(write)
         if len(self._writers) < MAX_WRITES:
             writer = self.host.spawn(self._work())
             self._writers.add(writer)
@@ -430,7 +446,12 @@ class ParameterService(Service):
     async def _work(self) -> None:
         """Carry out writes for as long as there are any."""
         while self._waiting:
-            await self._write(*self._waiting.popleft())
+            write = self._waiting.popleft()
+            self._under_way.append(write)
+            try:
+                await self._write(*write)
+            finally:
+                self._under_way.remove(write)
 
     async def _write(self, inbound: Inbound, parameter: Parameter, value: float) -> None:
         assert parameter.write is not None
