@@ -15,6 +15,7 @@ from support.sim_settings import sim_value
 from support.world import HOME, world
 
 from anafi_mav.arsdk.messages import ardrone3, camera, rth
+from anafi_mav.arsdk.messages.thermal import ThermalMode
 from anafi_mav.mavlink import dialect
 
 PREFER_ISO = 2.0
@@ -96,3 +97,15 @@ async def test_parameter_that_its_client_sets_back_while_two_writes_wait_is_set_
         for value in (70.0, 66.0):
             place = await w.client.place("PARAM_VALUE", partial(reports, "ANF_MAX_ALT", value), since=place)
         assert [entry.args["current"] for entry in w.commands(ardrone3.MaxAltitude.NAME)] == [66.0, 70.0, 66.0]
+
+
+@pytest.mark.parametrize("mode", [ThermalMode.STANDARD, ThermalMode.BLENDED])
+async def test_setting_after_a_thermal_mode_is_that_of_the_camera_at_work(mode: ThermalMode) -> None:
+    async with world(model="thermal") as w:
+        w.drone.faults.late = {camera.CameraStates.NAME: 0.8}
+        for thermal in (mode, ThermalMode.DISABLED):
+            ack = await write(w.client, "CAM_THERMAL", float(thermal), CHOICE)
+            assert ack.param_result == dialect.PARAM_ACK_ACCEPTED
+            ack = await write(w.client, "CAM_EV", 1.0, REAL32)
+            assert (ack.param_result, value_of(ack)) == (dialect.PARAM_ACK_ACCEPTED, 1.0)
+            assert sim_value(w.drone, "CAM_EV") == 1.0

@@ -48,6 +48,11 @@ def _has_thermal(options: tuple[Option, ...]) -> Callable[[View], tuple[Option, 
     return lambda view: options if view.thermal.mode is not None else ()
 
 
+async def _set_mode(drone: Drone, mode: ThermalMode) -> None:
+    if await drone.thermal.set_mode(mode) is mode:
+        await drone.camera.until_main(is_active=mode is ThermalMode.DISABLED)  # the next setting is of that camera
+
+
 def _set_palette(drone: Drone, **changes: object) -> Awaitable[object]:
     palette = drone.thermal.state.palette
     if palette is None:
@@ -85,7 +90,7 @@ THERMAL_SETTINGS: tuple[CameraSetting, ...] = (
         ExtType.CHOICE,
         "Thermal camera",
         read=lambda view: view.thermal.mode,
-        write=lambda drone, id, value: drone.thermal.set_mode(ThermalMode(round(value))),
+        write=lambda drone, id, value: _set_mode(drone, ThermalMode(round(value))),
         options=lambda view: tuple(
             Option(mode, text)
             for mode, text in (
