@@ -24,7 +24,6 @@ from anafi_mav.arsdk.messages.thermal import (
 )
 from anafi_mav.arsdk.messages.thermal import Range as Sensitivity
 from anafi_mav.drone.element import EMPTY, FIRST, LAST, Reducer, finite, members
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT
 from anafi_mav.drone.settings import Commanding, is_same, number, same_as
 from anafi_mav.errors import LocalProtocolError
 
@@ -159,16 +158,18 @@ class Thermal(Commanding[ThermalState]):
             )
             for place, colour in enumerate(colours)
         ]
-        answer = self._commander.expect(
-            (thermal.PalettePart,), lambda m: self.state.colours if m.list_flags & LAST else None
-        )
-        try:
+
+        def command() -> Message:
             for part in parts[:-1]:
-                self._commander.send(part)
-            self._commander.dispatch(answer, parts[-1], ANSWER_TIMEOUT)
-            return await answer.wait()
-        finally:
-            answer.close()
+                self._commander.send(part, is_setting=True)
+            return parts[-1]
+
+        return await self._change(
+            command,
+            thermal.PalettePart,
+            lambda m: self.state.colours if m.list_flags & LAST else None,
+            same_as(tuple(colours)),
+        )
 
     async def set_emissivity(self, emissivity: float) -> float:
         """Set the emissivity of the objects, 0 to 1."""

@@ -136,3 +136,12 @@ async def test_rendering_mode_set_at_once_with_a_share_keeps_the_share() -> None
         )
         assert simulator.firmware.payload.thermal is not None
         assert thermal.Rendering(RenderingMode.THERMAL, 0.25) in simulator.firmware.payload.thermal.states_report()
+
+
+async def test_older_colours_reported_late_are_not_those_that_were_set() -> None:
+    async with connected("thermal", speed=1.0) as (drone, simulator):
+        await drone.thermal.set_colours([RED])
+        simulator.faults.late = {thermal.PalettePart.NAME: 0.2}
+        simulator.inject(thermal.PalettePart(1.0, 0.0, 0.0, 1.0, FIRST | LAST))
+        simulator.faults.late = {thermal.PalettePart.NAME: 0.4}
+        assert await drone.thermal.set_colours([BLUE, RED]) == (BLUE, RED)
