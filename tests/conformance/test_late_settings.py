@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as stock
 from support.ext_params import CHOICE, value_of, write
+from support.params import read as param_read
 from support.params import send_set
 from support.params import write as param_write
 from support.sim_settings import sim_value
@@ -21,7 +22,9 @@ from anafi_mav.mavlink import dialect
 PREFER_ISO = 2.0
 """Of CAM_EXPMODE, an option of all models."""
 
-REAL32 = stock.MAV_PARAM_TYPE_REAL32
+REAL32, INT8 = stock.MAV_PARAM_TYPE_REAL32, stock.MAV_PARAM_TYPE_INT8
+CIRCLE = 2
+"""Bit of FENCE_TYPE."""
 SET_HOME, GLOBAL = stock.MAV_CMD_DO_SET_HOME, stock.MAV_FRAME_GLOBAL
 
 LATE = 1.15
@@ -109,3 +112,14 @@ async def test_setting_after_a_thermal_mode_is_that_of_the_camera_at_work(mode: 
             ack = await write(w.client, "CAM_EV", 1.0, REAL32)
             assert (ack.param_result, value_of(ack)) == (dialect.PARAM_ACK_ACCEPTED, 1.0)
             assert sim_value(w.drone, "CAM_EV") == 1.0
+
+
+async def test_fence_type_set_back_after_an_unreported_change_is_sent_to_the_drone() -> None:
+    async with world(flavour="ardupilot") as w:
+        before = (await param_read(w.client, "FENCE_TYPE")).param_value
+        w.drone.faults.unreported = frozenset({ardrone3.NoFlyOverMaxDistanceChanged.NAME})
+        await param_write(w.client, "FENCE_TYPE", before + CIRCLE, INT8, "ardupilot", timeout=8.0)
+        assert w.drone.firmware.settings["geofence"] == 1
+        w.drone.faults.unreported = frozenset()
+        answer = await param_write(w.client, "FENCE_TYPE", before, INT8, "ardupilot")
+        assert (answer.param_value, w.drone.firmware.settings["geofence"]) == (before, 0)

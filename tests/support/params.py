@@ -52,8 +52,10 @@ def send_set(client: Client, name: str, value: float, kind: int, flavour: str = 
     client.send(dialect.MAVLink_param_set_message(1, 1, name.encode(), field, kind))
 
 
-async def write(client: Client, name: str, value: float, kind: int = 9, flavour: str = "px4") -> Any:
+async def write(
+    client: Client, name: str, value: float, kind: int = 9, flavour: str = "px4", timeout: float = 5.0
+) -> Any:
     """PARAM_SET, and the PARAM_VALUE of that name that follows."""
     mark = client.mark()
     send_set(client, name, value, kind, flavour)
-    return await client.wait("PARAM_VALUE", lambda m: m.param_id == name, since=mark)
+    return await client.wait("PARAM_VALUE", lambda m: m.param_id == name, since=mark, timeout=timeout)

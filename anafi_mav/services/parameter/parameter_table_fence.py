@@ -190,8 +190,7 @@ async def _set_types(host: Host, value: float) -> None:
         raise Refused(texts.FENCE, texts.CEILING_BIT, lasting=True)
     # Circles around home that were uploaded are zones like others; bit 1 is the drone's own circle of FENCE_RADIUS.
     host.vehicle.fence.choose(CEILING | (ZONES | HOME_CIRCLE if types & ZONES else 0) | types & FLOOR)
-    if bool(types & HOME_CIRCLE) != bool(host.drone.piloting.state.geofence):
-        await host.drone.piloting.set_geofence(bool(types & HOME_CIRCLE))
+    await host.drone.piloting.set_geofence(bool(types & HOME_CIRCLE))
 
 
 _TYPE_WORDS = {CEILING: "ceiling", HOME_CIRCLE: "circle", ZONES: "polygon", FLOOR: "floor"}
