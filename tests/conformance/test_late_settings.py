@@ -114,6 +114,17 @@ async def test_setting_after_a_thermal_mode_is_that_of_the_camera_at_work(mode: 
             assert sim_value(w.drone, "CAM_EV") == 1.0
 
 
+async def test_setting_set_back_after_an_unreported_change_is_sent_to_the_drone() -> None:
+    async with world() as w:
+        w.drone.faults.unreported = frozenset({camera.EvCompensation.NAME})
+        ack = await write(w.client, "CAM_EV", 1.0, REAL32)
+        assert (ack.param_result, value_of(ack)) == (dialect.PARAM_ACK_FAILED, 0.0)
+        w.drone.faults.unreported = frozenset()
+        ack = await write(w.client, "CAM_EV", 0.0, REAL32)
+        assert (ack.param_result, value_of(ack)) == (dialect.PARAM_ACK_ACCEPTED, 0.0)
+        assert sim_value(w.drone, "CAM_EV") == 0.0
+
+
 async def test_fence_type_set_back_after_an_unreported_change_is_sent_to_the_drone() -> None:
     async with world(flavour="ardupilot") as w:
         before = (await param_read(w.client, "FENCE_TYPE")).param_value
