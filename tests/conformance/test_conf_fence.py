@@ -996,3 +996,17 @@ async def test_conf_077_home_set_while_a_rally_point_is_refused_stays() -> None:
         await looked(w)
         assert homes(w) == [(200, 0), (10, 0)]
         assert preferred(w)[-1] == 3
+
+
+async def test_conf_077_home_type_is_restored_after_a_rally_point_whose_choice_is_not_reported() -> None:
+    async with world() as w:
+        await put(w, "RTL_TYPE", 1)
+        w.drone.faults.unreported = frozenset({rth.PreferredHomeType.NAME})
+        assert (await upload(w.client, [rally(around(PLACE, (-30.0, 0.0))[0], 20.0)], RALLY)).type == TAKEN
+        await w.take_off()
+        chosen = await w.drone.wait_log(lambda e: e.name == rth.SetPreferredHomeType.NAME, 10.0)
+        w.drone.faults.unreported = frozenset()
+        await said(w.client, "Rally point 0 not used", since=0, timeout=10.0)
+        await w.drone.wait_log(lambda e: e.name == rth.PreferredHomeType.NAME, 10.0, since=chosen.t)
+        assert preferred(w) == [RthHomeType.CUSTOM, RthHomeType.TAKEOFF]
+        assert w.drone.firmware.settings["home_type"] == RthHomeType.TAKEOFF

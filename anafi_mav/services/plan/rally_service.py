@@ -150,6 +150,7 @@ class RallyService(Service):
         async with self.host.vehicle.home_choice:
             if self._taken_over() or not self._may_choose():
                 return  # while we waited; the next look makes something of it
+            is_sent = False
             try:
                 if self._before() is None:
                     assert home.state.preferred_type is not None
@@ -157,13 +158,14 @@ class RallyService(Service):
                     await self._remember(home.state.preferred_type.name)
                 at = home_height(self.host.vehicle, point.ato)
                 self._given = await home.set_custom_location(point.latitude, point.longitude, at)
+                is_sent = True
                 await home.set_preferred_type(RthHomeType.CUSTOM)  # after the place: before it, home is an older one
             except AnafiMavError as error:
                 self._rejected[point] = now + REJECTED_FOR
                 self._chosen = None
                 self.host.text(Severity.WARNING, texts.RALLY_FAILED.fill(number=point.number, error=error))
                 # Not at the next tick: a return in between would go to the custom home of some other day.
-                await self._restore()
+                await self._restore(is_sent=is_sent)
             else:
                 self._chosen = point
                 self.host.vehicle.return_end.set_home(self._given, texts.RALLY_POINT.fill(number=point.number))
@@ -173,10 +175,10 @@ class RallyService(Service):
         async with self.host.vehicle.home_choice:
             await self._restore()
 
-    async def _restore(self) -> None:
+    async def _restore(self, *, is_sent: bool = False) -> None:
         """Restore the home type that the drone preferred before us.
 
-        A home that another controller has chosen since is kept.
+        A home that another controller has chosen since is kept. `is_sent`: our choice may be in force without a report.
         """
         home, before = self.host.drone.home, self._before()
         if before is None:
@@ -186,7 +188,7 @@ class RallyService(Service):
         if taken_over:
             self._preferred = self._preference
         try:
-            if home.state.preferred_type == RthHomeType.CUSTOM and not taken_over:
+            if (is_sent or home.state.preferred_type == RthHomeType.CUSTOM) and not taken_over:
                 await home.set_preferred_type(before)
         except AnafiMavError as error:
             self.host.warn_throttled(texts.HOME_TYPE_NOT_RESTORED.fill(error=error))
