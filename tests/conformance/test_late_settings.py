@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as stock
 from support.ext_params import CHOICE, value_of, write
+from support.mav import CAMERA
 from support.params import read as param_read
 from support.params import send_set
 from support.params import write as param_write
@@ -26,6 +27,7 @@ REAL32, INT8 = stock.MAV_PARAM_TYPE_REAL32, stock.MAV_PARAM_TYPE_INT8
 CIRCLE = 2
 """Bit of FENCE_TYPE."""
 SET_HOME, GLOBAL = stock.MAV_CMD_DO_SET_HOME, stock.MAV_FRAME_GLOBAL
+SET_CAMERA_MODE = stock.MAV_CMD_SET_CAMERA_MODE
 
 LATE = 1.15
 """s, the latest event of the quirk `scramble`, and one retransmission."""
@@ -134,3 +136,16 @@ async def test_fence_type_set_back_after_an_unreported_change_is_sent_to_the_dro
         w.drone.faults.unreported = frozenset()
         answer = await param_write(w.client, "FENCE_TYPE", before, INT8, "ardupilot")
         assert (answer.param_value, w.drone.firmware.settings["geofence"]) == (before, 0)
+
+
+async def test_camera_mode_set_back_after_an_unreported_change_is_sent_to_the_drone() -> None:
+    async with world() as w:
+        simulated = w.drone.firmware.payload.cameras[0]
+        assert simulated.mode is camera.CameraCameraMode.RECORDING
+        w.drone.faults.unreported = frozenset({camera.CameraMode.NAME})
+        ack = await w.client.command(SET_CAMERA_MODE, 0, stock.CAMERA_MODE_IMAGE, target=(1, CAMERA))
+        assert ack.result == stock.MAV_RESULT_FAILED
+        w.drone.faults.unreported = frozenset()
+        ack = await w.client.command(SET_CAMERA_MODE, 0, stock.CAMERA_MODE_VIDEO, target=(1, CAMERA))
+        assert ack.result == stock.MAV_RESULT_ACCEPTED
+        assert simulated.mode is camera.CameraCameraMode.RECORDING

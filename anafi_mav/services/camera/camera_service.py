@@ -195,9 +195,13 @@ class CameraService(Service):
             raise Refused(texts.CAMERA_MODE, texts.NO_SUCH_MODE, lasting=True)
         if wanted not in camera.modes:  # the thermal camera only records
             raise Refused(texts.CAMERA_MODE, texts.CAMERA_LACKS_MODE)
-        if camera.mode is not wanted:
+        try:
             require_free(self.host.vehicle, texts.CAMERA_MODE)
             require_idle(drone, texts.CAMERA_MODE)
+        except Refused:
+            if camera.mode is not wanted:
+                raise
+        else:  # also in the reported mode: an earlier change may be unreported
             if await drone.camera.set_mode(wanted, drone.camera.active_id) is not wanted:
                 raise Refused(texts.CAMERA_MODE, texts.CAMERA_MODE_KEPT)
         self._send_settings()
