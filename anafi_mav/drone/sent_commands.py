@@ -39,6 +39,9 @@ PLAN_MEMORY = 20.0
 """s in which a flight plan may begin; as Olympe (common.Mavlink.Start): the drone reads the whole file before it
 reports anything."""
 
+LATE_LINES = 2.0
+"""s after a flight plan has begun in which lines of the plan before it may still be reported."""
+
 TAKEN_OFF = frozenset({FlyingState.TAKINGOFF, FlyingState.HOVERING, FlyingState.FLYING})
 RISING = TAKEN_OFF | {FlyingState.MOTOR_RAMPING}
 
@@ -150,6 +153,10 @@ class SentCommand(msgspec.Struct, eq=False):
     """The caller's value for what it starts, by which it recognises reports of that."""
     answered: bool = False
     """An event was about it: its motors ramped up, say, or its withdrawn plan began."""
+    line: int = -1
+    """Newest line of its plan that was reported as executed, from 0; first the line before the one it begins with."""
+    begun_at: float = -math.inf
+    """When its plan was reported to play."""
     answer: Any = None
     """The wait of its verb, an `expectation.Expectation`."""
     phase: Phase = Phase.QUEUED
@@ -207,6 +214,8 @@ class SentCommands:
 
     def __init__(self) -> None:
         self._slots: dict[Slot, deque[SentCommand]] = {slot: deque(maxlen=KEPT) for slot in Slot}
+        self.is_line_late = False
+        """The line that was reported last is one of the plan before the newest one."""
 
     def place(self, sent: SentCommand, now: float) -> list[SentCommand]:
         """Add a command; return those that it replaces, whose verbs are not to wait any longer."""
@@ -288,6 +297,11 @@ class SentCommands:
         """Return True when a report of this plan may still be that of an earlier start."""
         named = (one for one in self._slots[Slot.PLAN] if one.target == plan)
         return any(one.phase is not Phase.CONFIRMED and one.may_be_reported(now) for one in named)
+
+    def newest_line(self, plan: str) -> int:
+        """Return the newest line of this plan that was reported as executed, from 0; -1: none."""
+        named = self._plan_named(plan)
+        return -1 if named is None else named.line
 
     def rule_out(self) -> None:
         """Note that no withdrawn command starts the motors any more.
@@ -386,7 +400,28 @@ class SentCommands:
                 one.apply(Event.OVER)  # the drone plays one plan at a time
         if sent is not None:
             sent.target = uid or sent.target
+            if not sent.is_in_effect:
+                sent.begun_at = now
             sent.apply(Event.EXECUTED)
+        return sent
+
+    def attribute_line(self, message: common.MissionItemExecuted, now: float) -> SentCommand | None:
+        """Return the start whose plan this line is of; None: no start of this program.
+
+        MissionItemExecuted has the number of the line alone. Lines of a plan are reported in their order, maybe after
+        the next plan has begun. One that follows the newest line of the plan before, and not that of the plan that
+        plays, is therefore one of the plan before.
+        """
+        line, sent, before = message.idx, None, None
+        for one in self._slots[Slot.PLAN]:
+            if one.begun_at > -math.inf:
+                before, sent = sent, one
+        self.is_line_late = False
+        if sent is None:
+            return None
+        if before is not None and now < sent.begun_at + LATE_LINES and line == before.line + 1 != sent.line + 1:
+            sent, self.is_line_late = before, True
+        sent.line = max(sent.line, line)
         return sent
 
     def _attribute_stopped(self, uid: str) -> SentCommand | None:

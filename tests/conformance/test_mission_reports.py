@@ -563,3 +563,29 @@ async def test_distance_and_number_of_the_next_way_point_are_reported() -> None:
         message = await w.client.wait("HIGH_LATENCY2", since=mark)
         assert message.wp_num == 2  # behind home and the take-off
         assert message.target_distance * 10 == pytest.approx(60.0 - w.drone.pose.north, abs=10.0)
+
+
+SQUARE = [way(9.0, 0.0, 6.0), way(9.0, 9.0, 6.0), way(0.0, 9.0, 6.0), way(0.0, 0.0, 6.0)]
+
+
+@pytest.mark.parametrize("is_uploaded", [False, True], ids=["restarted", "replaced"])
+async def test_line_of_the_file_before_that_is_reported_late_is_none_of_the_new_file(is_uploaded: bool) -> None:
+    """The report has the number of a line alone, here that of the last line of the new file."""
+    async with world(speed=1.0, web=True) as w:
+        await w.take_off(6.0)
+        await put(w, SQUARE)
+        w.drone.faults.late = {EXECUTED: 0.8}
+        assert (await w.client.command(START, 0, 0)).result == ACCEPTED
+        await w.drone.wait_log(lambda entry: entry.name == "item" and entry.args["index"] == 3, 40.0)
+        mark = w.client.mark()
+        if is_uploaded:
+            await put(w, [way(-6.0, 0.0, 6.0), way(-6.0, -6.0, 6.0), way(0.0, -6.0, 6.0)])
+            assert (await w.client.command(START, 0, 0)).result == ACCEPTED
+        else:
+            assert (await w.client.command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, 1)).result == ACCEPTED
+        begun = w.drone.log[-1].t
+        await w.drone.wait_log(lambda e: e.name == "plan" and e.args["state"] == "stopped", 60.0, since=begun)
+        seen = [whole(m).mission_state for _, m in w.client.since(mark, "MISSION_CURRENT")]
+        assert COMPLETE not in seen
+        await state(w, COMPLETE, since=mark)
+        assert reached(w, mark) == ([0, 1, 2] if is_uploaded else [1, 2, 3])

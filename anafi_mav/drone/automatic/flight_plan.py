@@ -162,6 +162,11 @@ class FlightPlan(Commanding[FlightPlanState]):
         sent = self._commander.sent.in_effect(Slot.PLAN)
         return sent is not None and sent.phase is Phase.WITHDRAWN
 
+    @property
+    def is_line_late(self) -> bool:
+        """True when the line that was reported last is one of the plan before the newest one."""
+        return self._commander.sent.is_line_late
+
     def is_undecided(self, uid: str) -> bool:
         """Return True when an earlier start of this plan may still begin; `start` refuses it then."""
         return self._commander.sent.is_undecided(uid, loop_time())
@@ -249,6 +254,8 @@ class FlightPlan(Commanding[FlightPlanState]):
         if self.is_undecided(uid):
             raise CommandRejected("an earlier start may still begin")
         sent = SentCommand(Slot.PLAN, uid, common.Stop(), plan_before=self.state.uid, cause=cause)
+        resumes = item == 0 and self.state.playing == PlayingState.PAUSED and self.state.uid == uid
+        sent.line = self._commander.sent.newest_line(uid) if resumes else item - 1
         begun = loop_time()
 
         def judge(message: Any) -> bool | AnafiMavError | None:

@@ -30,16 +30,16 @@ class Course:
     @property
     def first(self) -> int | None:
         """The item that the first part begins with; None when no part starts by itself."""
-        if not self.parts:
-            return None if self.rest is None else self.rest.item
-        head = self.parts[0]
-        return head.item if isinstance(head, GatewayStep) else head.origins[0]
+        if self.parts:
+            return _item_of(self.parts[0])
+        return None if self.rest is None else self.rest.item
 
     @property
     def following(self) -> int | None:
         """The item behind the part that is flown; None: nothing follows."""
-        item = self.without_first().first
-        return self.later if item is None else item
+        if len(self.parts) > 1:
+            return _item_of(self.parts[1])
+        return self.later if self.rest is None else self.rest.item
 
     def without_first(self) -> Course:
         """Return the course once its first part is flown."""
@@ -48,3 +48,8 @@ class Course:
     def ending_with_this_part(self) -> Course:
         """Return the course of a drone without a link: its file. The parts behind it do not start."""
         return Course(self.parts[:1], later=self.following)
+
+
+def _item_of(part: FlightPlanFile | GatewayStep) -> int:
+    """Return the item that a part begins with."""
+    return part.item if isinstance(part, GatewayStep) else part.origins[0]

@@ -575,7 +575,7 @@ class MissionFlight(PlainTask):
         machine = self.machine
         return {
             events.MavlinkFilePlayingStateChanged: self._on_playing,
-            events.MissionItemExecuted: lambda message, now: self._handle(machine.executed(message.idx, now)),
+            events.MissionItemExecuted: self._on_executed,
             events.WaypointSkipped: lambda message, now: self._handle(machine.skipped(message.item)),
         }
 
@@ -593,6 +593,10 @@ class MissionFlight(PlainTask):
             case PlayingState.PAUSED | PlayingState.STOPPED if flown is None:
                 stopped = message.state == PlayingState.STOPPED
                 self._handle(self.machine.halted(stopped=stopped, report=self._report(), now=self._now))
+
+    def _on_executed(self, message: events.MissionItemExecuted, now: float) -> None:
+        if not self._vehicle.drone.flight_plan.is_line_late:
+            self._handle(self.machine.executed(message.idx, now))
 
     def _on_position(self, values: Values, now: float) -> None:
         if self.machine.state is not State.ENDING:

@@ -363,6 +363,49 @@ def test_stopped_before_a_start_is_answered_says_nothing_of_it(sent: SentCommand
     assert one.phase is Q
 
 
+def lines(sent: SentCommands, *reports: tuple[int, float]) -> list[SentCommand | None]:
+    """Return the starts that these lines are attributed to, each reported at a time."""
+    return [sent.attribute_line(common.MissionItemExecuted(line), now) for line, now in reports]
+
+
+def two_plans(sent: SentCommands, *reported: int) -> tuple[SentCommand, SentCommand]:
+    """Return a start whose lines were reported so far, and the start that followed it at 10 s."""
+    old, new = plan("a"), plan("b", before="a")
+    sent.place(old, 0.0)
+    sent.attribute(playing(PLAYING, "a"), 1.0)
+    lines(sent, *((line, 2.0) for line in reported))
+    sent.attribute(playing(STOPPED, "a"), 9.0)
+    sent.place(new, 9.5)
+    sent.attribute(playing(PLAYING, "b"), 10.0)
+    return old, new
+
+
+def test_line_that_continues_the_plan_before_is_that_plans_for_two_seconds(sent: SentCommands) -> None:
+    old, new = two_plans(sent, 0, 1)
+    assert lines(sent, (2, 10.5), (0, 10.6), (1, 10.7)) == [old, new, new]
+    assert not sent.is_line_late
+    assert lines(sent, (3, 10.8)) == [old]
+    assert sent.is_line_late
+    assert (old.line, new.line) == (3, 1)
+    assert lines(sent, (4, 12.1)) == [new]
+
+
+def test_line_that_continues_both_plans_is_that_of_the_newer(sent: SentCommands) -> None:
+    _, new = two_plans(sent)
+    assert lines(sent, (0, 10.5)) == [new]
+
+
+def test_line_that_continues_no_plan_is_that_of_the_newer(sent: SentCommands) -> None:
+    """Lines between may not have been reported."""
+    _, new = two_plans(sent, 0, 1)
+    assert lines(sent, (4, 10.5)) == [new]
+
+
+def test_line_without_a_start_of_ours_is_of_no_start(sent: SentCommands) -> None:
+    assert lines(sent, (0, 1.0)) == [None]
+    assert not sent.is_line_late
+
+
 @pytest.mark.parametrize(("uid", "confirms"), [("renamed", True), ("", True), ("before", False), ("older", False)])
 def test_unknown_plan_name_confirms_the_awaited_start(sent: SentCommands, uid: str, confirms: bool) -> None:
     older, one = plan("older"), plan("a", before="before")
