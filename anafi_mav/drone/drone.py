@@ -168,6 +168,7 @@ class Drone:
         self.controller = Controller(self._commander, self._user_moves, self._pilot_takes_over, self._stand_by)
         self.piloting.pilot_has_source = lambda: self.controller.pilot_has_source
         self.piloting.end_unreported = self._end_unreported
+        self.flight_plan.end_unreported = lambda: self._plan_ended(PlayingState.STOPPED)
         self.flight_plan.model = lambda: self._model
         self.piloting.is_modern = lambda: self._model.protobuf
         self._commander.gate = self._allows

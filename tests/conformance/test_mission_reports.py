@@ -589,3 +589,31 @@ async def test_line_of_the_file_before_that_is_reported_late_is_none_of_the_new_
         assert COMPLETE not in seen
         await state(w, COMPLETE, since=mark)
         assert reached(w, mark) == ([0, 1, 2] if is_uploaded else [1, 2, 3])
+
+
+@pytest.mark.parametrize("is_replaced", [False, True], ids=["again", "replaced"])
+async def test_mission_starts_after_one_whose_end_is_never_reported(is_replaced: bool) -> None:
+    """A drone that flies no plan has no state to report when one is to be stopped."""
+    async with world(speed=1.0, web=True) as w:
+        await w.take_off(6.0)
+        await put(w, SQUARE[:2])
+        mark = w.client.mark()
+        assert (await w.client.command(START, 0, 0)).result == ACCEPTED
+        w.drone.faults.unreported = frozenset({PLAYING})
+        await state(w, COMPLETE, since=mark)
+        if is_replaced:
+            await put(w, SQUARE[2:])
+        begun = w.drone.log[-1].t
+
+        def starts(entry: Any) -> bool:
+            if (entry.kind, entry.name) != ("command", common.Start.NAME):
+                return False
+            w.drone.faults.unreported = frozenset()
+            return True
+
+        started = asyncio.ensure_future(w.drone.wait_log(starts, 30.0, since=begun))
+        assert (await w.client.command(START, 0, 0, timeout=30.0)).result == ACCEPTED
+        await started
+        mark = w.client.mark()
+        await state(w, COMPLETE, since=mark)
+        assert reached(w, mark) == [0, 1]

@@ -139,6 +139,8 @@ class FlightPlan(Commanding[FlightPlanState]):
         self._rest = rest
         self.model: Callable[[], Model] = lambda: NO_MODEL
         """Which drone it is; the drone sets it."""
+        self.end_unreported: Callable[[], None] = lambda: None
+        """Handles the end of a plan that the drone does not report; the drone sets it."""
 
     def on_playing(self, message: common.MavlinkFilePlayingStateChanged, now: float) -> None:
         """A flight plan plays, is paused or stopped."""
@@ -306,13 +308,28 @@ class FlightPlan(Commanding[FlightPlanState]):
         await self._end(common.Pause(), PlayingState.PAUSED, timeout)
 
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
-        """End the plan and hover; returns at once when none is playing, paused or starting."""
+        """End the plan and hover; returns at once when none is playing, paused or starting.
+
+        A drone that has ended its plan without a report may have nothing to answer: a plan that does not play counts as
+        stopped when the drone has received the command and then reported nothing.
+        """
         self._available()
         self._commander.abort_pending("stopped", Slot.PLAN)
         await self._commander.stops_delivered(common.Stop.NAME, timeout)
-        if self.state.playing in (None, PlayingState.STOPPED):
-            return
-        await self._end(common.Stop(), PlayingState.STOPPED, timeout)
+        if self.state.playing == PlayingState.PLAYING:
+            await self._end(common.Stop(), PlayingState.STOPPED, timeout)
+        elif self.state.playing == PlayingState.PAUSED:
+            await self._end_paused(timeout)
+
+    async def _end_paused(self, timeout: float) -> None:
+        judge: Callable[[Any], bool | None] = lambda message: True if message.state == PlayingState.STOPPED else None  # noqa: E731
+        end = self._commander.expect((common.MavlinkFilePlayingStateChanged,), judge)
+        try:
+            delivery = self._commander.send_stop(common.Stop())
+            if not await end.wait_or_quiet(delivery, common.Stop.NAME, timeout):
+                self.end_unreported()
+        finally:
+            end.close()
 
     async def _end(self, command: Message, wanted: PlayingState, timeout: float) -> None:
         ends = (wanted, PlayingState.STOPPED)
