@@ -617,3 +617,22 @@ async def test_mission_starts_after_one_whose_end_is_never_reported(is_replaced:
         mark = w.client.mark()
         await state(w, COMPLETE, since=mark)
         assert reached(w, mark) == [0, 1]
+
+
+@pytest.mark.parametrize("unreported", [{PLAYING, EXECUTED}, {PLAYING}], ids=["no lines", "all lines"])
+async def test_return_of_a_plan_whose_end_is_not_reported_completes_the_mission(unreported: set[str]) -> None:
+    """The drone names its plan as the reason of the return; after it the mode is that of a drone that hovers."""
+    async with world(speed=2.0, web=True) as w:
+        await write(w.client, "ANF_RTL_END", 1, dialect.MAV_PARAM_TYPE_INT32)
+        await w.take_off(6.0)
+        await put(w, [*SQUARE[:2], RTL])
+        mark = w.client.mark()
+        assert (await w.client.command(START, 0, 0)).result == ACCEPTED
+        w.drone.faults.unreported = frozenset(unreported)
+        await state(w, COMPLETE, since=mark)
+        assert w.drone.firmware.homing.active
+        await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("Return ended"), since=mark, timeout=30.0)
+        mark = w.client.mark()
+        await watched(3.0)
+        assert {m.custom_mode for _, m in w.client.since(mark, "HEARTBEAT") if m.get_srcComponent() == 1} == {HOLD}
+        assert not [m.text for _, m in w.client.since(0, "STATUSTEXT") if "paused" in m.text]

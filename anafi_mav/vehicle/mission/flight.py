@@ -612,7 +612,11 @@ class MissionFlight(PlainTask):
             case State.ENDING:
                 may_end = True
             case State.FLYING_FILE:
-                may_end = machine.progress.leg_done or drone.piloting.settled.flying is FlyingState.LANDING
+                descends = (
+                    drone.piloting.settled.flying is FlyingState.LANDING
+                    or drone.home.settled.reason is events.ReturnReason.FLIGHTPLAN
+                )
+                may_end = machine.progress.leg_done or descends
             case _:
                 may_end = False
         if may_end:

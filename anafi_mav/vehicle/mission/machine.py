@@ -317,8 +317,8 @@ class MissionMachine:
         self.mission = Mission()
         self.progress = MissionProgress()
         self.phase = MissionPhase(S.NO_MISSION, S.NO_MISSION)
-        self._unended: str | None = None
-        """The plan whose last line is executed, and whose end the drone has not reported; None: none.
+        self._flown_plan: str | None = None
+        """The newest plan that is flown completely, also if the drone has not reported its end; None: none.
 
         That is no progress of the mission, which may have been replaced since.
         """
@@ -400,7 +400,7 @@ class MissionMachine:
 
         Such a drone goes on reporting that it flies it. False once that plan is started again.
         """
-        return uid is not None and uid == self._unended
+        return uid is not None and uid == self._flown_plan
 
     @property
     def leads_home(self) -> bool:
@@ -665,7 +665,7 @@ class MissionMachine:
         """
         if attempt is not None and attempt is not self.phase.attempt:
             return []
-        self._unended = None
+        self._flown_plan = None
         if attempt is not None:
             return self._playing(attempt)
         if uid == self.phase.plays:
@@ -704,7 +704,7 @@ class MissionMachine:
 
     def halted(self, *, stopped: bool, report: DroneReport, now: float) -> list[Effect]:
         """The drone reports its plan as paused, or as `stopped`."""
-        self.phase, self._unended = replace(self.phase, plays=None, stops=False), None
+        self.phase, self._flown_plan = replace(self.phase, plays=None, stops=False), None
         return self._halted(stopped=stopped, report=report, now=now)
 
     @_on(E.HALTED)
@@ -766,7 +766,7 @@ class MissionMachine:
             if self.progress.leg_done:  # its last line may be executed before the drone reports its plan as stopped
                 if self.ending and report.lands_or_returns:
                     yield from self._part_over()
-            elif report.lands and self._leads_down:
+            elif (report.lands and self._leads_down) or (report.returns_by_plan and self.leads_home):
                 yield from self._await_end(report, now)
             return
         if kind is None:
@@ -788,7 +788,7 @@ class MissionMachine:
         state, flew, course = self.state, self.flying, self.progress.course
         is_last_part = course.following is None and course.later is None
         if state is S.FLYING_FILE and self.progress.leg_done and is_last_part and not self.ending:
-            self._unended = self.progress.uid  # only the end of its plan was not reported yet
+            self._flown_plan = self.progress.uid  # only the end of its plan was not reported yet
             yield from self._complete()
             yield Suspend(starting=False)
             return
@@ -816,7 +816,6 @@ class MissionMachine:
             case S.FLYING_FILE:  # its plan has ended, but that was not reported
                 self.phase = replace(phase, until=math.inf)
                 if self.progress.leg_done:
-                    self._unended = self.progress.uid
                     yield from self._part_over()
             case _:
                 yield from self._look(report, last=True)
@@ -903,6 +902,7 @@ class MissionMachine:
     def _part_over(self) -> _Steps:
         """The first part is flown: begin the next one, or end the mission."""
         progress = self.progress
+        self._flown_plan = progress.uid
         course = progress.course.without_first()
         following = course.first
         if following is None and course.later is not None:
