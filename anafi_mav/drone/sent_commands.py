@@ -195,6 +195,10 @@ class SentCommand(msgspec.Struct, eq=False):
         closed = self.phase in (Phase.WITHDRAWN, Phase.ABANDONED)
         return self.awaited or self.phase is Phase.CONFIRMED or (closed and now < self.reported_until)
 
+    def continues(self, line: int) -> bool:
+        """Return True for a line that repeats or follows the newest one of its plan."""
+        return self.line <= line <= self.line + 1
+
     def apply(self, event: Event, now: float = -math.inf) -> None:
         """Change the phase. `now` is needed for WITHDRAWN and ABANDONED."""
         self.delivered = self.delivered or event is Event.DELIVERED
@@ -409,8 +413,8 @@ class SentCommands:
         """Return the start whose plan this line is of; None: no start of this program.
 
         MissionItemExecuted has the number of the line alone. Lines of a plan are reported in their order, maybe after
-        the next plan has begun. One that follows the newest line of the plan before, and not that of the plan that
-        plays, is therefore one of the plan before.
+        the next plan has begun. One that repeats or follows the newest line of the plan before, and does not follow
+        that of the plan that plays, is therefore one of the plan before.
         """
         line, sent, before = message.idx, None, None
         for one in self._slots[Slot.PLAN]:
@@ -419,7 +423,7 @@ class SentCommands:
         self.is_line_late = False
         if sent is None:
             return None
-        if before is not None and now < sent.begun_at + LATE_LINES and line == before.line + 1 != sent.line + 1:
+        if before is not None and now < sent.begun_at + LATE_LINES and line != sent.line + 1 and before.continues(line):
             sent, self.is_line_late = before, True
         sent.line = max(sent.line, line)
         return sent

@@ -591,6 +591,21 @@ async def test_line_of_the_file_before_that_is_reported_late_is_none_of_the_new_
         assert reached(w, mark) == ([0, 1, 2] if is_uploaded else [1, 2, 3])
 
 
+async def test_line_of_the_file_before_that_is_reported_twice_is_none_of_the_new_file() -> None:
+    async with world(speed=1.0, web=True) as w:
+        await w.take_off(6.0)
+        await put(w, SQUARE)
+        assert (await w.client.command(START, 0, 0)).result == ACCEPTED
+        await state(w, ACTIVE, seq=3, since=0)
+        mark = w.client.mark()
+        assert (await w.client.command(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, 1)).result == ACCEPTED
+        w.drone.inject(common.MissionItemExecuted(2))
+        begun = w.drone.log[-1].t
+        await w.drone.wait_log(lambda e: e.name == "plan" and e.args["state"] == "stopped", 60.0, since=begun)
+        await state(w, COMPLETE, since=w.client.mark())
+        assert reached(w, mark) == [1, 2, 3]
+
+
 @pytest.mark.parametrize("is_replaced", [False, True], ids=["again", "replaced"])
 async def test_mission_starts_after_one_whose_end_is_never_reported(is_replaced: bool) -> None:
     """A drone that flies no plan has no state to report when one is to be stopped."""

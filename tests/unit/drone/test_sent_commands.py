@@ -382,7 +382,7 @@ def two_plans(sent: SentCommands, *reported: int) -> tuple[SentCommand, SentComm
 
 def test_line_that_continues_the_plan_before_is_that_plans_for_two_seconds(sent: SentCommands) -> None:
     old, new = two_plans(sent, 0, 1)
-    assert lines(sent, (2, 10.5), (0, 10.6), (1, 10.7)) == [old, new, new]
+    assert lines(sent, (1, 10.4), (2, 10.5), (0, 10.6), (1, 10.7)) == [old, old, new, new]
     assert not sent.is_line_late
     assert lines(sent, (3, 10.8)) == [old]
     assert sent.is_line_late
