@@ -414,13 +414,19 @@ class SentCommands:
 
         MissionItemExecuted has the number of the line alone. Lines of a plan are reported in their order, maybe after
         the next plan has begun. One that repeats or follows the newest line of the plan before, and does not follow
-        that of the plan that plays, is therefore one of the plan before.
+        that of the plan that plays, is therefore one of the plan before. One that neither repeats nor follows it, and
+        that the newest start begins with, precedes the report that the plan of that start plays.
         """
-        line, sent, before = message.idx, None, None
+        line, sent, before, unbegun = message.idx, None, None, None
         for one in self._slots[Slot.PLAN]:
             if one.begun_at > -math.inf:
-                before, sent = sent, one
+                before, sent, unbegun = sent, one, None
+            else:
+                unbegun = one
         self.is_line_late = False
+        if unbegun is not None and line == unbegun.line + 1 and (sent is None or not sent.continues(line)):
+            unbegun.line = line
+            return unbegun
         if sent is None:
             return None
         if before is not None and now < sent.begun_at + LATE_LINES and line != sent.line + 1 and before.continues(line):

@@ -651,3 +651,16 @@ async def test_return_of_a_plan_whose_end_is_not_reported_completes_the_mission(
         await watched(3.0)
         assert {m.custom_mode for _, m in w.client.since(mark, "HEARTBEAT") if m.get_srcComponent() == 1} == {HOLD}
         assert not [m.text for _, m in w.client.since(0, "STATUSTEXT") if "paused" in m.text]
+
+
+@pytest.mark.parametrize("late", [0.3, 1.5])
+async def test_line_that_is_reported_before_its_plan_is_reached(late: float) -> None:
+    """The drone stands at the first way point, and reports that before it reports that it flies the plan."""
+    async with world(speed=1.0, web=True) as w:
+        await w.take_off(6.0)
+        await put(w, [way(0.0, 0.0, 6.0), *SQUARE[:2]])
+        w.drone.faults.late = {PLAYING: late}
+        mark = w.client.mark()
+        assert (await w.client.command(START, 0, 0)).result == ACCEPTED
+        await state(w, COMPLETE, since=mark)
+        assert reached(w, mark) == [0, 1, 2]

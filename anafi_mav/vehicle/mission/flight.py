@@ -588,8 +588,8 @@ class MissionFlight(PlainTask):
         flown = plan.flown
         match message.state:
             case PlayingState.PLAYING if not plan.plays_withdrawn:
-                attempt = flown.cause if isinstance(flown, SentCommand) else None
-                self._handle(self.machine.playing(message.filepath, attempt, now))
+                attempt, line = (flown.cause, flown.line) if isinstance(flown, SentCommand) else (None, -1)
+                self._handle(self.machine.playing(message.filepath, attempt, now, line=line))
             case PlayingState.PAUSED | PlayingState.STOPPED if flown is None:
                 stopped = message.state == PlayingState.STOPPED
                 self._handle(self.machine.halted(stopped=stopped, report=self._report(), now=self._now))

@@ -658,23 +658,25 @@ class MissionMachine:
 
     # Reports of the drone.
 
-    def playing(self, uid: str, attempt: MissionAttempt | None, now: float = math.inf) -> list[Effect]:
+    def playing(
+        self, uid: str, attempt: MissionAttempt | None, now: float = math.inf, *, line: int = -1
+    ) -> list[Effect]:
         """The drone flies the plan of this name; it may report that twice.
 
-        `attempt` has started it; None: another controller.
+        `attempt` has started it; None: another controller. `line`: the newest one that it has reported already.
         """
         if attempt is not None and attempt is not self.phase.attempt:
             return []
         self._flown_plan = None
         if attempt is not None:
-            return self._playing(attempt)
+            return self._playing(attempt, line, now)
         if uid == self.phase.plays:
             return []
         known = self._paused_file()
         return self._other_playing(uid) if known is None or uid != known.uid else self._resumed(known, now)
 
     @_on(E.PLAYING)
-    def _playing(self, attempt: MissionAttempt) -> _Steps:
+    def _playing(self, attempt: MissionAttempt, line: int, now: float) -> _Steps:
         prepared = self.phase.prepared
         assert prepared is not None, "STARTING has it"
         leg = prepared.course.parts[0]
@@ -683,7 +685,9 @@ class MissionMachine:
         progress = self.progress.in_file(prepared.uid, leg, prepared.line)
         self.progress = replace(progress, course=prepared.course, jumps=jumps)
         self.phase = MissionPhase(S.FLYING_FILE, S.FLYING_FILE, attempt, prepared)
-        yield from ()
+        for executed in range(prepared.line + 1, min(line + 1, len(leg.origins))):
+            yield from self._execute(executed)
+            self._limit(now)
 
     @_on(E.RESUMED)
     def _resumed(self, known: MissionProgress, now: float) -> _Steps:

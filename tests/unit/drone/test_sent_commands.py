@@ -401,6 +401,14 @@ def test_line_that_continues_no_plan_is_that_of_the_newer(sent: SentCommands) ->
     assert lines(sent, (4, 10.5)) == [new]
 
 
+def test_line_before_the_report_of_its_plan_is_that_of_the_awaited_start(sent: SentCommands) -> None:
+    old, new, third = *two_plans(sent, 0, 1), plan("c", before="b")
+    assert lines(sent, (0, 10.5), (1, 10.6), (2, 10.7)) == [new, new, new]
+    sent.place(third, 20.0)
+    assert lines(sent, (2, 20.1), (3, 20.2), (0, 20.3), (1, 20.4)) == [new, new, third, third]
+    assert (old.line, new.line, third.line) == (1, 3, 1)
+
+
 def test_line_without_a_start_of_ours_is_of_no_start(sent: SentCommands) -> None:
     assert lines(sent, (0, 1.0)) == [None]
     assert not sent.is_line_late
