@@ -99,7 +99,7 @@ ITEMS: dict[int, Item] = {
     75: Item("every kind of item is executed, in order"),
     76: Item("fence uploaded and enforced, FENCE_STATUS"),
     77: Item("rally points uploaded and downloaded"),
-    78: Item("orbit: AMSL in every frame, both directions"),
+    78: Item("orbit: AMSL in every frame of PX4 clients, both directions"),
     79: Item("ORBIT_EXECUTION_STATUS while it lasts"),
     80: Item("region of interest turns drone and camera"),
     81: Item("DO_REPOSITION's heading in radians; unset keeps it"),
