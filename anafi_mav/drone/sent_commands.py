@@ -40,7 +40,7 @@ PLAN_MEMORY = 20.0
 reports anything."""
 
 LATE_LINES = 2.0
-"""s after a flight plan has begun in which lines of the plan before it may still be reported."""
+"""s after the end of a flight plan in which lines of it may still be reported."""
 
 TAKEN_OFF = frozenset({FlyingState.TAKINGOFF, FlyingState.HOVERING, FlyingState.FLYING})
 RISING = TAKEN_OFF | {FlyingState.MOTOR_RAMPING}
@@ -157,6 +157,8 @@ class SentCommand(msgspec.Struct, eq=False):
     """Newest line of its plan that was reported as executed, from 0; first the line before the one it begins with."""
     begun_at: float = -math.inf
     """When its plan was reported to play."""
+    ended_at: float = math.inf
+    """When the end of that was reported, or the beginning of another plan."""
     answer: Any = None
     """The wait of its verb, an `expectation.Expectation`."""
     phase: Phase = Phase.QUEUED
@@ -195,9 +197,12 @@ class SentCommand(msgspec.Struct, eq=False):
         closed = self.phase in (Phase.WITHDRAWN, Phase.ABANDONED)
         return self.awaited or self.phase is Phase.CONFIRMED or (closed and now < self.reported_until)
 
-    def continues(self, line: int) -> bool:
-        """Return True for a line that repeats or follows the newest one of its plan."""
-        return self.line <= line <= self.line + 1
+    def continues(self, line: int, now: float) -> bool:
+        """Return True for a line that repeats or follows the newest one.
+
+        False once its plan has ended `LATE_LINES` ago.
+        """
+        return self.line <= line <= self.line + 1 and now < self.ended_at + LATE_LINES
 
     def apply(self, event: Event, now: float = -math.inf) -> None:
         """Change the phase. `now` is needed for WITHDRAWN and ABANDONED."""
@@ -347,7 +352,7 @@ class SentCommands:
             case common.MavlinkFilePlayingStateChanged(state=PlayingState.PLAYING):
                 return self._attribute_playing(message.filepath, now)
             case common.MavlinkFilePlayingStateChanged():
-                return self._attribute_stopped(message.filepath)
+                return self._attribute_stopped(message.filepath, now)
             case common.StartingErrorEvent():
                 return self._attribute_start_error(now)
         return None
@@ -401,6 +406,7 @@ class SentCommands:
             sent = None
         for one in plans:
             if one is not sent and one.is_in_effect:
+                one.ended_at = now
                 one.apply(Event.OVER)  # the drone plays one plan at a time
         if sent is not None:
             sent.target = uid or sent.target
@@ -424,17 +430,17 @@ class SentCommands:
             else:
                 unbegun = one
         self.is_line_late = False
-        if unbegun is not None and line == unbegun.line + 1 and (sent is None or not sent.continues(line)):
+        if unbegun is not None and line == unbegun.line + 1 and (sent is None or not sent.continues(line, now)):
             unbegun.line = line
             return unbegun
         if sent is None:
             return None
-        if before is not None and now < sent.begun_at + LATE_LINES and line != sent.line + 1 and before.continues(line):
+        if before is not None and line != sent.line + 1 and before.continues(line, now):
             sent, self.is_line_late = before, True
         sent.line = max(sent.line, line)
         return sent
 
-    def _attribute_stopped(self, uid: str) -> SentCommand | None:
+    def _attribute_stopped(self, uid: str, now: float) -> SentCommand | None:
         """PAUSED and STOPPED name the plan or nothing.
 
         - One that names another plan of this program than the one that plays is an older one.
@@ -445,6 +451,7 @@ class SentCommands:
         if playing is not None:
             if named is not None and named.target != playing.target:
                 return named
+            playing.ended_at = now
             playing.apply(Event.OVER)
             return playing
         for one in plans:

@@ -664,3 +664,19 @@ async def test_line_that_is_reported_before_its_plan_is_reached(late: float) -> 
         assert (await w.client.command(START, 0, 0)).result == ACCEPTED
         await state(w, COMPLETE, since=mark)
         assert reached(w, mark) == [0, 1, 2]
+
+
+async def test_line_before_the_report_of_its_plan_is_none_of_a_plan_that_ended_long_ago() -> None:
+    """The earlier plan was stopped before its first line."""
+    async with world(speed=1.0, web=True) as w:
+        await w.take_off(6.0)
+        await put(w, SQUARE)
+        assert (await w.client.command(START, 0, 0)).result == ACCEPTED
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        await put(w, [way(0.0, 0.0, 6.0), way(1.5, 0.0, 6.0)])
+        await watched(3.0)
+        w.drone.faults.late = {PLAYING: 1.5}
+        mark = w.client.mark()
+        assert (await w.client.command(START, 0, 0)).result == ACCEPTED
+        await state(w, COMPLETE, since=mark)
+        assert reached(w, mark) == [0, 1]

@@ -374,8 +374,8 @@ def two_plans(sent: SentCommands, *reported: int) -> tuple[SentCommand, SentComm
     sent.place(old, 0.0)
     sent.attribute(playing(PLAYING, "a"), 1.0)
     lines(sent, *((line, 2.0) for line in reported))
-    sent.attribute(playing(STOPPED, "a"), 9.0)
-    sent.place(new, 9.5)
+    sent.attribute(playing(STOPPED, "a"), 10.0)
+    sent.place(new, 10.0)
     sent.attribute(playing(PLAYING, "b"), 10.0)
     return old, new
 
@@ -407,6 +407,15 @@ def test_line_before_the_report_of_its_plan_is_that_of_the_awaited_start(sent: S
     sent.place(third, 20.0)
     assert lines(sent, (2, 20.1), (3, 20.2), (0, 20.3), (1, 20.4)) == [new, new, third, third]
     assert (old.line, new.line, third.line) == (1, 3, 1)
+
+
+def test_line_before_the_report_of_its_plan_continues_no_plan_that_ended_long_ago(sent: SentCommands) -> None:
+    _, new = two_plans(sent)
+    sent.attribute(playing(STOPPED, "b"), 11.0)
+    third = plan("c", before="b")
+    sent.place(third, 13.0)
+    assert lines(sent, (0, 13.1)) == [third]
+    assert (new.line, third.line) == (-1, 0)
 
 
 def test_line_without_a_start_of_ours_is_of_no_start(sent: SentCommands) -> None:
