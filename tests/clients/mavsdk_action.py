@@ -35,23 +35,12 @@ async def calibrated(name: str, steps: AsyncIterator[Any]) -> None:
         say("calibrated", name, error.result.name)
 
 
-async def cancelled(calibration: CalibrationAsync) -> None:
-    """A calibration that is cancelled once its first instruction has arrived."""
-    steps = calibration.calibrate_magnetometer()
-    async for _, step in steps:
-        if step.has_status_text:
-            break
-    await calibration.cancel()
-    await calibrated("cancelled", steps)
-
-
 async def main(url: str) -> None:
     async with connected(url) as drone:
         action, telemetry, calibration = ActionAsync(drone), TelemetryAsync(drone), CalibrationAsync(drone)
         await until(telemetry.subscribe_health_all_ok(), bool)
         await calibrated("magnetometer", calibration.calibrate_magnetometer())
         await calibrated("horizon", calibration.calibrate_level_horizon())
-        await cancelled(calibration)
         await calibrated("gyro", calibration.calibrate_gyro())
 
         await action.set_takeoff_altitude(6.0)

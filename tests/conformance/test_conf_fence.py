@@ -646,7 +646,7 @@ async def test_drones_own_circle_is_neither_enabled_nor_disabled_by_command() ->
         assert (await client.command(ENABLE, 1, circle_kind)).result == ACCEPTED
         assert not [text for text in texts(client, mark) if "Fence" in text]
         assert (await client.command(ENABLE, 0, circle_kind)).result == DENIED
-        await said(client, "Fence refused: drone's circle stays (ANF_GEOFENCE)", since=mark)
+        await said(client, "Fence refused: circle set by ANF_GEOFENCE", since=mark)
         assert own_fence(w) == (100.0, 1)
 
 

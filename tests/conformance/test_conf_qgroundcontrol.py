@@ -114,6 +114,8 @@ async def test_compass_calibration_turns_three_of_qgroundcontrols_pictures() -> 
         calibrate = dialect.MAV_CMD_PREFLIGHT_CALIBRATION
         ack = await w.client.command(calibrate, 0, 1, 0, 0, x=0.0, y=0.0, z=0.0, timeout=20.0)
         assert ack.result == dialect.MAV_RESULT_ACCEPTED
+        done = "[cal] calibration done: mag"
+        await w.client.wait("STATUSTEXT", lambda m: m.text == done, since=mark, timeout=20.0)
         said = [m.text for _, m in w.client.since(mark, "STATUSTEXT")]
         sides = [
             text for text in said if text.endswith(("orientation detected", "side done, rotate to a different side"))
@@ -123,7 +125,7 @@ async def test_compass_calibration_turns_three_of_qgroundcontrols_pictures() -> 
             for side in ("front", "left", "down")
             for what in ("orientation detected", "side done, rotate to a different side")
         ]
-        assert said[-1] == "[cal] calibration done: mag"
+        assert said[-1] == done
 
 
 class Toolbar:

@@ -143,18 +143,25 @@ async def test_hold_ends_a_climb_that_the_late_end_of_an_equal_one_crosses(late:
         assert w.drone.pose.up < min(up + 2.0, 16.0)
 
 
-@pytest.mark.parametrize("late", [1.3, 1.7])
+@pytest.mark.parametrize("late", [1.2, 1.65])
 async def test_turn_is_not_accepted_by_the_late_end_of_a_like_one_before_it_can_be_over(late: float) -> None:
-    """It arrives after the time of the fastest drone, and before that of the rate which was commanded."""
+    """It arrives after the time of the fastest drone, and before that of the rate which was commanded.
+
+    `late`: s after the drone's receipt of the second turn.
+    """
     async with world(speed=1.0) as w:
         await w.take_off(5.0)
-        w.drone.faults.late = {MOVED_BY: late}
+        w.drone.faults.unreported = frozenset({MOVED_BY})
         began = now()
         w.client.send_command(YAW, 40, 30, 1, 1)
         await flies(w, "flying", began)
         await flies(w, "hovering", now())
-        mark, heading = w.client.mark(), w.drone.pose.yaw
+        w.drone.faults.unreported = frozenset()
+        mark, heading, began = w.client.mark(), w.drone.pose.yaw, now()
         w.client.send_command(YAW, 41, 30, 1, 1)
+        await w.drone.wait_log(lambda e: e.kind == "command" and e.name.endswith("ove_by"), 5.0, since=began)
+        end = ardrone3.MoveByEnd(0.0, 0.0, 0.0, math.radians(40.0), ardrone3.MoveByError.OK)
+        asyncio.get_running_loop().call_later(late, w.drone.inject, end)
         while (YAW, ACCEPTED) not in (found := results(w.client, mark)):
             await until(w.client, mark, len(found) + 1)
         assert math.degrees(w.drone.pose.yaw - heading) > 38.0

@@ -190,7 +190,7 @@ async def test_refused_custom_home_is_reported_before_the_timeout(device: Script
     with pytest.raises(CommandRejected, match="does not accept the place"):
         await drone.home.set_custom_location(48.5, 2.25, 0.0, timeout=60.0)
     device.script[rth.SetCustomLocation] = lambda _: []
-    with pytest.raises(CommandTimeout, match="within 1.5 s"):
+    with pytest.raises(CommandTimeout, match=r"within 1\.5 s"):
         await drone.home.set_custom_location(48.5, 2.25, 0.0, timeout=60.0)
     device.session.air = lambda data, inward, hand_on: None if inward else hand_on(data)
     with pytest.raises(CommandTimeout):
