@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import os
 import random
 import socket
 from collections.abc import AsyncIterator, Callable, Sequence
@@ -59,10 +61,17 @@ MODES = {
 }
 
 
+_hosts = itertools.count(random.randrange(254))
+
+
 def loopback() -> str:
-    """An address of the loopback network that no one else uses: two runs on one machine do not meet."""
+    """An address of the loopback network that no one else uses: two runs on one machine do not meet.
+
+    Each process has a network of its own, by its process id, and takes the addresses of that in turn.
+    """
+    network, host = divmod(os.getpid() % (63 * 254), 254)
     while True:
-        address = f"127.{random.randint(64, 126)}.{random.randint(1, 254)}.{random.randint(1, 254)}"
+        address = f"127.{64 + network}.{1 + host}.{1 + next(_hosts) % 254}"
         with socket.socket() as probe:
             try:
                 probe.bind((address, 44445))

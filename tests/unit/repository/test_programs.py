@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from support import clock
 from support.programs import PROGRAM
+from support.world import loopback
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="support.programs needs PR_SET_CHILD_SUBREAPER, which only Linux has"
@@ -45,7 +46,7 @@ def test_forked_program_takes_its_folder_environment_and_stdin(tmp_path: Path) -
 
 
 def test_forked_program_is_a_child_of_ours_until_it_has_ended() -> None:
-    address = "127.63.1.1"
+    address = loopback()
     words = ["sim", "--address", address, "--rtsp-port", "0", "--http-port", "0"]
     files = []
     for start, forked in (FORKED, True), (STARTED, False):
