@@ -202,7 +202,6 @@ class Drone:
             ardrone3.FlyingStateChanged: self._flying_state_says,
             common.MavlinkFilePlayingStateChanged: self._plan_says,
             common.StartingErrorEvent: self._commander.sent.attribute,
-            common.MissionItemExecuted: self._commander.sent.attribute_line,
             common.Disconnection: self._on_dismissal,
             drone_manager.ConnectionState: self._controller_says,
             device_manager.State: self._controller_says,

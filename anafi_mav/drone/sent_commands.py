@@ -223,8 +223,6 @@ class SentCommands:
 
     def __init__(self) -> None:
         self._slots: dict[Slot, deque[SentCommand]] = {slot: deque(maxlen=KEPT) for slot in Slot}
-        self.is_line_late = False
-        """The line that was reported last is one of the plan before the newest one."""
 
     def place(self, sent: SentCommand, now: float) -> list[SentCommand]:
         """Add a command; return those that it replaces, whose verbs are not to wait any longer."""
@@ -415,30 +413,31 @@ class SentCommands:
             sent.apply(Event.EXECUTED)
         return sent
 
-    def attribute_line(self, message: common.MissionItemExecuted, now: float) -> SentCommand | None:
-        """Return the start whose plan this line is of; None: no start of this program.
+    def attribute_line(self, line: int, now: float) -> tuple[SentCommand | None, bool]:
+        """Return the start whose plan an executed line is of, and whether the line is late.
+
+        None: no start of this program. A late line is of the plan before the newest one.
 
         MissionItemExecuted has the number of the line alone. Lines of a plan are reported in their order, maybe after
         the next plan has begun. One that repeats or follows the newest line of the plan before, and does not follow
         that of the plan that plays, is therefore one of the plan before. One that neither repeats nor follows it, and
         that the newest start begins with, precedes the report that the plan of that start plays.
         """
-        line, sent, before, unbegun = message.idx, None, None, None
+        sent, before, unbegun, is_late = None, None, None, False
         for one in self._slots[Slot.PLAN]:
             if one.begun_at > -math.inf:
                 before, sent, unbegun = sent, one, None
             else:
                 unbegun = one
-        self.is_line_late = False
         if unbegun is not None and line == unbegun.line + 1 and (sent is None or not sent.continues(line, now)):
             unbegun.line = line
-            return unbegun
+            return unbegun, False
         if sent is None:
-            return None
+            return None, False
         if before is not None and line != sent.line + 1 and before.continues(line, now):
-            sent, self.is_line_late = before, True
+            sent, is_late = before, True
         sent.line = max(sent.line, line)
-        return sent
+        return sent, is_late
 
     def _attribute_stopped(self, uid: str, now: float) -> SentCommand | None:
         """PAUSED and STOPPED name the plan or nothing.

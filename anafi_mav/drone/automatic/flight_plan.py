@@ -164,10 +164,12 @@ class FlightPlan(Commanding[FlightPlanState]):
         sent = self._commander.sent.in_effect(Slot.PLAN)
         return sent is not None and sent.phase is Phase.WITHDRAWN
 
-    @property
-    def is_line_late(self) -> bool:
-        """True when the line that was reported last is one of the plan before the newest one."""
-        return self._commander.sent.is_line_late
+    def attribute_line(self, line: int, now: float) -> bool:
+        """Attribute a line that is reported as executed to a plan, once for each report.
+
+        Return True when it is of the plan before the newest one.
+        """
+        return self._commander.sent.attribute_line(line, now)[1]
 
     def is_undecided(self, uid: str) -> bool:
         """Return True when an earlier start of this plan may still begin; `start` refuses it then."""

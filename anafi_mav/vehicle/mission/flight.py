@@ -595,7 +595,7 @@ class MissionFlight(PlainTask):
                 self._handle(self.machine.halted(stopped=stopped, report=self._report(), now=self._now))
 
     def _on_executed(self, message: events.MissionItemExecuted, now: float) -> None:
-        if not self._vehicle.drone.flight_plan.is_line_late:
+        if not self._vehicle.drone.flight_plan.attribute_line(message.idx, now):
             self._handle(self.machine.executed(message.idx, now))
 
     def _on_position(self, values: Values, now: float) -> None:

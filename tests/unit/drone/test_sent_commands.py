@@ -365,7 +365,7 @@ def test_stopped_before_a_start_is_answered_says_nothing_of_it(sent: SentCommand
 
 def lines(sent: SentCommands, *reports: tuple[int, float]) -> list[SentCommand | None]:
     """Return the starts that these lines are attributed to, each reported at a time."""
-    return [sent.attribute_line(common.MissionItemExecuted(line), now) for line, now in reports]
+    return [sent.attribute_line(line, now)[0] for line, now in reports]
 
 
 def two_plans(sent: SentCommands, *reported: int) -> tuple[SentCommand, SentCommand]:
@@ -382,10 +382,9 @@ def two_plans(sent: SentCommands, *reported: int) -> tuple[SentCommand, SentComm
 
 def test_line_that_continues_the_plan_before_is_that_plans_for_two_seconds(sent: SentCommands) -> None:
     old, new = two_plans(sent, 0, 1)
-    assert lines(sent, (1, 10.4), (2, 10.5), (0, 10.6), (1, 10.7)) == [old, old, new, new]
-    assert not sent.is_line_late
-    assert lines(sent, (3, 10.8)) == [old]
-    assert sent.is_line_late
+    assert lines(sent, (1, 10.4), (2, 10.5), (0, 10.6)) == [old, old, new]
+    assert sent.attribute_line(1, 10.7) == (new, False)
+    assert sent.attribute_line(3, 10.8) == (old, True)
     assert (old.line, new.line) == (3, 1)
     assert lines(sent, (4, 12.1)) == [new]
 
@@ -419,8 +418,7 @@ def test_line_before_the_report_of_its_plan_continues_no_plan_that_ended_long_ag
 
 
 def test_line_without_a_start_of_ours_is_of_no_start(sent: SentCommands) -> None:
-    assert lines(sent, (0, 1.0)) == [None]
-    assert not sent.is_line_late
+    assert sent.attribute_line(0, 1.0) == (None, False)
 
 
 @pytest.mark.parametrize(("uid", "confirms"), [("renamed", True), ("", True), ("before", False), ("older", False)])
