@@ -37,13 +37,15 @@ class Initiators:
         """None while the drone does not return."""
         self._land_sent = -math.inf
         self._return_sent = -math.inf
-        self._ended: tuple[Initiator, float] | None = None
-        """Initiator of the return, or of the landing plan, that ended last, and its end time."""
+        self._returned: tuple[Initiator, float] | None = None
+        """Initiator of the return that ended last, and its end time."""
+        self._plan_ended = -math.inf
+        """End time of the newest plan whose last line lands the drone."""
 
     @property
     def last_return(self) -> Initiator | None:
         """Initiator of the return that ended last; None without one."""
-        return None if self._ended is None else self._ended[0]
+        return None if self._returned is None else self._returned[0]
 
     def land_commanded(self, now: float) -> None:
         """Note that a Landing is about to be sent."""
@@ -55,7 +57,7 @@ class Initiators:
 
     def plan_ended(self, now: float) -> None:
         """Note that a flight plan has ended whose last line lands the drone."""
-        self._ended = Initiator.DRONE, now
+        self._plan_ended = now
 
     def on_landing(self, now: float, *, plan_lands: bool, pilot_may_land: bool) -> None:
         """Note that the drone has begun to land.
@@ -66,8 +68,10 @@ class Initiators:
             self.landing = Initiator.CLIENT
         elif self.returning is not None:
             self.landing = self.returning
-        elif self._ended is not None and now - self._ended[1] <= ENDS_IN_LANDING:
-            self.landing = self._ended[0]
+        elif now - self._plan_ended <= ENDS_IN_LANDING:
+            self.landing = Initiator.DRONE
+        elif self._returned is not None and now - self._returned[1] <= ENDS_IN_LANDING:
+            self.landing = self._returned[0]
         else:
             self.landing = Initiator.PILOT if pilot_may_land else Initiator.DRONE
 
@@ -92,6 +96,6 @@ class Initiators:
     def on_return_over(self, now: float) -> None:
         """Note that the drone does not return."""
         if self.returning is not None:
-            self._ended = self.returning, now
+            self._returned = self.returning, now
             self.returning = None
             self._return_sent = -math.inf

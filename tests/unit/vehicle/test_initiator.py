@@ -37,6 +37,15 @@ def test_landing_just_after_a_plan_that_lands_is_not_the_pilots() -> None:
     assert lands(who, 103.0, skycontroller=True) is PILOT  # another landing
 
 
+def test_end_of_a_plan_that_lands_is_no_end_of_a_return() -> None:
+    who = Initiators()
+    who.return_commanded(99.0)
+    returns(who)
+    who.on_return_over(100.0)
+    who.plan_ended(101.0)
+    assert who.last_return is CLIENT
+
+
 @pytest.mark.parametrize(("skycontroller", "expected"), [(False, DRONE), (True, PILOT)])
 def test_unexplained_landing_is_the_drones_or_the_pilots(skycontroller: bool, expected: Initiator) -> None:
     assert lands(Initiators(), skycontroller=skycontroller) is expected
