@@ -9,7 +9,7 @@ from anafi_mav import mav_enums, texts
 from anafi_mav.drone.events import GpsLocationChanged
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.rules.parts import FlightPlanFile, GatewayStep
-from anafi_mav.vehicle.mission.course import Course
+from anafi_mav.plans.translation.translate import Course
 from anafi_mav.vehicle.mission.effects import (
     Acquire,
     DroneReport,

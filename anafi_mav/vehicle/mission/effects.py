@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from anafi_mav.plans.translation.translate import Course
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.mission.course import Course
 from anafi_mav.vehicle.mission.progress import Mission
 from anafi_mav.vehicle.mission.record import MissionRecord
 

@@ -20,7 +20,7 @@ from anafi_mav.drone.sent_commands import SentCommand
 from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
 from anafi_mav.plans.plan import Item
-from anafi_mav.plans.translation.translate import FlightPlanFile
+from anafi_mav.plans.translation.translate import Course, FlightPlanFile
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.control import Condition
 from anafi_mav.vehicle.base.control_machine import State as ControlState
@@ -32,7 +32,6 @@ from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.severity import Severity
 from anafi_mav.vehicle.base.subscriptions import Subscriptions, ValueInterest, ValueSubscriptions
 from anafi_mav.vehicle.fence.fence_watch import OutsideFence
-from anafi_mav.vehicle.mission.course import Course
 from anafi_mav.vehicle.mission.effects import (
     Acquire,
     Announce,

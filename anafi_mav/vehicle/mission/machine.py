@@ -24,11 +24,10 @@ from typing import Concatenate, ParamSpec, TypeAlias
 from anafi_mav import geo, mav_enums, texts
 from anafi_mav.drone.events import AltitudeChanged, GpsLocationChanged, Message
 from anafi_mav.plans.plan import Item
-from anafi_mav.plans.translation.translate import FlightPlanFile, GatewayStep
+from anafi_mav.plans.translation.translate import Course, FlightPlanFile, GatewayStep
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.mission.course import Course
 from anafi_mav.vehicle.mission.effects import (
     Acquire,
     Announce,

@@ -14,8 +14,7 @@ from dataclasses import dataclass, field, replace
 from anafi_mav import mav_enums
 from anafi_mav.plans.formats.parrot import SET_STILL_MODE, SET_VIEW_MODE
 from anafi_mav.plans.plan import DO_JUMP, Item
-from anafi_mav.plans.translation.translate import FlightPlanFile
-from anafi_mav.vehicle.mission.course import Course
+from anafi_mav.plans.translation.translate import Course, FlightPlanFile
 from anafi_mav.vehicle.mission.record import MissionRecord
 
 ENDINGS = (mav_enums.MAV_CMD_NAV_LAND, mav_enums.MAV_CMD_NAV_RETURN_TO_LAUNCH)

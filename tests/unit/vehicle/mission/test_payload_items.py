@@ -8,7 +8,7 @@ from anafi_mav import mav_enums
 from anafi_mav.plans.formats.parrot import SET_STILL_MODE, SET_VIEW_MODE
 from anafi_mav.plans.plan import DO_JUMP, Item
 from anafi_mav.plans.rules.parts import GatewayStep
-from anafi_mav.vehicle.mission.course import Course
+from anafi_mav.plans.translation.translate import Course
 from anafi_mav.vehicle.mission.effects import Prepared
 from anafi_mav.vehicle.mission.machine import MissionMachine
 from anafi_mav.vehicle.mission.progress import PayloadItems

@@ -7,8 +7,7 @@ from support.mission_machine import file
 
 from anafi_mav import mav_enums
 from anafi_mav.plans.plan import Item
-from anafi_mav.plans.translation.translate import FlightPlanFile
-from anafi_mav.vehicle.mission.course import Course
+from anafi_mav.plans.translation.translate import Course, FlightPlanFile
 from anafi_mav.vehicle.mission.effects import DroneReport, Prepared, Reached
 from anafi_mav.vehicle.mission.machine import MissionMachine, State
 from anafi_mav.vehicle.mission.progress import MissionProgress

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from anafi_mav.plans.rules.parts import FlightPlanFile, GatewayStep, ItemSettings
-from anafi_mav.plans.translation.translate import Cursor
-from anafi_mav.vehicle.mission.course import Course
+from anafi_mav.plans.translation.translate import Course, Cursor
 
 FILE = FlightPlanFile(b"QGC WPL 120\n", (0, 1), ((0,), (1,)))
 ZOOM = GatewayStep(2, (2,))
