@@ -491,6 +491,10 @@ ROI_NO_WAYPOINT = Reason("no waypoint is flown to")
 
 # == Mission ==
 
+FIRST_LABEL = 1
+"""The number of our item 0 in texts. On a station's map item 0 is home, whether or not it is sent to the vehicle
+(QGroundControl FirmwarePlugin::sendHomePositionToVehicle): seq + 1 for PX4's clients, seq for ArduPilot's."""
+
 MISSION_NOT_STARTED = Template("Mission not started: {reason}", reason="not armed within 10 s")
 NOT_ARMED_WITHIN = ReasonTemplate("not armed within {seconds:g} s", seconds=10)
 NO_MISSION = Reason("no mission")

@@ -23,7 +23,6 @@ from anafi_mav.services.plan.item_messages import from_wire
 from anafi_mav.services.plan.plan_transfer import PlanKind
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.fence.plan_items import PlanFault, PlanItem
-from anafi_mav.vehicle.mission.texts import FIRST_LABEL
 
 _RESULTS = {
     FaultKind.COMMAND: dialect.MAV_MISSION_UNSUPPORTED,
@@ -77,7 +76,7 @@ class Examined:
 
 def _some(losses: Sequence[Loss]) -> str:
     loss = losses[0]
-    where = "" if loss.item is None else f"item {loss.item + FIRST_LABEL}: "
+    where = "" if loss.item is None else f"item {loss.item + texts.FIRST_LABEL}: "
     more = f" and {len(losses) - 1} more" if len(losses) > 1 else ""
     return f"{where}{loss.what}{more}"
 
@@ -109,7 +108,7 @@ class MissionKind(PlanKind):
         result = _RESULTS.get(fault.kind)
         if result is None:
             result = dialect.MAV_MISSION_INVALID_PARAM1 - 1 + (fault.param or 1)
-        return PlanFault(result, texts.ITEM_REASON.fill(number=fault.item + FIRST_LABEL, reason=fault.reason))
+        return PlanFault(result, texts.ITEM_REASON.fill(number=fault.item + texts.FIRST_LABEL, reason=fault.reason))
 
     def examined(self, items: Sequence[PlanItem]) -> Examined:
         """A mission, and what it is to the drone; the last one is known, whichever thread asked."""
@@ -133,7 +132,7 @@ class MissionKind(PlanKind):
         return [_shifted(_without_zero(item), -1) for item in items[1:]]
 
     def label(self, seq: int, flavour: Flavour) -> int:
-        return seq - offset(flavour) + FIRST_LABEL
+        return seq - offset(flavour) + texts.FIRST_LABEL
 
     def always_shown(self, seq: int, flavour: Flavour) -> PlanItem | None:
         """Return home as item 0, for ArduPilot's clients, also of an empty list.

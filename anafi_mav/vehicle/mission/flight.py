@@ -15,12 +15,16 @@ from typing import Any, Protocol
 from anafi_mav import texts
 from anafi_mav.clock import Alarm, Clock
 from anafi_mav.drone import events
+from anafi_mav.drone.automatic.flight_plan import FlightPlanState
 from anafi_mav.drone.events import AlertState, FlyingState, ForcedLandingReason, PlayError, PlayingState
+from anafi_mav.drone.events import FlightPlanComponent as Part
+from anafi_mav.drone.events import FlightPlanIndicator as Input
 from anafi_mav.drone.sent_commands import SentCommand
 from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError, CommandRejected, LinkLost
 from anafi_mav.plans.plan import Item
 from anafi_mav.plans.translation.translate import Course, FlightPlanFile
+from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.control import Condition
 from anafi_mav.vehicle.base.control_machine import State as ControlState
@@ -57,12 +61,29 @@ from anafi_mav.vehicle.mission.payload_state import payload_after
 from anafi_mav.vehicle.mission.progress import Mission
 from anafi_mav.vehicle.mission.record import MissionRecord
 from anafi_mav.vehicle.mission.steps import fly_step
-from anafi_mav.vehicle.mission.store_wait import StoreWait
-from anafi_mav.vehicle.mission.texts import FIRST_LABEL, beginning, refusal
 
 _LANDING = (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING)
 _BEGINS = (State.PREPARING, State.TAKING_OVER, State.STARTING)
 """A start is under way, and the drone has not confirmed it."""
+
+STORE_WAIT = 5.0
+"""s that a command waits for a mission to be stored, which takes a thread some milliseconds and a disk its time."""
+
+_START_BLOCKERS = {
+    Part.GPS: texts.NO_FIX,
+    Part.CALIBRATION: texts.DRONE_CALIBRATION,
+    Part.MAVLINK_FILE: texts.DRONE_FILE,
+    Part.TAKE_OFF: texts.DRONE_TAKEOFF,
+    Part.WAYPOINTS_BEYOND_GEOFENCE: texts.DRONE_GEOFENCE,
+    Part.CAMERA_AVAILABLE: texts.DRONE_CAMERA,
+    Part.MAVLINK_STATE: texts.DRONE_NOT_READY,
+    Part.MAVLINK_MEDIA: texts.DRONE_MEDIA,
+    Part.FIRST_WAYPOINT_TOO_FAR: texts.DRONE_FIRST_FAR,
+}
+"""Parrot's components of a flight plan that keep it from being begun (arsdk.md §3.1)."""
+
+_INPUTS = {Input.DRONE_GPS: _START_BLOCKERS[Part.GPS], Input.DRONE_MAGNETO: _START_BLOCKERS[Part.CALIBRATION]}
+"""Faults that an Ai reports twice: as a missing input, and as one of the components."""
 
 
 class MissionOutlet(Protocol):
@@ -79,6 +100,43 @@ class MissionOutlet(Protocol):
 
     def run_mission(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """Run in the background, until the link goes down."""
+
+
+class StoreWait:
+    """Delays the commands of a client while its new mission is being stored.
+
+    They are meant for that mission, not for the old one: clients like dronekit do not wait for the acknowledgement of
+    their last item.
+    """
+
+    def __init__(self) -> None:
+        self._stored: asyncio.Future[None] | None = None
+
+    @contextlib.contextmanager
+    def going_on(self) -> Iterator[None]:
+        """For as long as a mission is being stored, and until it is the one of the vehicle."""
+        stored = self._stored = asyncio.get_running_loop().create_future()
+        try:
+            yield
+        finally:
+            stored.set_result(None)
+            if self._stored is stored:
+                self._stored = None
+
+    @property
+    def is_active(self) -> bool:
+        """A mission is being stored."""
+        return self._stored is not None
+
+    async def over(self) -> None:
+        """Return when no mission is being stored: at once if that is so.
+
+        Raises `Refused` when it takes too long.
+        """
+        while self._stored is not None:
+            done, _ = await asyncio.wait({self._stored}, timeout=STORE_WAIT)
+            if not done:
+                raise Refused(texts.MISSION, texts.MISSION_STORING)
 
 
 class MissionFlight(PlainTask):
@@ -218,7 +276,7 @@ class MissionFlight(PlainTask):
         if not self.there:
             raise Refused(texts.CURRENT_ITEM, texts.NO_MISSION)
         if not 0 <= item < len(self.machine.mission.items):
-            raise Refused(texts.CURRENT_ITEM, texts.NO_SUCH_ITEM.fill(number=item + FIRST_LABEL), lasting=True)
+            raise Refused(texts.CURRENT_ITEM, texts.NO_SUCH_ITEM.fill(number=item + texts.FIRST_LABEL), lasting=True)
         begun = self._beginning
         if begun is None and self.machine.is_at(item):
             self.outlet.mission_changed()
@@ -354,7 +412,7 @@ class MissionFlight(PlainTask):
                     vehicle.text(effect.severity, effect.text)
                 case Announce():
                     returns = vehicle.drone.flight_plan.state.returns_on_disconnect
-                    text = beginning(effect.item, effect.resumes, stepped=effect.stepped, returns=returns)
+                    text = _beginning_text(effect.item, effect.resumes, stepped=effect.stepped, returns=returns)
                     vehicle.text(Severity.INFO, text)
                 case Reached():
                     self.outlet.item_reached(effect.item)
@@ -537,7 +595,7 @@ class MissionFlight(PlainTask):
         try:
             await plan.start(uid, line, continue_on_disconnect=goes_on, cause=work.attempt)
         except CommandRejected as error:
-            raise DroneRefused(refusal(plan.state, error)) from error
+            raise DroneRefused(_refusal_text(plan.state, error)) from error
         if work.prepared.resumes and not self._payload_holds:
             self._vehicle.text(Severity.WARNING, texts.MISSION_PAYLOAD_CHANGED)
 
@@ -674,3 +732,24 @@ class MissionFlight(PlainTask):
         plays, in_air = plan.playing == PlayingState.PLAYING, self._vehicle.in_air
         self._handle(self.machine.link_up(record, plan.uid, self._now, plays=plays, in_air=in_air))
         self.on_vehicle()  # it may have landed meanwhile
+
+
+def _refusal_text(state: FlightPlanState, error: CommandRejected) -> OperatorText:
+    """Return the refusal of a start that the drone does not accept."""
+    reasons: list[str] = [
+        _START_BLOCKERS.get(part, part.name.lower()) for part, ok in state.components.items() if not ok
+    ]
+    reasons += [_INPUTS.get(one) or one.name.lower().replace("_", " ") for one in sorted(state.missing or ())]
+    return texts.MISSION_REFUSED_BY_DRONE.fill(reasons=", ".join(dict.fromkeys(reasons)) or error.reason)
+
+
+def _beginning_text(item: int, resumes: bool, *, stepped: bool, returns: bool | None) -> OperatorText:
+    """Return the text of a mission that begins or resumes, with the drone's link-loss behaviour.
+
+    `stepped`: the drone has a part of the mission only. `returns`: the value of its ReturnHomeOnDisconnect.
+    """
+    alone = {None: texts.LINK_LOSS_UNKNOWN, True: texts.LINK_LOSS_RETURNS, False: texts.LINK_LOSS_CONTINUES}[returns]
+    if stepped and returns is not True:
+        alone = texts.LINK_LOSS_FILE
+    template = texts.MISSION_RESUMES if resumes else texts.MISSION_STARTS
+    return template.fill(item=item + texts.FIRST_LABEL, alone=alone)

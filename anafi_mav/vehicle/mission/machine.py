@@ -49,7 +49,6 @@ from anafi_mav.vehicle.mission.effects import (
 from anafi_mav.vehicle.mission.path import WayPoint, seconds_of_last_line, way_points
 from anafi_mav.vehicle.mission.progress import ENDINGS, Mission, MissionProgress
 from anafi_mav.vehicle.mission.record import MissionRecord
-from anafi_mav.vehicle.mission.texts import FIRST_LABEL
 
 ARM_WAIT = 10.0
 """s that a mission waits for arming.
@@ -523,7 +522,7 @@ class MissionMachine:
         elif not self.flying and phase.attempt is not None:
             current = phase.attempt.item
         self.phase = replace(phase, again=not self.flying)
-        yield SendText(Severity.INFO, texts.MISSION_SAME.fill(item=current + FIRST_LABEL))
+        yield SendText(Severity.INFO, texts.MISSION_SAME.fill(item=current + texts.FIRST_LABEL))
 
     @_on(E.CHOSEN)
     def choose(self, item: int) -> _Steps:
@@ -759,7 +758,7 @@ class MissionMachine:
         """The drone has left out a line of its file."""
         self.progress, item = self.progress.with_skipped(line)
         if item is not None:
-            yield SendText(Severity.WARNING, texts.MISSION_OUT_OF_REACH.fill(item=item + FIRST_LABEL))
+            yield SendText(Severity.WARNING, texts.MISSION_OUT_OF_REACH.fill(item=item + texts.FIRST_LABEL))
 
     @_on(E.REPORTED)
     def reported(self, report: DroneReport, now: float, kind: type[Message] | None = None) -> _Steps:
@@ -851,7 +850,7 @@ class MissionMachine:
         later = progress.course.later
         if progress.leg_done and later is not None:
             progress = self.progress = replace(progress, current=later)
-        current = progress.current + FIRST_LABEL
+        current = progress.current + texts.FIRST_LABEL
         if plays and uid == progress.uid:
             self.phase = MissionPhase(S.FLYING_FILE, S.FLYING_FILE, plays=uid)
             self._limit(now)
@@ -885,7 +884,7 @@ class MissionMachine:
             self.phase = replace(self.phase, rest=rest)
 
     def _paused_text(self, why: OperatorText | None) -> SendText:
-        item = self.progress.current + FIRST_LABEL
+        item = self.progress.current + texts.FIRST_LABEL
         if why is None:
             return SendText(Severity.INFO, texts.MISSION_PAUSED.fill(item=item))
         return SendText(Severity.WARNING, texts.MISSION_PAUSED_REASON.fill(item=item, reason=why))

@@ -22,7 +22,6 @@ from anafi_mav.vehicle.base.bounds import LOWEST, check_estimate, check_limits, 
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.mission.texts import FIRST_LABEL
 
 BREATH = 20
 """Way points after which others get their turn: a large polygon takes a while."""
@@ -89,7 +88,7 @@ async def lay_out(
     try:
         flight = await asyncio.to_thread(translate, items, 1 if version == 1 else 2, start, first, {**(jumps or {})})
     except PlanError as error:
-        what = texts.MISSION if error.item is None else texts.ITEM.fill(number=error.item + FIRST_LABEL)
+        what = texts.MISSION if error.item is None else texts.ITEM.fill(number=error.item + texts.FIRST_LABEL)
         raise Refused(what, texts.from_below(error.problem)) from error
     if not flight.parts:
         raise Refused(texts.MISSION, texts.MISSION_OVER)
@@ -107,7 +106,7 @@ def _check_estimates(vehicle: Aircraft, items: Sequence[Item], parts: Sequence[F
                 try:
                     check_estimate(vehicle, point.ato)
                 except Refused as error:
-                    raise Refused(texts.ITEM.fill(number=point.item + FIRST_LABEL), error.reason) from error
+                    raise Refused(texts.ITEM.fill(number=point.item + texts.FIRST_LABEL), error.reason) from error
 
 
 def lines_of(leg: FlightPlanFile) -> list[str]:
@@ -172,7 +171,7 @@ async def check_path(
                     await asyncio.sleep(0)
         after = -1
     if warns and lowest is not None and lowest.ato < LOWEST:
-        item = lowest.item + FIRST_LABEL
+        item = lowest.item + texts.FIRST_LABEL
         vehicle.text(Severity.WARNING, texts.MISSION_LOW.fill(item=item, height=lowest.ato))
 
 
@@ -181,7 +180,7 @@ def _check(vehicle: Aircraft, start: GeoPoint | None, point: WayPoint) -> None:
         check_place(vehicle, point.place, start=start)
         check_limits(vehicle, point.ato)
     except Refused as error:
-        raise Refused(texts.ITEM.fill(number=point.item + FIRST_LABEL), error.reason, lasting=True) from error
+        raise Refused(texts.ITEM.fill(number=point.item + texts.FIRST_LABEL), error.reason, lasting=True) from error
 
 
 class FilesOnDrone:

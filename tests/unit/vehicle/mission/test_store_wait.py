@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from anafi_mav.vehicle.mission.store_wait import StoreWait
+from anafi_mav.vehicle.mission.flight import StoreWait
 
 
 @pytest.mark.parametrize("iterations", range(4))
