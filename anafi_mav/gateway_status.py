@@ -25,7 +25,7 @@ from anafi_mav.mavlink.base import Endpoint
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Node
 from anafi_mav.relay.server import RelayServer
-from anafi_mav.services.command.command_log import CommandLog
+from anafi_mav.services.commands import CommandLog
 from anafi_mav.services.system import System
 from anafi_mav.status_record import (
     VERSION,

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import enum
 import math
+from collections import Counter, deque
 from collections.abc import Awaitable, Callable, Hashable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from msgspec import Struct
 
@@ -54,6 +56,12 @@ set_home, reset_settings and format_storage return with one, and the real end th
 
 _UNSET_INT = (2**31 - 1, -(2**31))
 """x and y of a COMMAND_INT that stand for "not set": the specified INT32_MAX, and what a cast NaN becomes (R8)."""
+
+MAX_REFUSALS = 20
+"""Refused commands that are kept: what a person reads to see why a station's button does nothing."""
+
+MAX_DURATIONS = 200
+"""Durations of accepted commands that are kept: enough for a 99th percentile."""
 
 
 class ActionGroup(enum.Enum):
@@ -470,3 +478,40 @@ class CommandHistory:
             self._newest.clear()
         else:
             self._newest.pop(client, None)
+
+
+class CommandRefusal(NamedTuple):
+    """A command whose final result was not ACCEPTED."""
+
+    at: float
+    """s, monotonic."""
+    sysid: int
+    compid: int
+    client: str
+    """Name of the channel."""
+    command: int
+    result: int
+    reason: str
+
+
+class CommandLog:
+    """Counts results, and keeps the last refusals and durations."""
+
+    def __init__(self) -> None:
+        self.results: Counter[int] = Counter()
+        """By MAV_RESULT."""
+        self.refusals: deque[CommandRefusal] = deque(maxlen=MAX_REFUSALS)
+        """Oldest first."""
+        self.durations: deque[float] = deque(maxlen=MAX_DURATIONS)
+        """s from the arrival to the acknowledgement of actions that were accepted."""
+
+    def refuse(self, refusal: CommandRefusal) -> None:
+        """Note a command that was not accepted."""
+        self.results[refusal.result] += 1
+        self.refusals.append(refusal)
+
+    def accept(self, result: int, duration: float | None = None) -> None:
+        """Note an accepted command; `duration`: s that its action took, None for a query."""
+        self.results[result] += 1
+        if duration is not None:
+            self.durations.append(duration)

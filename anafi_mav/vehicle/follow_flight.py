@@ -17,10 +17,9 @@ from anafi_mav.drone.values import Values
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import LOWEST, amsl_to_ato, check_estimate, check_height, check_on_earth, check_place
-from anafi_mav.vehicle.base.flight_task import STEERING, Needs, PlainTask, TaskRules
+from anafi_mav.vehicle.base.flight_task import STEERING, Needs, PlainTask, Preparation, TaskRules
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.preparation import Preparation
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import By, client_of
 from anafi_mav.vehicle.base.severity import Severity

@@ -20,11 +20,10 @@ from anafi_mav.errors import CommandRejected
 from anafi_mav.texts import Subject
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import check_height, check_place
-from anafi_mav.vehicle.base.flight_task import Hover, Needs, PlainTask, TaskRules
+from anafi_mav.vehicle.base.flight_task import Hover, Needs, PlainTask, Preparation, TaskRules
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.move_heading import MoveHeading, oriented
-from anafi_mav.vehicle.base.preparation import Preparation
 from anafi_mav.vehicle.base.refusal import Refused, Unfinished
 from anafi_mav.vehicle.base.requester import By
 from anafi_mav.vehicle.base.severity import Severity

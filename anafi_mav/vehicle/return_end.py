@@ -33,10 +33,9 @@ from anafi_mav.drone.events import (
 from anafi_mav.errors import AnafiMavError, CommandTimeout, LinkLost
 from anafi_mav.texts import OperatorText
 from anafi_mav.vehicle.base.aircraft import Aircraft
-from anafi_mav.vehicle.base.flight_task import PlainTask, TaskRules
+from anafi_mav.vehicle.base.flight_task import PlainTask, Preparation, TaskRules
 from anafi_mav.vehicle.base.flying import LANDING
 from anafi_mav.vehicle.base.geo_point import GeoPoint
-from anafi_mav.vehicle.base.preparation import Preparation
 from anafi_mav.vehicle.base.right import Extent
 from anafi_mav.vehicle.base.severity import Severity
 

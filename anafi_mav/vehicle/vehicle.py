@@ -41,12 +41,22 @@ from anafi_mav.vehicle.aborted_return import AbortedReturn
 from anafi_mav.vehicle.base.aircraft import Aircraft, CommandedSpeeds
 from anafi_mav.vehicle.base.bounds import check_height
 from anafi_mav.vehicle.base.control_machine import REST, DroneAct, State
-from anafi_mav.vehicle.base.flight_task import LAND, MOTOR_CUT, FlightTask, Hover, Needs, TaskRules, end_of_descent
+from anafi_mav.vehicle.base.flight_task import (
+    LAND,
+    MOTOR_CUT,
+    DescentEnd,
+    FlightTask,
+    Hover,
+    Needs,
+    Preparation,
+    PreparationStep,
+    TaskRules,
+    end_of_descent,
+)
 from anafi_mav.vehicle.base.flying import AIRBORNE, LANDING, ON_GROUND, TAKING_OFF
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.height import ESTIMATE_ERROR, TakeoffRecord
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.preparation import DescentEnd, Preparation, PreparationStep
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.requester import By, Source, client_of, right_of
 from anafi_mav.vehicle.base.right import Extent, Right, system_of

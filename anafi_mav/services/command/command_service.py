@@ -23,7 +23,6 @@ from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, Not
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.services.command.command_log import CommandLog, Refusal
 from anafi_mav.services.commands import (
     IN_ORDER,
     LATE_PROGRESS_AFTER,
@@ -34,6 +33,8 @@ from anafi_mav.services.commands import (
     ActionGroup,
     Command,
     CommandHistory,
+    CommandLog,
+    CommandRefusal,
     Definition,
     Effect,
     Execution,
@@ -343,7 +344,7 @@ class CommandService(Service):
         """Note a command that was not accepted."""
         client = inbound.channel.name
         now = self.host.clock.monotonic()
-        self.log.refuse(Refusal(now, inbound.sysid, inbound.compid, client, command, result, reason))
+        self.log.refuse(CommandRefusal(now, inbound.sysid, inbound.compid, client, command, result, reason))
 
     def _require_role(self, inbound: Inbound) -> None:
         """Raise `NotInControl` when another station has become the operator meanwhile."""

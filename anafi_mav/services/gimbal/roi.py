@@ -18,10 +18,9 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.service import Host
 from anafi_mav.services.system_position import SystemPosition
 from anafi_mav.vehicle.base.bounds import amsl_to_ato, check_on_earth
-from anafi_mav.vehicle.base.flight_task import Needs, PlainTask, TaskRules
+from anafi_mav.vehicle.base.flight_task import Needs, PlainTask, Preparation, TaskRules
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.preparation import Preparation
 from anafi_mav.vehicle.base.refusal import Refused, reason_of
 from anafi_mav.vehicle.base.requester import By
 from anafi_mav.vehicle.base.severity import Severity

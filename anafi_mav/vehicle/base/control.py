@@ -40,16 +40,19 @@ from anafi_mav.vehicle.base.control_machine import (
     step,
 )
 from anafi_mav.vehicle.base.flight_task import (
+    ENDS_LANDING,
+    DescentEnd,
     FlightAction,
     FlightActions,
     FlightTask,
     Hover,
     Needs,
+    PreparationStep,
     TaskRules,
+    begin_preparation,
     lasting_needs,
 )
 from anafi_mav.vehicle.base.modes import FlightMode
-from anafi_mav.vehicle.base.preparation import ENDS_LANDING, DescentEnd, PreparationStep, begin
 from anafi_mav.vehicle.base.refusal import Refused, text_of
 from anafi_mav.vehicle.base.requester import By, Source, client_of
 from anafi_mav.vehicle.base.right import Right
@@ -290,7 +293,9 @@ class Control:
                 found = check()
             stands = end is not None and self._aircraft.on_ground and not piloting.about_to_fly
             plays = piloting.state.plan == PlayingState.PLAYING
-            preparing = begin(rules.start, stands=stands, cancels_return=Needs.NO_DESCENT in rules.needs, plays=plays)
+            preparing = begin_preparation(
+                rules.start, stands=stands, cancels_return=Needs.NO_DESCENT in rules.needs, plays=plays
+            )
             while preparing.left:
                 has_ended = await self._prepare(preparing.left[0], end)
                 if has_ended:

@@ -78,7 +78,7 @@ CORES = [
     "vehicle/offboard/takeoff.py",
     *("vehicle/circle.py", "vehicle/follow.py", "vehicle/hold_rule.py", "vehicle/initiator.py"),
     *("vehicle/failsafe_settings.py", "vehicle/joystick_override.py", "web/h264_offer.py", "web/metrics.py"),
-    *("recording/tlog.py", "recording/trace.py", "services/command/command_log.py"),
+    *("recording/tlog.py", "recording/trace.py"),
     *("vehicle/flight_policy.py", "vehicle/operator_control.py", "vehicle/takeoff_machine.py"),
     "services/command/operator_need.py",
     *("services/capabilities.py", "services/checksum.py", "services/commands.py", "services/component_metadata.py"),

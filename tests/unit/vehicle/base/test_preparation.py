@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from anafi_mav.vehicle.base.preparation import Preparation, PreparationStep, begin
+from anafi_mav.vehicle.base.flight_task import Preparation, PreparationStep, begin_preparation
 
 CANCEL, STOP, END = PreparationStep.CANCEL_RETURN, PreparationStep.STOP, PreparationStep.END_LANDING
 
@@ -13,7 +13,7 @@ def steps(
     start: Preparation, *, ended: tuple[int, ...] = (), stands: bool = False, cancels_return: bool = False
 ) -> list[PreparationStep]:
     """Return the steps of a preparation; `ended`: places of the steps that find something to end."""
-    now, taken = begin(start, stands=stands, cancels_return=cancels_return), []
+    now, taken = begin_preparation(start, stands=stands, cancels_return=cancels_return), []
     while now.left:
         step = now.left[0]
         now = now.after(has_ended=len(taken) in ended)
