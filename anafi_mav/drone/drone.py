@@ -17,8 +17,7 @@ from typing import Any, TypeAlias, TypeVar
 
 from anafi_mav import models
 from anafi_mav.arsdk.codec.secret_fields import without_secrets
-from anafi_mav.arsdk.codec.value_events import MAX_LAYOUTS, Received, ValueLayout, join
-from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
+from anafi_mav.arsdk.codec.wire import MAX_LAYOUTS, Message, Received, UnknownMessage, ValueLayout, join
 from anafi_mav.arsdk.link.controller import ControllerSession
 from anafi_mav.arsdk.link.handshake import DISCOVERY_PORT, DeviceInfo
 from anafi_mav.arsdk.messages import animation, ardrone3, common, drone_manager, follow_me, rth, skyctrl

@@ -17,8 +17,7 @@ from typing import Any, ClassVar, Final, Generic, TypeAlias, TypeVar
 
 import msgspec
 
-from anafi_mav.arsdk.codec.value_events import ValueLayout, Values
-from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.codec.wire import Message, ValueLayout, Values
 from anafi_mav.arsdk.messages.generic import ListFlags
 from anafi_mav.units import LARGEST
 

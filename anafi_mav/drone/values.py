@@ -10,9 +10,9 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 import anafi_mav.arsdk.messages  # noqa: F401  # declares them
-from anafi_mav.arsdk.codec.value_events import ValueLayout as ValueLayout
-from anafi_mav.arsdk.codec.value_events import Values as Values
 from anafi_mav.arsdk.codec.wire import Message, value_events
+from anafi_mav.arsdk.codec.wire import ValueLayout as ValueLayout
+from anafi_mav.arsdk.codec.wire import Values as Values
 
 VALUES: frozenset[type[Message]] = frozenset(value.kind for value in value_events().values())
 """The kinds of all of them."""

@@ -20,8 +20,7 @@ import pytest
 from support.olympe_server import CONTROLLER_PORT
 
 from anafi_mav.arsdk.codec import wire
-from anafi_mav.arsdk.codec.value_events import unpacked
-from anafi_mav.arsdk.codec.wire import MessageId, UnknownMessage
+from anafi_mav.arsdk.codec.wire import MessageId, UnknownMessage, unpacked
 from anafi_mav.arsdk.link.frame import FrameType, decode_frames, encode_frame, longest_command
 from anafi_mav.arsdk.link.transport import ACK_TIMEOUT, Delivered, ReceivedMessages, Role, Transport
 from anafi_mav.arsdk.messages import common

@@ -11,8 +11,7 @@ from types import FunctionType, ModuleType
 
 import anafi_mav.arsdk.messages as tables
 from anafi_mav.arsdk.codec import wire
-from anafi_mav.arsdk.codec.value_events import unpacked
-from anafi_mav.arsdk.codec.wire import Bits, Blob, Buffer, Message, MessageId, Scalar, Text, UnknownMessage
+from anafi_mav.arsdk.codec.wire import Bits, Blob, Buffer, Message, MessageId, Scalar, Text, UnknownMessage, unpacked
 from anafi_mav.arsdk.link.frame import FrameType, encode_frame
 from anafi_mav.arsdk.link.known_frames import KnownFrames
 from anafi_mav.arsdk.link.transport import (

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from anafi_mav.arsdk.codec import wire
-from anafi_mav.arsdk.codec.value_events import Values, join, receive
-from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.codec.wire import Message, Values, join, receive
 
 
 def arrived(*messages: Message) -> Values:

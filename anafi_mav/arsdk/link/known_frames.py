@@ -9,8 +9,7 @@ import struct
 from collections.abc import Sequence
 
 from anafi_mav.arsdk.codec import wire
-from anafi_mav.arsdk.codec.value_events import Received, ValueLayout, Values
-from anafi_mav.arsdk.codec.wire import HEADER
+from anafi_mav.arsdk.codec.wire import HEADER, Received, ValueLayout, Values
 from anafi_mav.arsdk.link.frame import Frame, sequence_number
 
 MAX_OF_SIZE, MAX_FRAMES = 4, 256

@@ -17,8 +17,7 @@ from typing import Protocol, TypeAlias, cast
 
 from typing_extensions import assert_never
 
-from anafi_mav.arsdk.codec.value_events import Received, unpacked
-from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
+from anafi_mav.arsdk.codec.wire import Message, Received, UnknownMessage, unpacked
 from anafi_mav.arsdk.link.transport import (
     Delivered,
     Event,

@@ -28,8 +28,7 @@ from typing import TypeAlias
 import msgspec
 
 from anafi_mav.arsdk.codec import wire
-from anafi_mav.arsdk.codec.value_events import Received, receive
-from anafi_mav.arsdk.codec.wire import Buffer, Message, MessageId, UnknownMessage
+from anafi_mav.arsdk.codec.wire import Buffer, Message, MessageId, Received, UnknownMessage, receive
 from anafi_mav.arsdk.link.frame import (
     PACK_LIMIT,
     VERSIONS,

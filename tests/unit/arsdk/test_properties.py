@@ -18,8 +18,7 @@ from hypothesis import strategies as st
 
 import anafi_mav.arsdk.messages as tables
 from anafi_mav.arsdk.codec import wire
-from anafi_mav.arsdk.codec.value_events import unpacked
-from anafi_mav.arsdk.codec.wire import Bits, Blob, Message, MessageId, OpenEnum, Scalar, Text, UnknownMessage
+from anafi_mav.arsdk.codec.wire import Bits, Blob, Message, MessageId, OpenEnum, Scalar, Text, UnknownMessage, unpacked
 from anafi_mav.arsdk.link import handshake
 from anafi_mav.arsdk.link.frame import decode_frames, encode_frame
 from anafi_mav.arsdk.link.transport import ACK_TIMEOUT, Delivered, ReceivedMessages, Role, Transport, Undelivered

@@ -12,8 +12,7 @@ from support.scripted_device import ScriptedDevice
 from support.values import arrived
 
 from anafi_mav.arsdk.codec import wire
-from anafi_mav.arsdk.codec.value_events import join, receive, unpacked
-from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.codec.wire import Message, join, receive, unpacked
 from anafi_mav.arsdk.messages import ardrone3, camera, gimbal
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.drone import Drone, Velocity

@@ -8,8 +8,7 @@ import pytest
 from support.values import arrived
 
 from anafi_mav.arsdk.codec import wire
-from anafi_mav.arsdk.codec.value_events import Values, receive, unpacked
-from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.codec.wire import Message, Values, receive, unpacked
 from anafi_mav.arsdk.link.frame import VERSIONS, FrameType, Unpacker, decode_frames, encode_frame, with_length
 from anafi_mav.arsdk.link.known_frames import MAX_OF_SIZE, KnownFrames
 from anafi_mav.arsdk.messages import ardrone3, camera, common, gimbal

@@ -8,7 +8,7 @@ import pytest
 from support.faulty_wire import Faults, FaultyWire
 
 from anafi_mav.arsdk.codec import wire
-from anafi_mav.arsdk.codec.value_events import unpacked
+from anafi_mav.arsdk.codec.wire import unpacked
 from anafi_mav.arsdk.link.frame import Frame, FrameType, decode_frames, encode_frame, with_length
 from anafi_mav.arsdk.link.transport import (
     MAX_QUEUED,
