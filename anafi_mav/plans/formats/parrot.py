@@ -8,6 +8,7 @@ file is handled here; the translation of a mission that the drone cannot fly as 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Literal
 
@@ -140,11 +141,23 @@ def _photo_of_version_1(item: Item, before: list[Item]) -> list[Item]:
 
 def write(plan: Plan, version: Version) -> tuple[bytes, list[Loss]]:
     """A file of what the version can hold of the plan."""
+    content, losses = write_items(plan.items, version)
+    if plan.home is not None:
+        losses.append(Loss("the planned home: the drone returns to where it took off"))
+    if plan.zones or plan.breach_return:
+        losses.append(Loss(f"the fence of {counted(len(plan.zones), 'zone')}"))
+    if plan.rally:
+        losses.append(Loss(counted(len(plan.rally), "rally point")))
+    return content, losses + editor_losses(plan)
+
+
+def write_items(items: Iterable[Item], version: Version) -> tuple[bytes, list[Loss]]:
+    """A file of what the version can hold of these items."""
     losses: list[Loss] = []
     written: list[Item] = []
     still: float | None = None
     """The format of photos that holds, for version 1."""
-    for number, item in enumerate(plan.items):
+    for number, item in enumerate(items):
         held = _held(number, item, version, losses)
         if held is None:
             continue
@@ -155,13 +168,7 @@ def write(plan: Plan, version: Version) -> tuple[bytes, list[Loss]]:
             _, interval, count, *_rest = held.params
             held = replace(held, params=(interval, count, still or 0.0, 0.0, 0.0, 0.0, 0.0))
         written.append(held)
-    if plan.home is not None:
-        losses.append(Loss("the planned home: the drone returns to where it took off"))
-    if plan.zones or plan.breach_return:
-        losses.append(Loss(f"the fence of {counted(len(plan.zones), 'zone')}"))
-    if plan.rally:
-        losses.append(Loss(counted(len(plan.rally), "rally point")))
-    return text_of(HEADER, written, current=None, unset=UNSET), losses + editor_losses(plan)
+    return text_of(HEADER, written, current=None, unset=UNSET), losses
 
 
 def _held(number: int, item: Item, version: Version, losses: list[Loss]) -> Item | None:

@@ -26,7 +26,6 @@ from anafi_mav.plans.plan import (
     Item,
     Loss,
     Params,
-    Plan,
     Point,
 )
 from anafi_mav.plans.rules.parts import (
@@ -178,7 +177,7 @@ class FlightPlanWriter:
         """End the current file; the next line begins another one."""
         if self._lines:
             self._stay()
-            content, lost = parrot.write(Plan(tuple(self._lines)), self.version)
+            content, lost = parrot.write_items(self._lines, self.version)
             if lost or len(self._lines) != len(content.splitlines()) - 1:
                 raise AssertionError(f"lines that version {self.version} cannot hold: {lost}")
             self.parts.append(FlightPlanFile(content, tuple(self._origins), tuple(map(tuple, self._done))))
