@@ -19,7 +19,7 @@ from anafi_mav.arsdk.messages.rth import RthState
 from anafi_mav.drone.element import Element, Position
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation, loop_time, require_number
 from anafi_mav.drone.piloting.moves import FASTEST, Displacement, Move, MoveEnd, Moves
-from anafi_mav.drone.piloting.state import PilotingState, in_state
+from anafi_mav.drone.piloting.state import PilotingState, in_state, require_free
 from anafi_mav.drone.piloting.stick_stream import StickStream
 from anafi_mav.drone.sent_commands import QUIET
 from anafi_mav.drone.status.alerts import spoken
@@ -72,7 +72,7 @@ class GuidedMoves:
         if not is_finite(front, right, down, turn):
             raise LocalProtocolError("a relative move is not a number")
         require_number(timeout)
-        self.require_free()
+        require_free(self._flight.state, self._home.state)
         command = self._move_by_command(front, right, down, turn, turn_rate_dps)
         turn_rate = None if turn_rate_dps is None else turn_rate_dps * RAD_PER_DEG
         if timeout is None:
@@ -130,7 +130,7 @@ class GuidedMoves:
             orientation = OrientationMode.NONE if heading_deg is None else OrientationMode.HEADING_DURING
         if (heading_deg is not None) != (orientation in _WITH_HEADING):
             raise LocalProtocolError(f"a moveTo with orientation {orientation.name} and heading {heading_deg}")
-        self.require_free()
+        require_free(self._flight.state, self._home.state)
         target = self._moves.distinct(Position(latitude, longitude, altitude), loop_time())
         command = self._move_to_command(target, orientation, heading_deg, horizontal_speed, vertical_speed)
         move = Move(self._commander.expect((), _decided_elsewhere), target)
@@ -210,16 +210,6 @@ class GuidedMoves:
         for move in (self._moves.cancel_to(why), *self._moves.cancel_by(why, loop_time())):
             if move is not None:
                 self._commander.cancel(move.answer.token)
-
-    def require_free(self) -> None:
-        """Raise `CommandRejected` while the drone returns by itself or lands.
-
-        A move of ours must not interfere with these.
-        """
-        if self._home.state.returning_by_itself:
-            raise CommandRejected(BY_ITSELF)
-        if self._flight.state.flying in (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING):
-            raise CommandRejected(in_state(self._flight.state.flying))
 
 
 def _decided_elsewhere(message: Message) -> None:

@@ -32,7 +32,7 @@ from anafi_mav.drone.piloting.landing import LandingEnd
 from anafi_mav.drone.piloting.motors import Motors
 from anafi_mav.drone.piloting.moves import Displacement, Move, MoveEnd, Moves
 from anafi_mav.drone.piloting.settings import PilotingSettings
-from anafi_mav.drone.piloting.state import REDUCERS, PilotingState
+from anafi_mav.drone.piloting.state import REDUCERS, PilotingState, require_free
 from anafi_mav.drone.piloting.stick_stream import StickStream
 from anafi_mav.drone.piloting.sticks import Limits, PilotingCommand, percent
 from anafi_mav.drone.sent_commands import QUIET, Slot
@@ -62,7 +62,6 @@ class Piloting(PilotingSettings):
         self._sticks = StickStream(commander, self, home, lambda: self.pilot_has_source())
         self._motors = Motors(commander, self, self._sticks, takeoff_blockers)
         self._guided = GuidedMoves(commander, self, home, self._sticks, self._moves)
-        self.require_free = self._guided.require_free
         self._returns = ReturnHome(commander, self, home, self._sticks, self._moves, self._end_movement)
         self.is_modern: Callable[[], bool] = lambda: False
         """True for an Ai; set by `Drone`."""
@@ -73,6 +72,10 @@ class Piloting(PilotingSettings):
     def reset(self) -> None:
         super().reset()
         self.link_lost()
+
+    def require_free(self) -> None:
+        """Raise `CommandRejected` while the drone returns by itself or lands."""
+        require_free(self.state, self._home.state)
 
     def link_lost(self) -> None:
         """Drop everything from before the loss of the link.

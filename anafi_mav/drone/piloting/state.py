@@ -19,6 +19,8 @@ from anafi_mav.arsdk.messages.piloting_style import PilotingStyleStyle
 from anafi_mav.drone.element import Position, Range, Reducer, finite, members, position, setting
 from anafi_mav.drone.piloting.sticks import Limits
 from anafi_mav.drone.status.alerts import spoken
+from anafi_mav.drone.status.home import BY_ITSELF, HomeState
+from anafi_mav.errors import CommandRejected
 from anafi_mav.units import LARGEST
 
 MOTORS_OFF = frozenset({FlyingState.LANDED, FlyingState.EMERGENCY})
@@ -126,6 +128,17 @@ def in_state(flying: FlyingState | None) -> str:
         if flying is None
         else f"the drone is in the state {spoken(flying)}"
     )
+
+
+def require_free(flight: PilotingState, home: HomeState) -> None:
+    """Raise `CommandRejected` while the drone returns by itself or lands.
+
+    A move of ours must not interfere with these.
+    """
+    if home.returning_by_itself:
+        raise CommandRejected(BY_ITSELF)
+    if flight.flying in (FlyingState.LANDING, FlyingState.EMERGENCY_LANDING):
+        raise CommandRejected(in_state(flight.flying))
 
 
 def _attitude(state: PilotingState, message: ardrone3.AttitudeChanged) -> PilotingState:
