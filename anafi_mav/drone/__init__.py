@@ -61,11 +61,12 @@ from anafi_mav.drone.payload.gimbal import Aim, Angles, Gimbal, GimbalAttitude, 
 from anafi_mav.drone.payload.media import Media, MediaItem, MediaState, Notification, Place, Resource
 from anafi_mav.drone.payload.storage import Storage, StorageState
 from anafi_mav.drone.payload.thermal import Colour, Palette, Thermal, ThermalState
+from anafi_mav.drone.piloting.motors import Blocker, BlockerKind
 from anafi_mav.drone.piloting.moves import Displacement, Move, MoveEnd
 from anafi_mav.drone.piloting.piloting import Piloting
 from anafi_mav.drone.piloting.state import Attitude, Avoidance, PilotingState, Velocity
 from anafi_mav.drone.piloting.sticks import Limits, PilotingCommand
-from anafi_mav.drone.status.alerts import Alerts, AlertsState, Blocker, BlockerKind
+from anafi_mav.drone.status.alerts import Alerts, AlertsState
 from anafi_mav.drone.status.battery import Battery, BatteryState
 from anafi_mav.drone.status.calibration import Calibration, CalibrationState
 from anafi_mav.drone.status.gps import Gps, GpsState

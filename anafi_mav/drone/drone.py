@@ -47,11 +47,12 @@ from anafi_mav.drone.payload.gimbal import Gimbal
 from anafi_mav.drone.payload.media import Media
 from anafi_mav.drone.payload.storage import Storage
 from anafi_mav.drone.payload.thermal import Thermal
+from anafi_mav.drone.piloting.motors import Blocker, takeoff_blockers
 from anafi_mav.drone.piloting.moves import Move
 from anafi_mav.drone.piloting.piloting import Piloting
 from anafi_mav.drone.piloting.state import MOTORS_OFF
 from anafi_mav.drone.rest import HTTP_PORT, Rest
-from anafi_mav.drone.status.alerts import Alerts, Blocker, spoken, takeoff_blockers
+from anafi_mav.drone.status.alerts import Alerts, spoken
 from anafi_mav.drone.status.battery import Battery
 from anafi_mav.drone.status.calibration import Calibration
 from anafi_mav.drone.status.gps import Gps

@@ -117,8 +117,8 @@ from anafi_mav.arsdk.messages.user_storage import Feature as StorageFeature
 from anafi_mav.arsdk.messages.user_storage import FormattingType as FormattingType
 from anafi_mav.arsdk.messages.user_storage import FsState as FsState
 from anafi_mav.arsdk.messages.user_storage import PhyState as PhyState
-from anafi_mav.drone.status.alerts import Blocker as Blocker
-from anafi_mav.drone.status.alerts import BlockerKind as BlockerKind
+from anafi_mav.drone.piloting.motors import Blocker as Blocker
+from anafi_mav.drone.piloting.motors import BlockerKind as BlockerKind
 
 __all__ = [
     "AlertLevel",

@@ -1,4 +1,4 @@
-"""Take-off and landing: the verbs that start the motors, and those that end a flight.
+"""Take-off and landing: what prevents a take-off, and the verbs that end a flight.
 
 A take-off that was aborted may have reached the drone all the same: a landing and an emergency have to stop motors
 that may still start.
@@ -7,17 +7,25 @@ that may still start.
 from __future__ import annotations
 
 import asyncio
+import enum
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
-from anafi_mav.arsdk.codec.wire import Message
+from anafi_mav.arsdk.codec.wire import Message, OpenEnum
 from anafi_mav.arsdk.messages import ardrone3
-from anafi_mav.arsdk.messages.ardrone3 import FlyingState
+from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
+from anafi_mav.arsdk.messages.ardrone3 import AlertState, FlyingState, MotorError
+from anafi_mav.arsdk.messages.battery import AlertLevel, BatteryAlert
+from anafi_mav.arsdk.messages.common import Sensor
 from anafi_mav.drone.element import Element
 from anafi_mav.drone.expectation import Commander, loop_time, require_number
 from anafi_mav.drone.piloting.state import MOTORS_OFF, PilotingState, in_state
 from anafi_mav.drone.piloting.stick_stream import StickStream
 from anafi_mav.drone.sent_commands import AUTOMATIC, QUIET, TAKEN_OFF, Phase, SentCommand, Slot
+from anafi_mav.drone.status.alerts import AlertsState, spoken
+from anafi_mav.drone.status.battery import BatteryState
+from anafi_mav.drone.status.calibration import CalibrationState
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout
 
 RAMPING_TIMEOUT = 10.0
@@ -52,6 +60,80 @@ TURNING = frozenset({FlyingState.MOTOR_RAMPING, FlyingState.USERTAKEOFF})
 _RISING = frozenset({FlyingState.MOTOR_RAMPING, FlyingState.TAKINGOFF})
 _LANDING = frozenset({FlyingState.LANDING, FlyingState.LANDED, FlyingState.EMERGENCY_LANDING, FlyingState.EMERGENCY})
 _MOTORS_CUT = frozenset({FlyingState.EMERGENCY, FlyingState.LANDED})
+
+_FLIES_WITHOUT = (Sensor.GPS,)
+"""Sensors that a drone takes off without."""
+
+_HARMLESS = (None, AlertState.NONE, AlertState.USER, AlertState.LOW_BATTERY)
+"""Alerts with which a drone takes off. USER is a past emergency stop; the flying state EMERGENCY reports it better. A
+firmware that kept it would stay on the ground until it is switched off."""
+
+
+class BlockerKind(enum.Enum):
+    """Kind of a reason that prevents a take-off; the value is the beginning of its text."""
+
+    CHECK = ""
+    """A line of the take-off checklist."""
+    MAGNETOMETER = "magnetometer calibration required"
+    CALIBRATING = "the magnetometer is being calibrated"
+    SENSOR = "sensor "
+    BATTERY = "battery "
+    ALERT = "alert "
+    MOTOR = "motor "
+
+
+class Blocker(NamedTuple):
+    """One reported reason that can prevent a take-off; `str` gives it in words."""
+
+    kind: BlockerKind
+    value: OpenEnum | None = None
+    """Which check, sensor, alert or error."""
+
+    def __str__(self) -> str:
+        if self.kind is BlockerKind.BATTERY and self.value == BatteryAlert.POWER_LEVEL:
+            return "battery critical"
+        return self.kind.value + ("" if self.value is None else spoken(self.value))
+
+    @property
+    def is_charge(self) -> bool:
+        """True when the reason is a low charge, which a drone reports in three ways at once."""
+        return (self.kind, self.value) in _CHARGE
+
+
+_CHARGE: tuple[tuple[BlockerKind, OpenEnum], ...] = (
+    (BlockerKind.CHECK, TakeoffChecklistType.BATTERY_CRITICAL),
+    (BlockerKind.BATTERY, BatteryAlert.POWER_LEVEL),
+    (BlockerKind.ALERT, AlertState.CRITICAL_BATTERY),
+    (BlockerKind.ALERT, AlertState.ALMOST_EMPTY_BATTERY),
+)
+
+
+def takeoff_blockers(alerts: AlertsState, battery: BatteryState, calibration: CalibrationState) -> list[Blocker]:
+    """Return the reported reasons that can prevent a take-off; empty when nothing is known.
+
+    ARSDK refuses a take-off without an answer. The take-off checklist (alarms.xml 175-0-2) is the drone's own list of
+    reasons and decides alone about alerts and sensors, whose last report may be old; firmware without it leaves the
+    alert, the calibration and the sensors. A critical battery counts in any case.
+    """
+    reasons = [Blocker(BlockerKind.CHECK, check) for check, blocks in alerts.checklist.items() if blocks]
+    if TakeoffChecklistType.MAGNETO_CALIBRATION not in alerts.checklist and calibration.magneto_required:
+        reasons.append(Blocker(BlockerKind.MAGNETOMETER))
+    if calibration.started:
+        reasons.append(Blocker(BlockerKind.CALIBRATING))
+    if not alerts.checklist:
+        failed = [sensor for sensor, ok in calibration.sensors.items() if not ok and sensor not in _FLIES_WITHOUT]
+        reasons += [Blocker(BlockerKind.SENSOR, sensor) for sensor in failed]
+    critical = [alert for alert, level in battery.alerts.items() if level == AlertLevel.CRITICAL]
+    reasons += [Blocker(BlockerKind.BATTERY, alert) for alert in critical]
+    if not alerts.checklist:
+        if alerts.alert not in _HARMLESS:
+            reasons.append(Blocker(BlockerKind.ALERT, alerts.alert))
+        if BatteryAlert.POWER_LEVEL not in battery.alerts and battery.charge_level == AlertLevel.CRITICAL:
+            reasons.append(Blocker(BlockerKind.BATTERY, BatteryAlert.POWER_LEVEL))
+    if alerts.motor_error not in (None, MotorError.NO_ERROR):
+        reasons.append(Blocker(BlockerKind.MOTOR, alerts.motor_error))
+    charge = [reason for reason in reasons if reason.is_charge]
+    return [reason for reason in reasons if reason not in charge[1:]]
 
 
 class Motors:

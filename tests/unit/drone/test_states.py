@@ -27,9 +27,10 @@ from anafi_mav.arsdk.messages.common import CalibrationAxis, Sensor
 from anafi_mav.arsdk.messages.rth import AutoTriggerReason, RthEndingBehavior, RthHomeType, RthState, StateReason
 from anafi_mav.drone import Position, Range
 from anafi_mav.drone.element import MAX_ITEMS, Element
+from anafi_mav.drone.piloting.motors import takeoff_blockers
 from anafi_mav.drone.piloting.piloting import Piloting
 from anafi_mav.drone.piloting.state import Attitude, PilotingState, Velocity
-from anafi_mav.drone.status.alerts import Alerts, AlertsState, takeoff_blockers
+from anafi_mav.drone.status.alerts import Alerts, AlertsState
 from anafi_mav.drone.status.battery import Battery, BatteryState
 from anafi_mav.drone.status.calibration import Calibration, CalibrationState
 from anafi_mav.drone.status.gps import Gps
