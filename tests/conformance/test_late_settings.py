@@ -149,3 +149,17 @@ async def test_camera_mode_set_back_after_an_unreported_change_is_sent_to_the_dr
         ack = await w.client.command(SET_CAMERA_MODE, 0, stock.CAMERA_MODE_VIDEO, target=(1, CAMERA))
         assert ack.result == stock.MAV_RESULT_ACCEPTED
         assert simulated.mode is camera.CameraCameraMode.RECORDING
+
+
+async def test_setting_after_a_change_between_thermal_modes_is_that_of_the_camera_at_work() -> None:
+    """The pictures of each of the two modes are another camera's."""
+    async with world(model="thermal") as w:
+        ack = await write(w.client, "CAM_THERMAL", float(ThermalMode.STANDARD), CHOICE)
+        assert ack.param_result == dialect.PARAM_ACK_ACCEPTED
+        for mode in (ThermalMode.BLENDED, ThermalMode.STANDARD):
+            w.drone.faults.late = {camera.CameraStates.NAME: 0.8}
+            ack = await write(w.client, "CAM_THERMAL", float(mode), CHOICE)
+            assert ack.param_result == dialect.PARAM_ACK_ACCEPTED
+            ack = await write(w.client, "CAM_EV", 1.0, REAL32)
+            assert (ack.param_result, value_of(ack)) == (dialect.PARAM_ACK_ACCEPTED, 1.0)
+            assert sim_value(w.drone, "CAM_EV") == 1.0

@@ -21,6 +21,7 @@ from anafi_mav.drone.payload import camera_classic, camera_modern
 from anafi_mav.drone.payload.camera_classic import ClassicCamera
 from anafi_mav.drone.payload.camera_enums import (
     Antiflicker,
+    CameraKind,
     CameraMode,
     PhotoMode,
     StoragePolicy,
@@ -537,20 +538,30 @@ class Camera(Commanding[CamerasState]):
 
     # -- inside
 
-    async def until_main(self, *, is_active: bool) -> None:
-        """Wait until the main camera is reported to take the pictures, or another one.
+    async def until_active(self, kind: CameraKind) -> None:
+        """Wait until the camera of this kind is reported to take the pictures.
 
         A thermal mode changes that. Returns without it when the drone does not report it in `STATE_TIMEOUT`.
         """
 
         def judge(message: Message) -> bool | None:
-            return True if (self.active_id == MAIN) is is_active else None
+            return True if self._is_active(kind) else None
 
-        if self.state.active and (self.active_id == MAIN) is not is_active:
+        if self.state.active and not self._is_active(kind):
             with contextlib.suppress(CommandTimeout, LinkLost):
                 answer = self._commander.expect((camera_classic.ACTIVE_EVENT,), judge)
                 answer.expire_after(STATE_TIMEOUT, camera_classic.ACTIVE_EVENT.NAME)
                 await answer.wait()
+
+    def _is_active(self, kind: CameraKind) -> bool:
+        """Return True if the active camera is of this kind.
+
+        If no camera is reported with a thermal kind, it is any but the main one.
+        """
+        id = self.active_id
+        if kind is CameraKind.MAIN or kind not in (camera.kind for camera in self.state.cameras.values()):
+            return (id == MAIN) is (kind is CameraKind.MAIN)
+        return self[id].kind is kind
 
     def _known(self, id: int) -> tuple[type[ClassicCamera] | type[ModernCamera], CameraState]:
         """How to ask this camera, and its state."""

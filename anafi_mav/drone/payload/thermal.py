@@ -24,8 +24,16 @@ from anafi_mav.arsdk.messages.thermal import (
 )
 from anafi_mav.arsdk.messages.thermal import Range as Sensitivity
 from anafi_mav.drone.element import EMPTY, FIRST, LAST, Reducer, finite, members
+from anafi_mav.drone.payload.camera_enums import CameraKind
 from anafi_mav.drone.settings import Commanding, is_same, number, same_as
 from anafi_mav.errors import LocalProtocolError
+
+ACTIVE_CAMERAS: Mapping[ThermalMode, CameraKind] = {
+    ThermalMode.DISABLED: CameraKind.MAIN,
+    ThermalMode.STANDARD: CameraKind.THERMAL,
+    ThermalMode.BLENDED: CameraKind.THERMAL_BLENDED,
+}
+"""Kind of the camera that takes the pictures in each mode."""
 
 MAX_COLOURS = 256
 """Colours of a palette that are kept. Parrot's own have a dozen; a longer list is a confused peer."""

@@ -19,7 +19,7 @@ from anafi_mav.arsdk.codec.wire import Message
 from anafi_mav.arsdk.messages import thermal as thermal_messages
 from anafi_mav.arsdk.messages.thermal import RenderingMode, ThermalMode
 from anafi_mav.drone.payload.camera import Camera
-from anafi_mav.drone.payload.thermal import Thermal
+from anafi_mav.drone.payload.thermal import ACTIVE_CAMERAS, Thermal
 from anafi_mav.drone.video.video import Video
 from anafi_mav.errors import CommandRejected, NotSupported
 from anafi_mav.models import Model, PayloadSensor
@@ -151,7 +151,7 @@ class StreamChoice:
         if self._thermal.state.mode is not mode:
             if await self._thermal.set_mode(mode) is not mode:
                 raise CommandRejected("the drone keeps its thermal mode")
-            await self._camera.until_main(is_active=not kind.is_thermal)  # the next command is for that camera
+            await self._camera.until_active(ACTIVE_CAMERAS[mode])  # the next command is for that camera
         if kind.is_thermal:
             wanted = RenderingMode.THERMAL if kind is StreamKind.THERMAL else RenderingMode.BLENDED
             rendering, _ = await self._thermal.set_rendering(wanted)

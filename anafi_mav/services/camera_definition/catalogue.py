@@ -27,6 +27,7 @@ from anafi_mav.drone import (
     ThermalState,
 )
 from anafi_mav.drone.events import ThermalMode
+from anafi_mav.drone.payload.thermal import ACTIVE_CAMERAS
 from anafi_mav.services.camera_definition import setting_table, thermal_table
 from anafi_mav.services.camera_definition.camera_setting import CameraSetting, Option, ValueLimits, View
 
@@ -37,13 +38,6 @@ SETTINGS: tuple[CameraSetting, ...] = (
     *thermal_table.THERMAL_SETTINGS[1:],
 )
 """All settings of all models, in the order of the list."""
-
-KIND_OF_MODE = {
-    ThermalMode.DISABLED: CameraKind.MAIN,
-    ThermalMode.STANDARD: CameraKind.THERMAL,
-    ThermalMode.BLENDED: CameraKind.THERMAL_BLENDED,
-}
-"""The camera that each thermal mode makes the active one."""
 
 _SETS = (
     "modes",
@@ -231,7 +225,7 @@ class Catalogue:
         if "CAM_THERMAL" not in self.index:
             return
         for option in self["CAM_THERMAL"].options:
-            kind = KIND_OF_MODE[ThermalMode(round(option.value))]
+            kind = ACTIVE_CAMERAS[ThermalMode(round(option.value))]
             for camera in self._cameras.values():
                 if camera.kind is kind:
                     yield option.value, self._view(camera)

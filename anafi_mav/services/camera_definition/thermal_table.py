@@ -20,6 +20,7 @@ from anafi_mav.drone.events import (
     ThermalMode,
     ThermalSensitivity,
 )
+from anafi_mav.drone.payload.thermal import ACTIVE_CAMERAS
 from anafi_mav.errors import NotSupported
 from anafi_mav.services.camera_definition.camera_setting import CameraSetting, Guard, Option, ValueLimits, View
 from anafi_mav.services.camera_definition.param_ext_codec import ExtType
@@ -50,7 +51,7 @@ def _has_thermal(options: tuple[Option, ...]) -> Callable[[View], tuple[Option, 
 
 async def _set_mode(drone: Drone, mode: ThermalMode) -> None:
     if await drone.thermal.set_mode(mode) is mode:
-        await drone.camera.until_main(is_active=mode is ThermalMode.DISABLED)  # the next setting is of that camera
+        await drone.camera.until_active(ACTIVE_CAMERAS[mode])  # the next setting is of that camera
 
 
 def _set_palette(drone: Drone, **changes: object) -> Awaitable[object]:
