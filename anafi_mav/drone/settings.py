@@ -79,8 +79,19 @@ class Commanding(Element[StateT]):
         super().__init__()
         self._commander = commander
         self._setting_locks: dict[type[Message], asyncio.Lock] = {}
+        self._changes: dict[type[Message], object] = {}
+        """The newest change of each kind of answer, until the drone has answered it."""
         self._orders: Counter[Hashable] = Counter()
         """Targets given so far, by what they are for: a verb that repeats its own sees that there is a newer one."""
+
+    def reset(self) -> None:
+        super().reset()
+        self._changes.clear()
+
+    @property
+    def is_settled(self) -> bool:
+        """True when the drone has answered the newest change of each setting, and has what it reports."""
+        return not self._changes
 
     def _require(self, reported: object, feature: str) -> None:
         """Raise `LinkLost` without a link, `NotSupported` for an absent feature.
@@ -112,6 +123,7 @@ class Commanding(Element[StateT]):
         drone has reported nothing by then; without it, it may still answer until `timeout`. Raises `CommandTimeout`,
         too, if the drone has not received the command by then.
         """
+        change = self._changes[answer] = object()
         async with self._setting_locks.setdefault(answer, asyncio.Lock()):  # else whose answer would it be
             sent = command if isinstance(command, Message) else command()
             kept: list[T] = []
@@ -149,7 +161,10 @@ class Commanding(Element[StateT]):
             expectation = self._commander.expect((answer,), listen)
             self._commander.dispatch(expectation, sent, timeout, stops=stops, is_setting=not stops)
             watch_delivery()
-            return await expectation.wait()
+            result = await expectation.wait()
+            if self._changes.get(answer) is change:
+                del self._changes[answer]
+            return result
 
     def _order(self, subject: Hashable, command: Message) -> int:
         """Send a target that is not acknowledged; every older one for the same subject is over."""

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as stock
 from support.ext_params import CHOICE, value_of, write
+from support.ext_params import send_set as send_write
 from support.mav import CAMERA
 from support.params import read as param_read
 from support.params import send_set
@@ -17,6 +18,7 @@ from support.sim_settings import sim_value
 from support.world import HOME, world
 
 from anafi_mav.arsdk.messages import ardrone3, camera, rth
+from anafi_mav.arsdk.messages import thermal as thermal_messages
 from anafi_mav.arsdk.messages.thermal import ThermalMode
 from anafi_mav.mavlink import dialect
 
@@ -163,3 +165,41 @@ async def test_setting_after_a_change_between_thermal_modes_is_that_of_the_camer
             ack = await write(w.client, "CAM_EV", 1.0, REAL32)
             assert (ack.param_result, value_of(ack)) == (dialect.PARAM_ACK_ACCEPTED, 1.0)
             assert sim_value(w.drone, "CAM_EV") == 1.0
+
+
+SET_SOURCE, DIGICAM = stock.MAV_CMD_SET_CAMERA_SOURCE, stock.MAV_CMD_DO_DIGICAM_CONTROL
+
+
+async def test_camera_source_of_before_is_shown_after_a_change_that_is_not_reported_yet() -> None:
+    async with world(model="thermal", clients=2) as w:
+        first, second = w.clients
+        w.drone.faults.late = {thermal_messages.Mode.NAME: 0.8}
+        send_write(first, "CAM_THERMAL", float(ThermalMode.BLENDED), CHOICE)
+        await w.drone.wait_log(lambda e: e.name == thermal_messages.SetMode.NAME)
+        ack = await second.command(SET_SOURCE, 0, dialect.CAMERA_SOURCE_RGB, 0, target=(1, CAMERA))
+        assert ack.result == stock.MAV_RESULT_ACCEPTED
+        assert sim_value(w.drone, "CAM_THERMAL") == ThermalMode.DISABLED
+
+
+async def test_thermal_mode_of_before_is_set_after_a_source_that_is_not_reported_yet() -> None:
+    async with world(model="thermal", clients=2) as w:
+        first, second = w.clients
+        w.drone.faults.late = {thermal_messages.Mode.NAME: 0.8}
+        first.send_command(SET_SOURCE, 0, dialect.CAMERA_SOURCE_IR, 0, target=(1, CAMERA))
+        await w.drone.wait_log(lambda e: e.name == thermal_messages.SetMode.NAME)
+        ack = await write(second, "CAM_THERMAL", float(ThermalMode.DISABLED), CHOICE)
+        assert (ack.param_result, value_of(ack)) == (dialect.PARAM_ACK_ACCEPTED, ThermalMode.DISABLED)
+        assert sim_value(w.drone, "CAM_THERMAL") == ThermalMode.DISABLED
+
+
+async def test_photo_at_the_autopilot_enters_photo_mode_although_a_change_is_not_reported_yet() -> None:
+    async with world(clients=2, web=True) as w:
+        first, second = w.clients
+        ack = await first.command(SET_CAMERA_MODE, 0, stock.CAMERA_MODE_IMAGE, target=(1, CAMERA))
+        assert ack.result == stock.MAV_RESULT_ACCEPTED
+        w.drone.faults.late = {camera.CameraMode.NAME: 0.8}
+        first.send_command(SET_CAMERA_MODE, 0, stock.CAMERA_MODE_VIDEO, target=(1, CAMERA))
+        await w.drone.wait_log(lambda e: len(w.commands(camera.SetCameraMode.NAME)) == 2)
+        ack = await second.command(DIGICAM, x=1.0)
+        assert ack.result == stock.MAV_RESULT_ACCEPTED
+        assert w.drone.firmware.payload.cameras[0].mode is camera.CameraCameraMode.PHOTO

@@ -120,6 +120,14 @@ class StreamChoice:
 
         return undo
 
+    def is_shown(self, kind: StreamKind) -> bool:
+        """Return True when the drone shows this stream, and has answered each change of it.
+
+        While nothing may change it, it is the reported one.
+        """
+        is_certain = self._thermal.is_settled or self.is_recording or self.ends_photos(kind)
+        return kind is self._shown_by_drone() and is_certain
+
     async def show(self, kind: StreamKind) -> None:
         """Show this stream from now on; return when the drone has confirmed it.
 
@@ -131,7 +139,7 @@ class StreamChoice:
             raise NotSupported(f"{kind.value} stream")
         async with self._showing:
             try:
-                if kind is not self._shown_by_drone():
+                if not self.is_shown(kind):
                     await self._change(kind)
             finally:
                 if self._is_linked:
@@ -148,7 +156,7 @@ class StreamChoice:
         # THERMAL is a rendering of the blended stream: STANDARD sends the sensor's raw picture, for programs that
         # colour it themselves (GroundSDK ThermalControl; anafi_ros uses BLENDED for both renderings).
         mode = ThermalMode.BLENDED if kind.is_thermal else ThermalMode.DISABLED
-        if self._thermal.state.mode is not mode:
+        if self._thermal.state.mode is not mode or not self._thermal.is_settled:
             if await self._thermal.set_mode(mode) is not mode:
                 raise CommandRejected("the drone keeps its thermal mode")
             await self._camera.until_active(ACTIVE_CAMERAS[mode])  # the next command is for that camera

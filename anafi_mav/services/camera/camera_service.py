@@ -22,7 +22,7 @@ from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.camera import camera_messages
 from anafi_mav.services.camera.camera_pose import current_pose
 from anafi_mav.services.camera.camera_reset import reset_camera
-from anafi_mav.services.camera.camera_targets import is_at_autopilot, require_free, require_idle
+from anafi_mav.services.camera.camera_targets import enter_mode, is_at_autopilot, require_free, require_idle
 from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect, ProgressPolicy, require_camera
 from anafi_mav.services.service import Answer, Host, Request, Service
 from anafi_mav.services.stream import MessageStream, Times
@@ -193,17 +193,7 @@ class CameraService(Service):
             raise Refused(texts.CAMERA_MODE, texts.CAMERA_UNKNOWN)
         if wanted is None:
             raise Refused(texts.CAMERA_MODE, texts.NO_SUCH_MODE, lasting=True)
-        if wanted not in camera.modes:  # the thermal camera only records
-            raise Refused(texts.CAMERA_MODE, texts.CAMERA_LACKS_MODE)
-        try:
-            require_free(self.host.vehicle, texts.CAMERA_MODE)
-            require_idle(drone, texts.CAMERA_MODE)
-        except Refused:
-            if camera.mode is not wanted:
-                raise
-        else:  # also in the reported mode: an earlier change may be unreported
-            if await drone.camera.set_mode(wanted, drone.camera.active_id) is not wanted:
-                raise Refused(texts.CAMERA_MODE, texts.CAMERA_MODE_KEPT)
+        await enter_mode(self.host, wanted, texts.CAMERA_MODE)
         self._send_settings()
 
     async def _zoom(self, command: Command) -> None:
@@ -247,7 +237,7 @@ class CameraService(Service):
             raise Refused(texts.CAMERA_SOURCE, texts.NO_SUCH_SOURCE, lasting=True)
         if second and not math.isnan(second):
             kind = StreamKind.BLENDED
-        if drone.streams.shown.kind is not kind:
+        if not drone.streams.is_shown(kind):
             require_free(self.host.vehicle, texts.CAMERA_SOURCE)
             require_idle(drone, texts.CAMERA_SOURCE)
             self.host.end_others(ActionGroup.STREAM)

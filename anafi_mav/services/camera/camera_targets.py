@@ -1,11 +1,13 @@
-"""Checks that the camera's commands have in common: owner, storage."""
+"""Checks and changes that the camera's commands have in common: owner, mode, storage."""
 
 from __future__ import annotations
 
 from anafi_mav import texts
 from anafi_mav.drone import Drone
 from anafi_mav.drone.events import FsState, PhyState
+from anafi_mav.drone.payload.camera_enums import CameraMode
 from anafi_mav.services.flavours import Flavour
+from anafi_mav.services.service import Host
 from anafi_mav.texts import OperatorText, Reason
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.vehicle import Vehicle
@@ -44,6 +46,30 @@ def require_idle(drone: Drone, what: OperatorText) -> None:
         raise Refused(what, texts.CAMERA_RECORDS)
     if any(camera.taking for camera in drone.camera.state.cameras.values()):
         raise Refused(what, texts.CAMERA_TAKES_PHOTOS)
+
+
+async def enter_mode(host: Host, mode: CameraMode, what: OperatorText) -> None:
+    """Change between photos and videos.
+
+    No command is sent for the mode that the camera has. It has the reported one when it has answered every change, or
+    when nothing may change it now.
+    """
+    camera = host.drone.camera
+    id = camera.active_id
+    state = camera[id]
+    if state.mode is mode and camera.is_settled:
+        return
+    if mode not in (state.modes or ()):  # the thermal camera only records
+        raise Refused(what, texts.CAMERA_LACKS_MODE)
+    try:
+        require_free(host.vehicle, what)
+        require_idle(host.drone, what)
+    except Refused:
+        if state.mode is mode:
+            return
+        raise
+    if await camera.set_mode(mode, id) is not mode:
+        raise Refused(what, texts.CAMERA_MODE_KEPT)
 
 
 def media_storage(drone: Drone) -> int | None:

@@ -23,6 +23,7 @@ from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.services.camera.camera_messages import MEBIBYTE, stepped_zoom, zoom_factor
 from anafi_mav.services.camera.camera_targets import (
+    enter_mode,
     is_at_autopilot,
     media_storage,
     require_free,
@@ -303,7 +304,7 @@ class CaptureService(Service):
 
     async def _start_capture_in_any_mode(self, command: Command) -> None:
         require_camera(texts.PHOTO, command.params[0])
-        await self._photos.enter(CameraMode.PHOTO, texts.PHOTO)
+        await enter_mode(self.host, CameraMode.PHOTO, texts.PHOTO)
         await self._start_capture(command)
 
     async def _stop_capture(self, command: Command) -> None:
@@ -324,7 +325,7 @@ class CaptureService(Service):
             factor = zoom_factor(camera, zoom) if zoom > 0.0 else stepped_zoom(camera, steps)
             await drone.camera.zoom(factor, id)
         if shoot == 1.0:
-            await self._photos.enter(CameraMode.PHOTO, texts.PHOTO)
+            await enter_mode(self.host, CameraMode.PHOTO, texts.PHOTO)
             await self._photos.take()
 
     async def _trigger_by_distance(self, command: Command) -> None:
@@ -351,7 +352,7 @@ class CaptureService(Service):
 
     async def _start_video_in_any_mode(self, command: Command) -> None:
         require_camera(texts.RECORDING, command.params[2])
-        await self._photos.enter(CameraMode.RECORDING, texts.RECORDING)
+        await enter_mode(self.host, CameraMode.RECORDING, texts.RECORDING)
         await self._start_video(command)
 
     async def _record(self) -> None:
@@ -397,7 +398,7 @@ class CaptureService(Service):
         if record == 0.0:
             await self._stop_recording()
             return
-        await self._photos.enter(CameraMode.RECORDING, texts.RECORDING)
+        await enter_mode(self.host, CameraMode.RECORDING, texts.RECORDING)
         await self._record()
 
 

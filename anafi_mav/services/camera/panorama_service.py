@@ -16,7 +16,7 @@ from anafi_mav.drone.events import AnimationType, FlyingState
 from anafi_mav.drone.payload.camera_enums import CameraMode
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
-from anafi_mav.services.camera.camera_targets import require_free, require_idle, require_storage
+from anafi_mav.services.camera.camera_targets import enter_mode, require_free, require_idle, require_storage
 from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect
 from anafi_mav.services.service import Service
 from anafi_mav.vehicle.base.flight_task import PlainTask, TaskRules
@@ -89,11 +89,7 @@ class PanoramaService(Service, PlainTask):
         if not (math.isfinite(wide) and math.isfinite(high)):
             raise Refused(texts.PANORAMA, texts.NUMBER_MISSING, lasting=True)
         self._require_hovering()
-        id = drone.camera.active_id
-        if drone.camera[id].mode is not CameraMode.PHOTO:
-            if await drone.camera.set_mode(CameraMode.PHOTO, id) is not CameraMode.PHOTO:
-                raise Refused(texts.PANORAMA, texts.CAMERA_MODE_KEPT)
-            self._require_hovering()
+        await enter_mode(self.host, CameraMode.PHOTO, texts.PANORAMA)
         async with vehicle.control.acquire(self, by=command.right, condition=self._require_hovering):
             await drone.animations.photo_panorama(panorama_type(wide, high, drone.animations.state.available or ()))
 

@@ -15,7 +15,7 @@ from anafi_mav import texts
 from anafi_mav.drone.payload.camera_enums import CameraMode, PhotoMode
 from anafi_mav.drone.payload.camera_state import CameraState, CaptureProgress, CaptureUpdate, PhotoSettings
 from anafi_mav.errors import AnafiMavError, CommandTimeout, LinkLost
-from anafi_mav.services.camera.camera_targets import require_free, require_idle, require_storage
+from anafi_mav.services.camera.camera_targets import enter_mode, require_free, require_storage
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
@@ -149,7 +149,7 @@ class PhotoControl:
         if self.camera.taking and photo is not None and (photo.mode, photo.interval) == (PhotoMode.GPS_LAPSE, distance):
             return
         await self.stop_series()
-        await self.enter(CameraMode.PHOTO, texts.PHOTO)
+        await enter_mode(self.host, CameraMode.PHOTO, texts.PHOTO)
         await self.begin_series(PhotoMode.GPS_LAPSE, distance, None)
 
     async def stop_series(self) -> None:
@@ -162,20 +162,6 @@ class PhotoControl:
                 raise Refused(texts.PHOTO, texts.NO_SERIES)
             require_free(self.host.vehicle, texts.PHOTO)
             await self.host.drone.camera.stop_photo(self.host.drone.camera.active_id)
-
-    async def enter(self, mode: CameraMode, what: texts.Subject) -> None:
-        """Change the mode for a command whose clients know no modes."""
-        drone = self.host.drone
-        id = drone.camera.active_id
-        state = drone.camera[id]
-        if state.mode is mode:
-            return
-        if mode not in (state.modes or ()):
-            raise Refused(what, texts.CAMERA_LACKS_MODE)
-        require_free(self.host.vehicle, what)
-        require_idle(drone, what)
-        if await drone.camera.set_mode(mode, id) is not mode:
-            raise Refused(what, texts.CAMERA_MODE_KEPT)
 
     async def _restored(self) -> None:
         """Wait until the settings of before the last series are restored."""

@@ -18,7 +18,7 @@ from anafi_mav import texts
 from anafi_mav.clock import NEVER
 from anafi_mav.drone import Camera, Thermal
 from anafi_mav.drone.events import Message
-from anafi_mav.errors import AnafiMavError, CommandTimeout, NotSupported
+from anafi_mav.errors import AnafiMavError, NotSupported
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.node import Inbound
@@ -100,8 +100,6 @@ class ParamExtService(Service):
         self._waiting: deque[Write] = deque()
         self._current: Write | None = None
         """The write that the drone is carrying out."""
-        self._unanswered: set[str] = set()
-        """Settings whose last write the drone has not answered: it may have another value than it has reported."""
         self._worker: asyncio.Task[None] | None = None
         self._refused_at: dict[Channel, float] = {}
 
@@ -117,7 +115,6 @@ class ParamExtService(Service):
 
     def link_up(self) -> None:
         self._catalogue = Catalogue()
-        self._unanswered.clear()  # the drone has reported all
         self._learn()
         self._report_changes()
 
@@ -272,8 +269,9 @@ class ParamExtService(Service):
                 other.is_reported = True
                 self._acknowledge(write, dialect.PARAM_ACK_IN_PROGRESS)
                 return
-        is_certain = name not in self._unanswered and not any(other.name == name for other in under_way)
-        if is_certain and self._reported(entry) == value:
+        drone = self.host.drone
+        is_settled = drone.camera.is_settled and drone.thermal.is_settled  # else it may have another value
+        if is_settled and not any(other.name == name for other in under_way) and self._reported(entry) == value:
             self._acknowledge(write, dialect.PARAM_ACK_ACCEPTED)
             return
         self._queue(write)
@@ -309,20 +307,19 @@ class ParamExtService(Service):
         reason = self._refusal(entry.setting.guard)
         result = dialect.PARAM_ACK_FAILED
         if reason is None:
-            self._unanswered.discard(write.name)
             try:
                 await entry.setting.write(self.host.drone, self.host.drone.camera.active_id, write.value)
             except NotSupported as error:
                 result, reason = dialect.PARAM_ACK_VALUE_UNSUPPORTED, reason_of(error)
             except AnafiMavError as error:
                 reason = reason_of(error)
-                if isinstance(error, CommandTimeout):
-                    self._unanswered.add(write.name)
             else:
                 if entry.setting.is_set(self._reported(entry), write.value):
                     result = dialect.PARAM_ACK_ACCEPTED
                 elif (reason := self._capturing()) is None:
                     result, reason = dialect.PARAM_ACK_VALUE_UNSUPPORTED, texts.VALUE_KEPT
+        elif entry.setting.is_set(self._reported(entry), write.value):  # nothing may change it now
+            result, reason = dialect.PARAM_ACK_ACCEPTED, None
         self._acknowledge(write, result)
         if reason is not None:
             self._explain(write, reason)

@@ -95,7 +95,7 @@ class VideoStreamService(Service):
         if stream is None:
             return  # each URI is open whenever its stream is shown
         streams = self.host.drone.streams
-        if stream.kind is streams.shown.kind:
+        if streams.is_shown(stream.kind):
             return
         if self.host.vehicle.mission_needs_camera:
             raise Refused(texts.VIDEO_STREAM, texts.MISSION_USES_CAMERA)
