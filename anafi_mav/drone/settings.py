@@ -90,7 +90,7 @@ class Commanding(Element[StateT]):
 
     @property
     def is_settled(self) -> bool:
-        """True when the drone has answered the newest change of each setting, and has what it reports."""
+        """True when the drone has answered the newest change of each setting."""
         return not self._changes
 
     def _require(self, reported: object, feature: str) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from support.cameras import ACCEPTED, PHOTO, VIDEO, command, enter, photos, press, request, shoot, texts, videos
-from support.ext_params import CHOICE, value_of, write
+from support.ext_params import CHOICE, read, value_of, write
 from support.fault_scenarios import on_command, watched
 from support.flavours import both
 from support.ftp import Ftp
@@ -41,7 +41,7 @@ START_VIDEO, STOP_VIDEO = dialect.MAV_CMD_VIDEO_START_CAPTURE, dialect.MAV_CMD_V
 ZOOM, FORMAT = dialect.MAV_CMD_SET_CAMERA_ZOOM, dialect.MAV_CMD_STORAGE_FORMAT
 
 IMAGE = dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED
-TIME_LAPSE = 3.0
+SINGLE, TIME_LAPSE, GPS_LAPSE = 0.0, 3.0, 4.0
 """Of CAM_PHOTOMODE."""
 
 models = pytest.mark.parametrize("model", ["4k", "thermal", "usa", "ai"])
@@ -332,6 +332,41 @@ async def test_conf_087_photo_mode_is_restored_after_a_series(model: str, count:
             assert await command(w.client, STOP_PHOTO, 0) == ACCEPTED
         await photo_mode_shown(w.client, before, mark)
         assert sim_value(w.drone, "CAM_PHOTOMODE") == before
+
+
+@pytest.mark.parametrize(
+    ("model", "mode", "name", "others", "before"),
+    [
+        ("ai", SINGLE, "CAM_PHOTODIST", 5.0, 10.0),
+        ("ai", GPS_LAPSE, "CAM_PHOTOLAPSE", 3.0, 2.0),
+        ("4k", GPS_LAPSE, "CAM_PHOTOLAPSE", 3.0, 2.0),
+    ],
+)
+async def test_conf_087_interval_of_before_is_restored_after_a_series(
+    model: str, mode: float, name: str, others: float, before: float
+) -> None:
+    """An ANAFI Ai has one interval for each of the two series, the others one for both."""
+    async with world(model=model, web=True) as w:
+        await enter(w.client, PHOTO)
+        assert (await write(w.client, "CAM_PHOTOMODE", mode, CHOICE)).param_result == dialect.PARAM_ACK_ACCEPTED
+        assert sim_value(w.drone, name) == before
+        if mode == SINGLE:
+            ack = await w.client.command(dialect.MAV_CMD_DO_SET_CAM_TRIGG_DIST, others)
+        else:
+            ack = await w.client.command(START_PHOTO, 0, others, 0, target=(1, CAMERA))
+        assert (ack.result, sim_value(w.drone, name)) == (ACCEPTED, others)
+        assert await command(w.client, STOP_PHOTO, 0) == ACCEPTED
+        await w.drone.wait_log(lambda e: sim_value(w.drone, "CAM_PHOTOMODE") == mode, 10.0)
+        assert sim_value(w.drone, name) == before
+
+
+async def test_intervals_of_both_series_of_an_ai_are_read_and_written_in_any_photo_mode() -> None:
+    async with world(model="ai") as w:
+        assert [value_of(await read(w.client, name)) for name in ("CAM_PHOTOLAPSE", "CAM_PHOTODIST")] == [2.0, 10.0]
+        for name, value in (("CAM_PHOTODIST", 7.0), ("CAM_PHOTOLAPSE", 3.0)):
+            ack = await write(w.client, name, value, dialect.MAV_PARAM_EXT_TYPE_REAL32)
+            assert (ack.param_result, value_of(ack)) == (dialect.PARAM_ACK_ACCEPTED, value)
+            assert sim_value(w.drone, name) == value
 
 
 async def lose_link(w: World, seconds: float) -> None:

@@ -160,8 +160,9 @@ class Camera(Commanding[CamerasState]):
 
     async def set_photo(self, wish: PhotoSettings, id: int = MAIN) -> PhotoSettings | None:
         """Change the photo settings; a field that is None stays as it is."""
-        if wish.interval is not None:
-            number(wish.interval, "interval")
+        for interval in (wish.interval, wish.other_interval):
+            if interval is not None:
+                number(interval, "interval")
         state = await self._ask(
             id, "photo", lambda s, now: s.photo(id, now, wish), lambda state: _has(state.photo, wish)
         )

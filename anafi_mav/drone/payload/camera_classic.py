@@ -378,7 +378,7 @@ class ClassicCamera:
     def photo(id: int, now: CameraState, wish: PhotoSettings) -> tuple[Message, type[Message]]:
         if wish.megapixels is not None:
             raise NotSupported("choice of the photo resolution")
-        if wish.signed is not None or wish.keeps_live_video is not None:
+        if wish.signed is not None or wish.keeps_live_video is not None or wish.other_interval is not None:
             raise NotSupported("photo setting of another camera")
         has = now.photo or PhotoSettings()
         command = wire.SetPhotoMode(

@@ -148,9 +148,7 @@ def _config(now: CameraState, c: wire.Config) -> dict[str, Any]:
         if c.photo_streaming_mode is None
         else c.photo_streaming_mode == wire.PhotoStreamingMode.CONTINUOUS,
     )
-    mode = photo.get("mode", now.photo.mode if now.photo is not None else None)
-    interval = c.photo_gps_lapse_interval if mode is PhotoMode.GPS_LAPSE else c.photo_time_lapse_interval
-    photo |= _given(interval=None if interval is None else finite(interval))
+    photo |= _intervals(now.photo or PhotoSettings(), photo.get("mode"), c)
     recording = _given(
         mode=word(RecordingMode, c.video_recording_mode),
         resolution=word(Resolution, c.video_recording_resolution),
@@ -195,6 +193,27 @@ def _config(now: CameraState, c: wire.Config) -> dict[str, Any]:
         if fields:
             changes[name] = replace(getattr(now, name) or empty, **fields)
     return changes
+
+
+def _intervals(now: PhotoSettings, mode: PhotoMode | None, c: wire.Config) -> dict[str, float]:
+    """Return the intervals of both series as `PhotoSettings` has them in a photo mode.
+
+    `mode` None: the mode of before.
+    """
+    time, distance = (
+        before if reported is None or finite(reported) is None else reported
+        for reported, before in zip(
+            (c.photo_time_lapse_interval, c.photo_gps_lapse_interval), _by_series(now, now.mode), strict=True
+        )
+    )
+    interval, other = (distance, time) if (mode or now.mode) is PhotoMode.GPS_LAPSE else (time, distance)
+    return _given(interval=interval, other_interval=other)
+
+
+def _by_series(settings: PhotoSettings, mode: PhotoMode | None) -> tuple[float | None, float | None]:
+    """Return the intervals of time-lapse (s) and GPS-lapse (m) of settings in a photo mode."""
+    interval, other = settings.interval, settings.other_interval
+    return (other, interval) if mode is PhotoMode.GPS_LAPSE else (interval, other)
 
 
 def _level(now: Range | None, value: float | None) -> Range | None:
@@ -399,8 +418,7 @@ class ModernCamera:
 
     @staticmethod
     def photo(id: int, now: CameraState, wish: PhotoSettings) -> tuple[Message, type[Message]]:
-        mode = wish.mode or (now.photo.mode if now.photo is not None else None)
-        interval = "photo_gps_lapse_interval" if mode is PhotoMode.GPS_LAPSE else "photo_time_lapse_interval"
+        time, distance = _by_series(wish, wish.mode or (now.photo.mode if now.photo is not None else None))
         signature = wire.DigitalSignature.DRONE if wish.signed else wire.DigitalSignature.NONE
         live = wire.PhotoStreamingMode.CONTINUOUS if wish.keeps_live_video else wire.PhotoStreamingMode.INTERRUPT
         return _configure(
@@ -413,7 +431,8 @@ class ModernCamera:
             photo_resolution=None if wish.megapixels is None else _pixels(wish.megapixels),
             photo_signature=None if wish.signed is None else signature,
             photo_streaming_mode=None if wish.keeps_live_video is None else live,
-            **{interval: wish.interval},
+            photo_time_lapse_interval=time,
+            photo_gps_lapse_interval=distance,
         )
 
     @staticmethod

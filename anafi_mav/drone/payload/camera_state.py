@@ -46,13 +46,25 @@ class PhotoSettings(msgspec.Struct, frozen=True):
     burst: Burst | None = None
     bracketing: Bracketing | None = None
     interval: float | None = None
-    """Between two pictures: s of a TIME_LAPSE, m of a GPS_LAPSE."""
+    """Between two pictures: m in mode GPS_LAPSE, else s of a TIME_LAPSE.
+
+    The older cameras have one number for both.
+    """
+    other_interval: float | None = None
+    """Interval of the other series: s in mode GPS_LAPSE, else m. Ai only."""
     megapixels: float | None = None
     """Ai only."""
     signed: bool | None = None
     """True when photos carry the drone's digital signature. Ai only."""
     keeps_live_video: bool | None = None
     """True when the live video goes on while a photo is taken. Ai only."""
+
+    def interval_of(self, series: PhotoMode) -> float | None:
+        """Return the interval of a series; None if the camera does not report it in its mode."""
+        if self.mode is series:
+            return self.interval
+        is_of_distance = PhotoMode.GPS_LAPSE in (self.mode, series)
+        return self.other_interval if is_of_distance or self.other_interval is None else self.interval
 
 
 class RecordingSettings(msgspec.Struct, frozen=True):

@@ -314,19 +314,19 @@ def bounded(bounds: tuple[float, float] | None) -> ValueLimits | None:
 
 
 def interval(mode: PhotoMode, view: View) -> float | None:
-    """Return the interval of a series; None in another photo mode.
+    """Return the interval of a series; None while the camera does not report it.
 
-    The older cameras have one number for both.
+    The older cameras have one number for both, and report that of the photo mode.
     """
-    settings = photo(view)
-    return settings.interval if settings.mode is mode else None
+    return photo(view).interval_of(mode)
 
 
 def set_interval(drone: Drone, id: int, mode: PhotoMode, value: float) -> Awaitable[object]:
     now = drone.camera[id].photo
-    if now is None or now.mode is not mode:
+    if now is None or now.interval_of(mode) is None:
         raise CommandRejected("other photo mode")
-    return set_photo(drone, id, PhotoSettings(interval=value))
+    is_other = PhotoMode.GPS_LAPSE in (now.mode, mode) and now.mode is not mode
+    return set_photo(drone, id, PhotoSettings(other_interval=value) if is_other else PhotoSettings(interval=value))
 
 
 def union(sets: Iterable[Iterable[WordT]]) -> frozenset[WordT]:
