@@ -9,8 +9,9 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 from support.cameras import ACCEPTED, PHOTO, VIDEO, command, enter, photos, press, request, shoot, texts, videos
-from support.ext_params import CHOICE, read, value_of, write
+from support.ext_params import CHOICE, fetch, read, value_of, write
 from support.fault_scenarios import on_command, watched
 from support.flavours import both
 from support.ftp import Ftp
@@ -815,6 +816,25 @@ async def test_conf_090_mode_is_changed_and_reported(flavour: str, model: str) -
             assert any("mode" in text for text in texts(w.client, mark))
         assert await command(w.client, dialect.MAV_CMD_SET_CAMERA_MODE, 0, dialect.CAMERA_MODE_IMAGE_SURVEY) == DENIED
         assert await command(w.client, dialect.MAV_CMD_SET_CAMERA_MODE, 2, PHOTO) == DENIED
+
+
+@pytest.mark.parametrize("is_default", [True, False])
+async def test_capabilities_that_are_reported_in_part_take_no_mode_from_an_ai(is_default: bool) -> None:
+    """Those of its present settings, or some of those of all."""
+    rules = (camera2.CapabilitiesRule(index=2, video_recording_codecs=(camera2.VideoCodec.H264,)),)
+    if not is_default:
+        rules = (replace(rules[0], camera_modes=(camera2.CameraMode.RECORDING,)),)
+    part = camera2.Capabilities(rules=rules)
+    async with world(model="ai") as w:
+        found = await fetch(w.client)
+        kinds = {"default_capabilities" if is_default else "current_capabilities": part}
+        w.drone.inject(camera2.State(camera_id=0, **kinds))
+        await watched(0.5)
+        await enter(w.client, PHOTO)
+        assert sim_value(w.drone, "CAM_MODE") == 0.0
+        assert (await write(w.client, "CAM_EV", 1.0, dialect.MAV_PARAM_EXT_TYPE_REAL32)).param_result == 0
+        assert set(await fetch(w.client)) == set(found)
+        assert w.gateway.systems[0].drone.camera[0].storage_policies
 
 
 @both

@@ -34,6 +34,7 @@ from anafi_mav.drone.payload.camera_enums import (
     Style,
     VideoCodec,
     WhiteBalance,
+    WordT,
     bare,
     ev_of,
     ev_step,
@@ -110,7 +111,8 @@ def _state(state: CamerasState, m: wire.State) -> CamerasState:
         }
     if m.config is not None:
         changes |= _config(now, m.config)
-    rules = m.default_capabilities or m.current_capabilities
+    # Those of its present settings count until those of all are reported.
+    rules = m.default_capabilities or (m.current_capabilities if now.modes is None else None)
     if rules is not None:
         changes |= _rules(rules.rules, changes.get("style", now.style))
     state = changed(state, id, **changes)
@@ -227,64 +229,80 @@ def _level(now: Range | None, value: float | None) -> Range | None:
 
 
 def _rules(rules: tuple[wire.CapabilitiesRule, ...], style: StyleSettings | None) -> dict[str, Any]:
-    """Return the possible values of the settings.
+    """Return the possible values of the settings that the rules name.
 
     Each rule is a set of values that go together.
     """
     rules = rules[:MAX_OPTIONS]
 
-    def union(name: str) -> list[Any]:
-        return [value for rule in rules for value in getattr(rule, name) or ()]
+    def union(name: str) -> list[Any] | None:
+        named = [values for rule in rules if (values := getattr(rule, name)) is not None]
+        return [value for values in named for value in values] if named else None
+
+    def words_of(kind: type[WordT], name: str) -> frozenset[WordT] | None:
+        values = union(name)
+        return None if values is None else words(kind, values)
+
+    def quantities_of(name: str) -> tuple[float, ...] | None:
+        values = union(name)
+        return None if values is None else quantities(values)
+
+    def has(name: str, value: OpenEnum) -> bool | None:
+        values = union(name)
+        return None if values is None else value in values
 
     def bounds(name: str) -> tuple[float, float] | None:
         ranges = [one for rule in rules if (one := getattr(rule, name)) is not None]
         return (min(one.min for one in ranges), max(one.max for one in ranges)) if ranges else None
 
-    changes = {
-        "modes": words(CameraMode, union("camera_modes")),
-        "exposures": words(ExposureMode, union("exposure_modes")),
-        "evs": tuple(ev for step in sorted(set(union("ev_compensations"))) if (ev := ev_of(step)) is not None),
-        "white_balances": words(WhiteBalance, union("white_balance_modes")),
-        "styles": words(Style, union("image_styles")),
-        "temperatures": quantities(union("white_balance_temperatures")),
-        "bursts": words(Burst, union("photo_burst_values")),
-        "brackets": words(Bracketing, union("photo_bracketing_presets")),
-        "megapixels": tuple(sorted({size for one in union("photo_resolutions") if (size := _number_of_pixels(one))})),
-        "signable": wire.DigitalSignature.DRONE in union("photo_signatures"),
-        "live_video_keepable": wire.PhotoStreamingMode.CONTINUOUS in union("photo_streaming_modes"),
-        "codecs": words(VideoCodec, union("video_recording_codecs")),
-        "storage_policies": words(StoragePolicy, union("storage_policies")),
-        "bitrates": tuple(sorted(set(union("video_recording_bitrates")))),
-        "shutters": quantities(union("exposure_manual_shutter_speeds")),
-        "isos": quantities(union("exposure_manual_iso_sensitivities")),
-        "max_isos": quantities(union("exposure_maximum_iso_sensitivities")),
-        "meterings": words(Metering, union("exposure_meterings")),
-        "photos": tuple(
-            PhotoOption(
-                words(PhotoMode, rule.photo_modes),
-                words(PhotoFormat, rule.photo_formats or ()),
-                words(PhotoFile, rule.photo_file_formats or ()),
-                wire.DynamicRange.HDR8 in (rule.photo_dynamic_ranges or ()),
-            )
-            for rule in rules
-            if rule.photo_modes
-        ),
-        "recordings": tuple(
-            RecordingOption(
-                words(RecordingMode, rule.video_recording_modes),
-                words(Resolution, rule.video_recording_resolutions or ()),
-                quantities(rule.video_recording_framerates or ()),
-                wire.DynamicRange.HDR8 in (rule.video_recording_dynamic_ranges or ()),
-            )
-            for rule in rules
-            if rule.video_recording_modes
-        ),
-        **_given(
-            zoom_speed_bounds=bounds("zoom_max_speed_range"),
-            time_lapse_bounds=bounds("photo_time_lapse_interval_range"),
-            gps_lapse_bounds=bounds("photo_gps_lapse_interval_range"),
-        ),
-    }
+    evs, sizes, bitrates = union("ev_compensations"), union("photo_resolutions"), union("video_recording_bitrates")
+    photos = tuple(
+        PhotoOption(
+            words(PhotoMode, rule.photo_modes),
+            words(PhotoFormat, rule.photo_formats or ()),
+            words(PhotoFile, rule.photo_file_formats or ()),
+            wire.DynamicRange.HDR8 in (rule.photo_dynamic_ranges or ()),
+        )
+        for rule in rules
+        if rule.photo_modes
+    )
+    recordings = tuple(
+        RecordingOption(
+            words(RecordingMode, rule.video_recording_modes),
+            words(Resolution, rule.video_recording_resolutions or ()),
+            quantities(rule.video_recording_framerates or ()),
+            wire.DynamicRange.HDR8 in (rule.video_recording_dynamic_ranges or ()),
+        )
+        for rule in rules
+        if rule.video_recording_modes
+    )
+    changes = _given(
+        modes=words_of(CameraMode, "camera_modes"),
+        exposures=words_of(ExposureMode, "exposure_modes"),
+        evs=None if evs is None else tuple(ev for step in sorted(set(evs)) if (ev := ev_of(step)) is not None),
+        white_balances=words_of(WhiteBalance, "white_balance_modes"),
+        styles=words_of(Style, "image_styles"),
+        temperatures=quantities_of("white_balance_temperatures"),
+        bursts=words_of(Burst, "photo_burst_values"),
+        brackets=words_of(Bracketing, "photo_bracketing_presets"),
+        megapixels=None
+        if sizes is None
+        else tuple(sorted({size for one in sizes if (size := _number_of_pixels(one))})),
+        signable=has("photo_signatures", wire.DigitalSignature.DRONE),
+        live_video_keepable=has("photo_streaming_modes", wire.PhotoStreamingMode.CONTINUOUS),
+        codecs=words_of(VideoCodec, "video_recording_codecs"),
+        storage_policies=words_of(StoragePolicy, "storage_policies"),
+        bitrates=None if bitrates is None else tuple(sorted(set(bitrates))),
+        shutters=quantities_of("exposure_manual_shutter_speeds"),
+        isos=quantities_of("exposure_manual_iso_sensitivities"),
+        max_isos=quantities_of("exposure_maximum_iso_sensitivities"),
+        meterings=words_of(Metering, "exposure_meterings"),
+        photos=photos or None,
+        recordings=recordings or None,
+        zoom_speed_bounds=bounds("zoom_max_speed_range"),
+        time_lapse_bounds=bounds("photo_time_lapse_interval_range"),
+        gps_lapse_bounds=bounds("photo_gps_lapse_interval_range"),
+    )
     if style is not None:
         levels = {}
         for name in ("saturation", "contrast", "sharpness"):
