@@ -175,6 +175,38 @@ async def test_conf_086_shutter_of_a_photo_that_is_reported_twice_is_one_picture
         assert (await shoot(w.client)).image_index == first.image_index + 1
 
 
+async def test_conf_087_shutter_of_a_series_that_is_reported_twice_is_one_picture() -> None:
+    """An ANAFI Ai counts no pictures. The series was ended one picture early."""
+    async with world(model="ai", speed=1.0, web=True) as w:
+        await enter(w.client, PHOTO)
+        taking = camera2.Photo(camera_id=0, type=camera2.PhotoEvent.TAKING_PHOTO)
+        assert await command(w.client, START_PHOTO, 0, 3, 3) == ACCEPTED
+        for index in range(2):
+            await w.drone.wait_log(lambda e, taken=index + 1: w.drone.firmware.payload.cameras.shots == taken, 10.0)
+            await watched(0.5)
+            w.drone.inject(taking)
+        await w.drone.wait_log(lambda e: bool(photos(w)) and not w.drone.firmware.payload.cameras.busy, 20.0)
+        (series,) = photos(w)
+        assert len(series.resources) == 3
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", lambda image: image.image_index == 2, since=0)
+        assert (await request(w.client, "CAMERA_CAPTURE_STATUS")).image_count == 3
+
+
+@pytest.mark.parametrize(("mode", "pictures"), [(1.0, 7), (2.0, 14)], ids=["bracketing", "burst"])
+async def test_conf_087_shutter_of_a_burst_that_is_reported_twice_is_one_picture(mode: float, pictures: int) -> None:
+    async with world(model="ai", speed=1.0, web=True) as w:
+        await enter(w.client, PHOTO)
+        assert (await write(w.client, "CAM_PHOTOMODE", mode, CHOICE)).param_result == dialect.PARAM_ACK_ACCEPTED
+        assert await command(w.client, START_PHOTO, 0, 0, 1) == ACCEPTED
+        taking = camera2.Photo(camera_id=0, type=camera2.PhotoEvent.TAKING_PHOTO)
+        for _ in range(pictures):
+            w.drone.inject(taking)
+        last = pictures - 1
+        await w.client.wait("CAMERA_IMAGE_CAPTURED", lambda image: image.image_index == last, since=0)
+        await watched(1.0)
+        assert (await request(w.client, "CAMERA_CAPTURE_STATUS")).image_count == pictures
+
+
 async def test_conf_086_shutter_that_is_reported_again_after_the_end_is_not_that_of_the_next_photo() -> None:
     """An ANAFI Ai counts no pictures. The next photo had the time and the place of the repeated report."""
     async with world(model="ai", speed=1.0, web=True) as w:

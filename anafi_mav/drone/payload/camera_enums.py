@@ -76,6 +76,11 @@ class Burst(enum.Enum):
     B4_OVER_2S = "4_OVER_2S"
     B4_OVER_1S = "4_OVER_1S"
 
+    @property
+    def pictures(self) -> int:
+        """Number of pictures."""
+        return int(self.value.partition("_")[0])
+
 
 class Bracketing(enum.Enum):
     """Steps of exposure to both sides."""
@@ -87,6 +92,11 @@ class Bracketing(enum.Enum):
     EV1_EV3 = "1EV_3EV"
     EV2_EV3 = "2EV_3EV"
     EV1_EV2_EV3 = "1EV_2EV_3EV"
+
+    @property
+    def pictures(self) -> int:
+        """Number of pictures: one for each step to either side, and one between them."""
+        return 2 * self.value.count("EV") + 1
 
 
 class RecordingMode(enum.Enum):

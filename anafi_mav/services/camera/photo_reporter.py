@@ -130,7 +130,7 @@ class PhotoReporter:
         Return False for the failure, or the media, of a photo before the one under way or the last one.
         """
         is_earlier = update.progress is CaptureProgress.FAILED and self._shots.awaits_capture_before
-        shots = self._shots.receive(update, now, 1 if self._is_single(update.camera) else None)
+        shots = self._shots.receive(update, now, self._most(update.camera), self._interval(update.camera))
         if update.progress is CaptureProgress.FAILED and shots:
             self.host.text(Severity.WARNING, texts.PHOTO_NOT_STORED.fill(reason=update.reason))
         stored_as = self._shots.media_of(shots[-1].capture) if shots and update.media else update.media
@@ -141,15 +141,28 @@ class PhotoReporter:
             self._name_rest()
         return not is_earlier and (not update.media or self._shots.capture_of(update.media) == self._shots.capture)
 
-    def _is_single(self, camera: int) -> bool:
-        """Return True when a photo of this camera is one picture.
+    def _most(self, camera: int) -> int | None:
+        """Return the pictures of a photo of this camera; None: not known.
 
-        The drone may report its shutter twice. A panorama, of a plan or by itself, has many pictures in that mode.
+        The drone may report its shutter twice. A panorama, of a plan or by itself, has many pictures in mode SINGLE.
         """
         drone = self.host.drone
         photo, playing = drone.camera[camera].photo, drone.flight_plan.state.playing
-        is_panorama = drone.animations.state.is_running or playing is PlayingState.PLAYING
-        return photo is not None and photo.mode is PhotoMode.SINGLE and not is_panorama
+        if photo is None or drone.animations.state.is_running or playing is PlayingState.PLAYING:
+            return None
+        match photo.mode:
+            case PhotoMode.SINGLE:
+                return 1
+            case PhotoMode.BURST:
+                return None if photo.burst is None else photo.burst.pictures
+            case PhotoMode.BRACKETING:
+                return None if photo.bracketing is None else photo.bracketing.pictures
+        return None
+
+    def _interval(self, camera: int) -> float | None:
+        """Return the time between two pictures of this camera, s; None: not known."""
+        photo = self.host.drone.camera[camera].photo
+        return photo.interval if photo is not None and photo.mode is PhotoMode.TIME_LAPSE else None
 
     def reset(self) -> None:
         """Begin the index again: the storage was formatted."""

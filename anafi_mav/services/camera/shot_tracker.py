@@ -7,6 +7,7 @@ between the reports. Reports may come twice, late or not at all.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import TypeVar
 
@@ -37,6 +38,9 @@ UNANNOUNCED = 1.0
 """s after a shutter without a count in which the begin of its photo is reported. A later begin is that of the next one:
 the shutter was that of the photo before, reported again."""
 
+LATE = 1.2
+"""s by which a report may be late."""
+
 REPEATED = 4
 """Media ids that are remembered, because the drone may report them again."""
 
@@ -64,6 +68,8 @@ class _Capture:
         self.is_open = is_open
         self.is_announced = True
         """False when a shutter without a count has begun it, which may be that of the photo before."""
+        self.begun = now
+        """When it began, s; -inf: before the connection."""
         self.since = now
         """When the last report of a shot was received, or the capture began."""
         self.shots: list[float] = []
@@ -93,6 +99,17 @@ class _Capture:
     def counts(self, update: CaptureUpdate) -> bool:
         """Return True for a report that counts as many pictures as this capture has."""
         return update.count is not None and update.count == self.taken % COUNT
+
+    def has_reported(self, now: float, most: int | None, interval: float | None) -> bool:
+        """Return True for a shutter without a count that is one of before, reported again.
+
+        `most` pictures are taken, or one each `interval` s.
+        """
+        if most is not None and self.taken >= most:
+            return True
+        if interval is None or not self.taken or self.reported is None:
+            return False
+        return now - self.since < interval - LATE or self.taken > (now - self.begun + LATE) / interval
 
     def continues(self, update: CaptureUpdate) -> bool:
         """Return True for the shutter of a picture of this capture, whose end was reported before."""
@@ -165,7 +182,7 @@ class ShotTracker:
         without one.
         """
         self._now = _Capture(self.capture + 1, now, camera, is_open=True)
-        self._now.taken, self._now.reported = taken, None
+        self._now.taken, self._now.reported, self._now.begun = taken, None, -math.inf
 
     @property
     def is_open(self) -> bool:
@@ -214,10 +231,13 @@ class ShotTracker:
         """Return True when the pictures of this media are all taken."""
         return not self._now.is_open or self.capture_of(media) != self.capture
 
-    def receive(self, update: CaptureUpdate, now: float, most: int | None = None) -> list[CapturedShot]:
+    def receive(
+        self, update: CaptureUpdate, now: float, most: int | None = None, interval: float | None = None
+    ) -> list[CapturedShot]:
         """Take an event about a photo; return the pictures that it completes.
 
-        `most`: pictures that the capture under way can have, for events without a count; None: not known.
+        For events without a count: `most` pictures of the capture under way, and the `interval` (s) of a time-lapse;
+        None: not known.
         """
         match update.progress:
             case CaptureProgress.STARTED:
@@ -226,7 +246,7 @@ class ShotTracker:
                 if not self._now.is_open and self._now.has_taken(update.count):
                     return []  # the same report again; of another photo its media is reported too
                 lost = [] if self._now.continues(update) else self._open(update, now)
-                is_repeated = update.count is None and most is not None and self._now.taken >= most
+                is_repeated = update.count is None and self._now.has_reported(now, most, interval)
                 more = 1 if update.count is None else self._now.more(update.count)
                 self._now.take(0 if is_repeated else more, now)
                 return lost

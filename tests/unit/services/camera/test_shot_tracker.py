@@ -43,6 +43,30 @@ def test_shutter_of_a_single_photo_that_is_reported_twice_is_one_picture() -> No
     assert tracker.receive(saved("a", is_last=True), 1.6, 1) == [CapturedShot(1, 1, 1.2, True)]
 
 
+def test_shutter_of_a_time_lapse_that_is_reported_twice_is_one_picture() -> None:
+    """Pictures every 3 s; a report may be 1.2 s late, so that two of them are at least 1.8 s apart."""
+    tracker = ShotTracker()
+    for at, progress in (
+        (0.0, STARTED),
+        (0.1, TAKEN),
+        (1.1, TAKEN),
+        (3.1, TAKEN),
+        (4.8, TAKEN),
+        (7.2, TAKEN),
+        (9.1, TAKEN),
+    ):
+        tracker.receive(CaptureUpdate(0, progress), at, interval=3.0)
+    assert (tracker.pending, tracker.taken) == (pytest.approx((0.1, 3.1, 7.2, 9.1)), 4)
+
+
+def test_time_lapse_has_no_more_pictures_than_its_time_allows() -> None:
+    """Pictures every second are too close to be told from repeated reports, but no more than 3 are taken in 1.1 s."""
+    tracker = ShotTracker()
+    for at, progress in ((0.0, STARTED), *((0.1 + 0.1 * n, TAKEN) for n in range(11))):
+        tracker.receive(CaptureUpdate(0, progress), at, interval=1.0)
+    assert tracker.taken == 3
+
+
 def test_shutter_without_a_count_is_of_a_photo_that_is_announced_soon_or_of_none() -> None:
     tracker = ShotTracker()
     feed(tracker, (1.0, STARTED, None), (1.2, TAKEN, None))
