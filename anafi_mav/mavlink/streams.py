@@ -149,13 +149,17 @@ class Streams(Generic[ChannelT]):
             streams[id] = _Stream(interval, self._pace(channel))
             self._forget(id)
 
-    def is_off(self, channel: ChannelT, id: int) -> bool:
-        """Return True if a client has ended this message on its channel.
+    def without_off(self, channels: Sequence[ChannelT], id: int) -> Sequence[ChannelT]:
+        """Return those of these channels on which no client has ended this message.
 
         One that is not streamed by default is not off.
         """
-        stream = self._channels.get(channel, {}).get(id)
-        return stream is not None and stream is not _OFF and stream.interval is None
+        off = [
+            channel
+            for channel, streams in self._channels.items()
+            if (stream := streams.get(id)) is not None and stream is not _OFF and stream.interval is None
+        ]
+        return [channel for channel in channels if channel not in off] if off else channels
 
     def reset(self, channel: ChannelT, id: int) -> None:
         """Stream at the default interval again."""

@@ -224,11 +224,15 @@ class Component:
         return self._system.channels
 
     def send(self, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None = None) -> None:
-        """Send as this component to one channel, to some, or to all.
+        """Send as this component to one channel, to some, or to all but those where it is off.
 
         Nothing is sent while the link is down.
         """
-        self._system.send_as(self.compid, message, to, give_way=type(message).id in self.telemetry)
+        id = type(message).id
+        is_streamed = id in self.telemetry
+        if to is None and is_streamed:
+            to = self.messages.intervals.without_off(self._system.channels, id)
+        self._system.send_as(self.compid, message, to, give_way=is_streamed)
 
     def send_streams(self, messages: Sequence[Packed], to: Sequence[Channel]) -> None:
         """Send messages of streams as this component, together, to channels that have these streams.
@@ -240,14 +244,16 @@ class Component:
     def send_by_flavour(
         self, build: Callable[[Flavour], dialect.MAVLink_message | None], to: Sequence[Channel] | None = None
     ) -> None:
-        """Send to each of these channels (None: all) the message that `build` makes for its flavour.
+        """Send to each of these channels the message that `build` makes for its flavour.
 
-        If `build` returns None, nothing is sent.
+        None: all that have not switched the message off. If `build` returns None, nothing is sent.
         """
         for flavour, channels in by_flavour(self._system.channels if to is None else to):
             message = build(flavour)
             if message is not None:
-                self.send(message, channels)
+                id = type(message).id
+                its = channels if to is not None else self.messages.intervals.without_off(channels, id)
+                self._system.send_as(self.compid, message, its, give_way=id in self.telemetry)
 
     @property
     def replaced_by_order(self) -> bool:

@@ -84,7 +84,7 @@ class Host(Protocol):
         """The open channels without the muted ones."""
 
     def send(self, message: dialect.MAVLink_message, to: Channel | Sequence[Channel] | None = None) -> None:
-        """Send as this component to one channel, to some, or to all.
+        """Send as this component to one channel, to some, or to all but those where it is off.
 
         Nothing is sent while the link is down.
         """
@@ -104,9 +104,9 @@ class Host(Protocol):
     def send_by_flavour(
         self, build: Callable[[Flavour], dialect.MAVLink_message | None], to: Sequence[Channel] | None = None
     ) -> None:
-        """Send to each of these channels (None: all) the message that `build` makes for its flavour.
+        """Send to each of these channels the message that `build` makes for its flavour.
 
-        If `build` returns None, nothing is sent.
+        None: all that have not switched the message off. If `build` returns None, nothing is sent.
         """
 
     def text(self, severity: Severity, text: OperatorText, to: Channel | None = None) -> None:

@@ -6,9 +6,10 @@ import math
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support import missions, plans
 from support.flavours import both
 from support.mav import NAN, Client
-from support.world import world
+from support.world import HOME, world
 
 from anafi_mav.drone.events import AttitudeChanged, SpeedChanged
 from anafi_mav.mavlink import dialect as newer
@@ -160,6 +161,28 @@ async def test_conf_108_state_that_is_off_stays_off_at_a_change(flavour: str) ->
         assert all(second.since(marks[1], name) for name in names)
         assert (await first.command(SET, IDS["SYS_STATUS"], 0)).result == ACCEPTED
         await first.wait("SYS_STATUS")
+
+
+@both
+async def test_conf_108_message_that_is_off_is_not_announced(flavour: str) -> None:
+    """What leaves at each change of its content is a stream, too."""
+    names = ["CURRENT_MODE", "MISSION_CURRENT", "FENCE_STATUS"]
+    async with world(clients=2, flavour=flavour) as w:
+        await w.take_off()
+        first, second = w.clients
+        for name in names:
+            assert (await first.command(SET, IDS[name], -1)).result == ACCEPTED
+        marks = first.mark(), second.mark()
+        around_the_drone = plans.circle(HOME[:2], 30.0, inclusion=False)
+        assert (await plans.upload(second, [around_the_drone], plans.FENCE)).type == plans.ACCEPTED
+        await second.wait("FENCE_STATUS", lambda m: m.breach_status, since=marks[1])
+        await missions.put(w, [missions.takeoff(6.0), missions.way(12.0, 0.0, 6.0)])
+        assert (await second.command(dialect.MAV_CMD_NAV_LAND)).result == ACCEPTED
+        for client, mark in zip(w.clients, marks, strict=True):
+            await client.heartbeat(lambda beat: beat.custom_mode == w.modes.land, since=mark)
+            assert (await client.command(dialect.MAV_CMD_REQUEST_MESSAGE, IDS["SYS_STATUS"])).result == ACCEPTED
+        assert {name: first.since(marks[0], name) for name in names} == {name: [] for name in names}
+        assert all(second.since(marks[1], name) for name in names)
 
 
 async def test_message_of_a_new_row_leaves_at_default_interval(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -76,7 +76,8 @@ class MessageService(Service):
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._intervals: Streams[Channel] = Streams({})
+        self.intervals: Streams[Channel] = Streams({})
+        """Of the messages on each channel."""
         self._table: Mapping[int, MessageStream] = {}
         self._requests: Mapping[int, Request] = {}
         self._tracker = UpdateTracker({})
@@ -120,7 +121,7 @@ class MessageService(Service):
         """
         self._table, self._requests = streams, requests
         defaults = {id: stream.every for id, stream in streams.items() if stream.every is not None}
-        self._intervals = Streams(defaults, has=self._is_streamed, pace=lambda channel: channel.pace)
+        self.intervals = Streams(defaults, has=self._is_streamed, pace=lambda channel: channel.pace)
         updates, affected = _affected(tuple((id, stream.updates) for id, stream in streams.items()))
         self._events = [kind for kind in updates if kind not in VALUES]
         self._values = [kind for kind in updates if kind in VALUES]
@@ -165,7 +166,7 @@ class MessageService(Service):
 
     def channel_closed(self, channel: Channel) -> None:
         self._sources.close(channel)
-        self._intervals.channel_closed(channel)
+        self.intervals.channel_closed(channel)
 
     def subscriptions(self) -> Subscriptions:
         return dict.fromkeys(self._events, self._on_update)
@@ -178,7 +179,7 @@ class MessageService(Service):
         tracker, kinds = self._tracker, values.layout.kinds
         if not (tracker.has_updates or self._sources.is_used):
             ids = tracker.ids(kinds)
-            if now < self._intervals.next_on(self.host.channels, ids):
+            if now < self.intervals.next_on(self.host.channels, ids):
                 tracker.count(kinds, now)
                 return
         if tracker.mark_all(kinds, now):
@@ -202,7 +203,7 @@ class MessageService(Service):
     def needs_video(self) -> bool:
         """True while a client has a stream whose fields are in the video only."""
         channels = self.host.channels
-        return any(self._intervals.is_streamed(channels, id) for id in self._of_video)
+        return any(self.intervals.is_streamed(channels, id) for id in self._of_video)
 
     def show_picture(self, pose: VehiclePose, shot: float, now: float) -> None:
         """Send the pose that a picture reports to the channels that want it.
@@ -217,7 +218,7 @@ class MessageService(Service):
         channels = self._sources.on_pictures(self.host.channels, shot, newest_event, now)
         if channels:
             times = self.host.times(shot, pose)
-            for id, due in self._intervals.due_on(channels, self._poses, shot):
+            for id, due in self.intervals.due_on(channels, self._poses, shot):
                 self._show(id, due, times, shot)
             self._flush()
 
@@ -239,20 +240,16 @@ class MessageService(Service):
             return self._repeat_at
         self._repeat_at = now + REPEATED
         channels = self.host.channels
-        for id, due in self._intervals.due_on(channels, self._repeated, now, is_repeated=True):
+        for id, due in self.intervals.due_on(channels, self._repeated, now, is_repeated=True):
             self._leave(id, due, self._times(id))
         self._flush()
-        return max(self._repeat_at, self._intervals.next_on(channels, self._repeated))
+        return max(self._repeat_at, self.intervals.next_on(channels, self._repeated))
 
     def state_changed(self) -> None:
         """They leave at once, except to clients that have switched them off."""
         for id in self._on_change:
-            to = [
-                channel
-                for channel in self.host.channels
-                if channel.can_stream(id) and not self._intervals.is_off(channel, id)
-            ]
-            self._leave(id, to, self._times(id))
+            to = [channel for channel in self.host.channels if channel.can_stream(id)]
+            self._leave(id, self.intervals.without_off(to, id), self._times(id))
         self._flush()
 
     # Streams.
@@ -261,12 +258,12 @@ class MessageService(Service):
         ids, at = self._tracker.take()
         everyone = self.host.channels
         if not self._sources.is_used:
-            due = self._intervals.due_on(everyone, ids, at)
+            due = self.intervals.due_on(everyone, ids, at)
         else:
             channels = self._sources.on_events(everyone, at)
             others = tuple(id for id in ids if not self._is_pictured(id))
             poses = tuple(id for id in ids if self._is_pictured(id))
-            due = [*self._intervals.due_on(everyone, others, at), *self._intervals.due_on(channels, poses, at)]
+            due = [*self.intervals.due_on(everyone, others, at), *self.intervals.due_on(channels, poses, at)]
         pose: VehiclePose | None = None
         for id, to in due:
             if self._table[id].from_pictures:  # one moment for all of them
@@ -373,7 +370,7 @@ class MessageService(Service):
         stream = self._table[id]
         if interval is not None and stream.is_repeated:
             interval = max(interval, stream.fastest)
-        self._intervals.set(channel, id, interval)
+        self.intervals.set(channel, id, interval)
         if stream.from_pictures:
             self._sources.request(channel, id, wanted=wants_pictures and self.host.has_picture_pose)
 
@@ -419,7 +416,7 @@ class MessageService(Service):
         if not inbound.channel.can_stream(int(id)):  # what is accepted would have no effect
             return dialect.MAV_RESULT_DENIED
         if math.isnan(interval) or interval == 0:
-            self._intervals.reset(inbound.channel, int(id))
+            self.intervals.reset(inbound.channel, int(id))
             self._sources.request(inbound.channel, int(id), wanted=False)
         elif interval == -1:
             self._ask(inbound.channel, int(id), None)
@@ -448,7 +445,7 @@ class MessageService(Service):
             return dialect.MAV_RESULT_DENIED
         microseconds = 0
         if int(id) in self._table and self._exists(inbound.channel, self._table[int(id)]):
-            asked = self._intervals.interval(inbound.channel, int(id))
+            asked = self.intervals.interval(inbound.channel, int(id))
             source = self._source(inbound.channel, int(id))
             if asked is not None and inbound.channel.pace is not None:
                 asked *= inbound.channel.pace.slowdown
