@@ -24,7 +24,7 @@ from anafi_mav.cli.addresses import spot
 from anafi_mav.cli.terminal import say, say_json
 from anafi_mav.drone import Drone
 from anafi_mav.drone.controller.controller import MODELS as CONTROLLERS
-from anafi_mav.drone.drone import CONTROLLER_PORTS
+from anafi_mav.drone.drone import CONTROLLER_PORTS, HANDSHAKE_AFTER
 from anafi_mav.drone.rest import HTTP_PORT
 from anafi_mav.drone.status.product import MODELS
 from anafi_mav.errors import AnafiMavError, ConfigError, LinkLost
@@ -34,8 +34,9 @@ from anafi_mav.vehicle.failsafe_settings import FailsafeLimits, warnings_of
 ANSWER_LIMIT = 2.0
 """s for a port to answer, and again for the introduction: an aircraft in range takes some milliseconds."""
 
-LISTEN = 5.0
-"""s to stay connected: another controller tries again within two, and what it takes is noticed by a silence of 2.5."""
+LISTEN = HANDSHAKE_AFTER + 4.0
+"""s to stay connected. Another controller tries again within two, another gateway after `HANDSHAKE_AFTER` of silence;
+what it takes is noticed by a silence of 2.5."""
 
 LOWEST_CEILING, SMALLEST_FENCE = 10.0, 30.0
 """m: an aircraft with less than that refuses nearly every flight."""
@@ -279,7 +280,7 @@ async def with_handshake(place: DroneAddress) -> list[Finding]:
         await asyncio.wait([drone.lost], timeout=LISTEN)
         if drone.lost.done():
             return [_no_connection(f"connected and lost at once: {drone.lost.result()}")]
-        controller = ok("controller", "connected, no other controller took it back")
+        controller = ok("controller", f"connected, no other controller took it back within {LISTEN:.0f} s")
         return [controller, firmware(drone), *settings(drone), *failsafes(drone)]
     finally:
         await drone.close()

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from support.product import Process
-from support.world import loopback
+from support.world import WEB_PORT, loopback, world
 
 from anafi_mav.arsdk.link import interface
 from anafi_mav.arsdk.link.handshake import ConnectReply, DeviceInfo, format_discovery, format_reply
@@ -202,6 +202,13 @@ async def test_doctor_displaced_by_another_controller_names_it() -> None:
         await taking
         await rival.close()
     assert "lost at once" in faults(findings)["controller"]
+    assert "another controller has the drone" in faults(findings)["controller"]
+
+
+async def test_doctor_names_another_gateway_that_takes_the_drone_back() -> None:
+    """That gateway waits for the end of a silence before its next handshake."""
+    async with world(web=True) as w:
+        findings = await with_handshake(DroneAddress(w.drone.address, None, WEB_PORT, RTSP))
     assert "another controller has the drone" in faults(findings)["controller"]
 
 
