@@ -730,6 +730,10 @@ class _FabricSystems:
         effect = None if supervised is None else supervised.system.stop_of(inbound)
         return None if effect is None else _STOP_KINDS.get(effect)
 
+    def uses_target(self, sysid: int, inbound: Inbound) -> bool:
+        supervised = self._gateway.supervised(sysid)
+        return supervised is not None and supervised.system.uses_target(inbound)
+
     def is_started(self) -> bool:
         return bool(self._gateway.systems)
 

@@ -25,7 +25,7 @@ from anafi_mav.fabric.claims import ClaimStep, SystemClaims
 from anafi_mav.fabric.connection import FabricConnection
 from anafi_mav.fabric.envelope import MAX_SAMPLE, Pong, UpEnvelope, sender_of
 from anafi_mav.fabric.keys import KeyKind, session_of
-from anafi_mav.fabric.sample_age import INPUTS, REFUSED, StationInput, StopKind, refusal_of
+from anafi_mav.fabric.sample_age import INPUTS, REFUSED, TARGETS, StationInput, StopKind, refusal_of
 from anafi_mav.fabric.station_places import MAX_WAITING, StationPlaces
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, Outbox, Sink, shaped_channel
@@ -71,6 +71,9 @@ class FabricSystems(Protocol):
 
     def stop_kind(self, sysid: int, inbound: Inbound) -> StopKind | None:
         """Return how a command or SET_MODE to a system stops its flight; None for one that does not."""
+
+    def uses_target(self, sysid: int, inbound: Inbound) -> bool:
+        """Return True while a system follows this target or looks at it; the message names none."""
 
     def is_started(self) -> bool:
         """Return True once drones are connected to; before, an id is looked up and not claimed."""
@@ -428,8 +431,7 @@ class FabricEndpoint(Endpoint):
     def _stop_kind(self, channel: Channel, sysid: int, received: ReceivedFrame, now: float) -> StopKind | None:
         if not isinstance(received.message, REFUSED):
             return None
-        inbound = Inbound(received.message, received.id, channel, received.sysid, received.compid, now)
-        return self._systems.stop_kind(sysid, inbound)
+        return self._systems.stop_kind(sysid, _inbound(channel, received, now))
 
     def _refuse(self, station: _Station, sysid: int, received: ReceivedFrame, now: float) -> None:
         """Count a late frame; answer a command, and send a text about commands and inputs."""
@@ -442,6 +444,8 @@ class FabricEndpoint(Endpoint):
             compid = targets(received.message)[1] or dialect.MAV_COMP_ID_AUTOPILOT1
             channel.send(answer, sysid, compid, is_answer=True)
         if received.id in INPUTS:
+            if received.id in TARGETS and not self._systems.uses_target(sysid, _inbound(channel, received, now)):
+                return
             channel.counters["late_inputs"] += 1
         elif not is_command:
             return
@@ -517,3 +521,7 @@ class FabricEndpoint(Endpoint):
         if key is not None and key.sysid in self.claims.held and key.sysid in self._states:
             session.reply(query.query, query.key, self._states[key.sysid])
         session.finish(query.query)
+
+
+def _inbound(channel: Channel, received: ReceivedFrame, now: float) -> Inbound:
+    return Inbound(received.message, received.id, channel, received.sysid, received.compid, now)

@@ -57,6 +57,9 @@ INPUTS = frozenset(
 )
 """Messages that move the drone or its gimbal until the next one arrives."""
 
+TARGETS = frozenset({dialect.MAVLINK_MSG_ID_FOLLOW_TARGET, dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT})
+"""Those that name no drone: stations send them to all, whether one follows them or not."""
+
 COMMANDS = (dialect.MAVLink_command_long_message, dialect.MAVLink_command_int_message)
 """Messages that are answered though they are too old."""
 

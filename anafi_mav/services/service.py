@@ -301,6 +301,10 @@ class Service:
         It is the one message that every service receives. Those of observers, who control nothing, reach none.
         """
 
+    def uses_target(self, inbound: Inbound) -> bool:
+        """Return True while this target has an effect here; its message names no drone."""
+        return False
+
     def state_changed(self) -> None:
         """Handle a change of mode, armed state, health, flying state or another awaited state."""
 

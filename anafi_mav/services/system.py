@@ -412,6 +412,10 @@ class System:
         component = self.owner(inbound.message) if is_command else self._autopilot
         return stop_of(inbound, component.commands.action_of)
 
+    def uses_target(self, inbound: Inbound) -> bool:
+        """Return True while the drone follows this target or looks at it; the message names none."""
+        return any(service.uses_target(inbound) for service in self.services)
+
     def owner(self, message: Any) -> Component:
         """Return the component that answers this message to component 0.
 

@@ -395,6 +395,43 @@ async def test_station_that_answers_no_ping_can_stop_the_flight_and_begin_nothin
             token.undeclare()
 
 
+async def test_late_target_is_reported_only_while_it_is_followed() -> None:
+    """QGroundControl sends its own position to every drone, once a second."""
+    async with router() as node, world(endpoints=(node.url,)) as w:
+        await w.take_off()
+        name = f"{7:016x}-1"
+        with await asyncio.to_thread(opened, node) as session:
+            samples = session.declare_subscriber(f"anafi/1/down/{name}")
+            token = session.liveliness().declare_token(f"anafi/station/v1/{name}")
+            await asyncio.to_thread(samples.recv)  # it answers no ping, so that its time is not known
+            numbers = itertools.count(1)
+
+            async def put(*sent: own.MAVLink_message) -> None:
+                before = counted(w, "late_frames")
+                for message in sent:
+                    number = next(numbers)
+                    raw = frame(pack(message), number, w.client.sysid, 190)
+                    session.put(f"anafi/1/up/{name}", raw, attachment=UpEnvelope(7, number, 0).encode())
+                while counted(w, "late_frames") < before + len(sent):
+                    await watched(0.05)
+
+            place = (round(HOME[0] * 1e7), round(HOME[1] * 1e7))
+            position = own.MAVLink_global_position_int_message(0, *place, 35_000, 0, 0, 0, 0, 0)
+            target = own.MAVLink_follow_target_message(0, 1, *place, 35.0, *[[0.0] * n for n in (3, 3, 4, 3, 3)], 0)
+            await put(position, target)
+            assert counted(w, "late_inputs") == 0
+            assert (await w.client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 8)).result == ACCEPTED  # Follow
+            await put(position)
+            assert counted(w, "late_inputs") == 0
+            await put(target)
+            assert counted(w, "late_inputs") == 1
+            w.client.send(dialect.MAVLink_global_position_int_message(0, *place, 35_000, 0, 0, 0, 0, 0))
+            assert (await w.client.command(dialect.MAV_CMD_DO_SET_ROI_SYSID, w.client.sysid)).result == ACCEPTED
+            await put(position)
+            assert counted(w, "late_inputs") == 2
+            token.undeclare()
+
+
 async def test_silent_station_with_a_token_is_lost_and_returns_with_its_next_sample(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

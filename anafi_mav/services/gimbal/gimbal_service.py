@@ -159,6 +159,10 @@ class GimbalService(Service):
 
     # The link, clients and time.
 
+    def uses_target(self, inbound: Inbound) -> bool:
+        """Return True for the position of the system at which the gimbal looks."""
+        return inbound.id == dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT and self._roi.looks_at(inbound.sysid)
+
     def link_up(self) -> None:
         self._motion.link_up()
         self._roi.link_up()

@@ -331,6 +331,10 @@ class RegionOfInterest(PlainTask):
         """True while the region is the place of another system."""
         return self._region is not None and self._system is not None
 
+    def looks_at(self, sysid: int) -> bool:
+        """Return True while the region is the place of this system."""
+        return self.follows and self._system == sysid
+
     def tick(self, now: float) -> None:
         """Look at the new place of the system that is followed."""
         region = self._region

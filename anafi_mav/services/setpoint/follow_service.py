@@ -37,16 +37,21 @@ class FollowService(Service):
     def value_subscriptions(self) -> ValueSubscriptions:
         return self._flight.value_subscriptions()
 
+    def uses_target(self, inbound: Inbound) -> bool:
+        """Return True while the drone follows the sender.
+
+        Of positions those of the station that chose the mode count: other systems on its link are no targets.
+        """
+        if inbound.id == dialect.MAVLINK_MSG_ID_FOLLOW_TARGET:
+            return self._flight.engaged
+        return self._flight.requester == inbound.client and flavour_of(inbound.channel).station_position_leads
+
     def _target(self, inbound: Inbound) -> None:
-        if self._flight.engaged:  # else others may follow its sender: the message names no drone
+        if self.uses_target(inbound):
             self._receive(inbound, sighting(inbound.message))
 
     def _station(self, inbound: Inbound) -> None:
-        """Take the position of the station that chose the mode.
-
-        Other systems on its link are no targets.
-        """
-        if self._flight.requester == inbound.client and flavour_of(inbound.channel).station_position_leads:
+        if self.uses_target(inbound):
             self._receive(inbound, station_sighting(inbound.message))
 
     def _receive(self, inbound: Inbound, seen: Sighting | OperatorText) -> None:
