@@ -58,6 +58,10 @@ PARTIAL = 206
 UNREADABLE = (ValueError, RecursionError)
 """Errors of msgspec for what is no JSON: also `UnicodeDecodeError`, for a text in it that is no UTF-8."""
 
+UNSIZED_LIMIT = 1 << 32
+"""Bytes of a file whose size the drone does not report: no file on its card is larger (FAT32). A web server that sends
+on for ever would fill the disk of the gateway."""
+
 MUX_RANGE = 1 << 19
 """Bytes of a file that are requested at a time behind a Skycontroller's mux.
 
@@ -172,11 +176,15 @@ class Rest:
         """Open a file of `size` bytes (0: unknown) at `offset`; yield its start and its pieces.
 
         The answer begins at 0 when the web server has no ranges (RFC 9110 §14.2). Raises `RemoteProtocolError` when
-        the file has another size by now. The caller counts the bytes: an answer may end too early.
+        the file has another size by now, and at `UNSIZED_LIMIT`. The caller counts the bytes: an answer may end too
+        early.
         """
         end = offset + MUX_RANGE if self._is_behind_mux and offset + MUX_RANGE < size else None
         async with self._open_range(path, offset, end, size) as (found, pieces):
-            if end is None or found.end is None:
+            if not size:
+                async with aclosing(_bounded(path, pieces)) as bounded:
+                    yield found.start, bounded
+            elif end is None or found.end is None:
                 yield found.start, pieces
             else:
                 async with aclosing(self._following_ranges(path, pieces, found.end, size)) as all_pieces:
@@ -281,6 +289,16 @@ class Rest:
             sock.close()
             raise
         return sock
+
+
+async def _bounded(path: str, pieces: AsyncIterator[bytes]) -> AsyncGenerator[bytes, None]:
+    """Yield pieces of a file of unknown size. Raises `RemoteProtocolError` at `UNSIZED_LIMIT`."""
+    size = 0
+    async for piece in pieces:
+        size += len(piece)
+        if size > UNSIZED_LIMIT:
+            raise RemoteProtocolError(f"GET {path}: the file has no size, and more than {UNSIZED_LIMIT} bytes")
+        yield piece
 
 
 async def _refusal(what: str, response: aiohttp.ClientResponse) -> str:

@@ -61,7 +61,7 @@ class MediaState(msgspec.Struct, frozen=True):
     video_files: int | None = None
 
 
-class MediaItem(msgspec.Struct, frozen=True):
+class MediaItem(msgspec.Struct, frozen=True, gc=False):
     """One media: a photo, a series or a video, with its files."""
 
     media_id: str

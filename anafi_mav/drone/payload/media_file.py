@@ -35,7 +35,7 @@ UNKNOWN = 500.0
 """Coordinate that the drone does not know."""
 
 
-class Place(msgspec.Struct, frozen=True):
+class Place(msgspec.Struct, frozen=True, gc=False):
     """A place: deg, deg, m above mean sea level."""
 
     latitude: float = UNKNOWN
@@ -53,7 +53,7 @@ class Place(msgspec.Struct, frozen=True):
         return None if self.altitude == UNKNOWN else self.altitude
 
 
-class Resource(msgspec.Struct, frozen=True):
+class Resource(msgspec.Struct, frozen=True, gc=False):
     """One file of a media."""
 
     resource_id: str

@@ -36,6 +36,8 @@ class PartFile:
         self._digest = hashlib.md5(usedforsecurity=False)
         self._fd: int | None = None
         self._size = 0
+        self._limit = 0
+        """Bytes from which the next download may continue; 0: it begins again."""
 
     async def open(self, size: int, *, continues: bool) -> int:
         """Open it to write behind its end, and lock it; return its bytes.
@@ -57,7 +59,10 @@ class PartFile:
         await self._run(self._finish, path, size, md5)
 
     async def close(self, rest: bytes) -> None:
-        """Append the rest as far as possible and close it. One without a byte is deleted."""
+        """Append the rest as far as possible and close it.
+
+        One without a byte is deleted, and one that no download can continue.
+        """
         await self._run(self._close, rest)
         self._thread.shutdown()
 
@@ -89,7 +94,7 @@ class PartFile:
         except BaseException:
             os.close(fd)
             raise
-        self._fd = fd
+        self._fd, self._limit = fd, size
         return self._size
 
     def _read_present(self) -> None:
@@ -131,6 +136,6 @@ class PartFile:
             log.debug("%s: %s", self._path, error)
         fd, self._fd = self._fd, None
         os.close(fd)
-        if not self._size:
+        if not self._size or not self._limit:
             with suppress(OSError):  # its folder is deleted
                 self._path.unlink()

@@ -19,8 +19,9 @@ from anafi_mav.arsdk.messages.mediastore import MediastoreState
 from anafi_mav.drone import Drone
 from anafi_mav.drone.payload.camera_enums import CameraMode, PhotoFile, PhotoMode
 from anafi_mav.drone.payload.camera_state import PhotoSettings
-from anafi_mav.drone.payload.item_list import MAX_ITEMS
+from anafi_mav.drone.payload.item_list import MAX_ITEMS, MAX_OBJECTS, MAX_VALUES
 from anafi_mav.drone.payload.media import MediaItem, Notification, Resource
+from anafi_mav.drone.payload.media_file import fetch
 from anafi_mav.drone.payload.media_index import SORTED_IN_LOOP, MediaIndex
 from anafi_mav.drone.rest import JSON_LIMIT, MUX_RANGE, Rest
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, NotSupported, RemoteProtocolError
@@ -294,6 +295,27 @@ async def test_list_of_too_many_items_is_refused() -> None:
     async with serving(medias=web.Response(body=b"[" + b"0," * MAX_ITEMS + b"0]")) as (drone, _):
         with pytest.raises(RemoteProtocolError, match=f"length <= {MAX_ITEMS}"):
             await drone.media.list()
+
+
+@pytest.mark.parametrize("values", [b"{}," * MAX_OBJECTS, b"0," * MAX_VALUES], ids=["objects", "values"])
+async def test_list_with_too_many_values_in_an_item_is_refused_undecoded(values: bytes) -> None:
+    """The interpreter decodes an item in one step, in which the event loop waits for a thread, too."""
+    body = b'[{"media_id": "a", "more": [' + values + b"0]}]"
+    async with serving(medias=web.Response(body=body)) as (drone, _):
+        with pytest.raises(RemoteProtocolError, match="too long"):
+            await drone.media.list()
+
+
+async def test_file_of_unknown_size_has_a_bound(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A web server that sends on for ever would fill the disk."""
+    monkeypatch.setattr("anafi_mav.drone.rest.UNSIZED_LIMIT", 1000)
+    answers = {"video": web.Response(body=b"0" * 1001), "photo": web.Response(body=b"0" * 1000)}
+    async with serving(**answers) as (drone, _):
+        with pytest.raises(RemoteProtocolError, match="no size, and more than 1000 bytes"):
+            await fetch(Resource("video", url="/video"), tmp_path, drone.media.reader.read_from, None)
+        assert names(tmp_path) == []
+        await fetch(Resource("photo", url="/photo"), tmp_path, drone.media.reader.read_from, None)
+        assert names(tmp_path) == ["photo"]
 
 
 async def test_answer_that_would_stop_the_event_loop_is_refused() -> None:
