@@ -131,5 +131,5 @@ class FrameNumbers:
 
 
 def sender_of(raw: bytes) -> int:
-    """Return the system id of a version 2 frame's sender."""
-    return raw[5]
+    """Return the system id of a frame's sender."""
+    return raw[5 if raw[0] == MAGIC_2 else 3]

@@ -10,7 +10,7 @@ from anafi_mav.clock import Clock
 from anafi_mav.errors import ConfigError
 from anafi_mav.fabric.arrivals import Arrival, FabricSample, LinkChange, TokenChange
 from anafi_mav.fabric.connection import FabricConnection
-from anafi_mav.fabric.envelope import MAX_SAMPLE, FrameNumbers, Ping, Pong, UpEnvelope, micros, split_frames
+from anafi_mav.fabric.envelope import MAX_SAMPLE, FrameNumbers, Ping, Pong, UpEnvelope, micros, sender_of, split_frames
 from anafi_mav.fabric.keys import KeyKind, station_id
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, reason
@@ -67,7 +67,8 @@ class FabricGround:
         self.counters: Counter[str] = Counter()
         """unknown_keys, refused_keys (of SETUP_SIGNING without a signature), no_system (frames for systems that are not
         on the fabric, as far as it has reported), stale (frames that waited while the host stalled, and are published
-        with that age), lost_frames (from gateways to stations), and those of the queues."""
+        with that age), lost_frames (from gateways to stations), misdirected_frames (of another system than their
+        key's), and those of the queues."""
         self._clock = clock
         self._on_systems = on_systems
         self._url = fabric
@@ -265,6 +266,9 @@ class FabricGround:
         elif key.kind is KeyKind.DOWN:
             self._shown.add(key.sysid)
             for raw in split_frames(sample.payload):
+                if sender_of(raw) != key.sysid:  # a router's rules name the keys of a gateway
+                    self.counters["misdirected_frames"] += 1
+                    continue
                 self._count_lost(station.received.missing(raw))
                 station.channel.forward(raw, is_answer=True)
 

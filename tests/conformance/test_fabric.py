@@ -473,6 +473,25 @@ async def test_frames_that_do_not_reach_a_station_are_counted() -> None:
         await fabric.close()
 
 
+async def test_frame_of_another_system_than_the_keys_reaches_no_station() -> None:
+    """A router's rules name the keys that a gateway may publish: otherwise it could speak for every drone."""
+    beat = pack(own.MAVLink_heartbeat_message(2, 12, 81, 0, 4, 3))
+    async with router() as node:
+        fabric = FabricGround(parse_endpoint(node.url), [parse_endpoint("udpin://127.0.0.1:0")], SystemClock())
+        await fabric.start()
+        station = FabricStation()
+        with await asyncio.to_thread(opened, node) as session:
+            tokens = session.liveliness().declare_subscriber("anafi/station/v1/*", history=True)
+            joining = asyncio.ensure_future(station.join(fabric.endpoints[0].local_port or 0))
+            name = str((await asyncio.to_thread(tokens.recv)).key_expr).rpartition("/")[2]
+            session.put(f"anafi/1/down/{name}", frame(beat, 1, 7, 1) + frame(beat, 2, 1, 1))
+            await joining
+            assert {message.get_srcSystem() for _, message in station.received} == {1}
+            assert fabric.all_counters()["misdirected_frames"] == 1
+        await station.close()
+        await fabric.close()
+
+
 async def test_command_to_a_system_whose_token_is_late_is_published() -> None:
     """zenoh reports tokens and samples in a thread each: a station may see a system before its token is known."""
     beat = pack(own.MAVLink_heartbeat_message(2, 12, 81, 0, 4, 3))
