@@ -7,8 +7,10 @@ import contextlib
 import importlib
 import logging
 import secrets
+import ssl
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -45,6 +47,29 @@ def check_readable(path: str) -> None:
         open_file(Path(path)).close()
     except (OSError, ValueError) as error:
         raise OSError(f"{path}: {getattr(error, 'strerror', None) or error}") from error
+
+
+def check_certificates(ca: str | None, certificate: str | None, private_key: str | None) -> None:
+    """Raise `OSError` for files that are no certificate or key.
+
+    zenoh's only report of them is that the router does not answer.
+    """
+    for path in (ca, certificate):
+        if path is not None and not _accepts(lambda context, file=path: context.load_verify_locations(file)):
+            raise OSError(f"{path}: expected a certificate (PEM)")
+    if certificate is not None and private_key is not None:
+        # An empty password, or OpenSSL asks for that of an encrypted key at the terminal. zenoh reads none.
+        pair = partial(ssl.SSLContext.load_cert_chain, certfile=certificate, keyfile=private_key, password="")
+        if not _accepts(pair):
+            raise OSError(f"{private_key}: expected the private key of {certificate} (PEM, without a password)")
+
+
+def _accepts(load: Callable[[ssl.SSLContext], None]) -> bool:
+    try:
+        load(ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT))
+    except (ssl.SSLError, ValueError):
+        return False
+    return True
 
 
 class FabricConnection:
@@ -90,6 +115,7 @@ class FabricConnection:
         for file in (options.ca, options.certificate, options.private_key):
             if file is not None:
                 check_readable(file)
+        check_certificates(options.ca, options.certificate, options.private_key)
         if options.link == "udp":
             logger.warning("%s: udp repeats nothing that is lost: drones and stations may be seen late", self._url.text)
         self._zenoh = module.ZenohSession(

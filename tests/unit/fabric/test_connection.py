@@ -9,6 +9,8 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from cryptography.hazmat.primitives import serialization
+from support.certificates import Authority
 
 from anafi_mav.fabric.arrivals import Arrival, FabricSample, TokensListed
 from anafi_mav.fabric.connection import MAX_TAKEN, FabricConnection
@@ -44,6 +46,29 @@ async def test_unreadable_file_of_a_link_is_named(tmp_path: Path, option: str) -
     options = "&".join(f"{name}={file}" for name, file in files.items())
     connection = FabricConnection(parse_endpoint(f"zenoh://127.0.0.1:7447?link=tls&{options}"), Counter(), print)
     with pytest.raises(OSError, match=f"{files[option]}: No such file or directory"):
+        await connection.open()
+    await connection.close()
+
+
+@pytest.mark.parametrize("wrong", ["ca", "certificate", "private_key", "another's key", "key with a password"])
+async def test_file_that_is_no_certificate_or_key_is_named(tmp_path: Path, wrong: str) -> None:
+    """zenoh reports no more than that the router does not answer."""
+    authority = Authority(tmp_path)
+    certificate, key = authority.issue("north")
+    files = {"ca": authority.path, "certificate": certificate, "private_key": key}
+    if wrong in files:
+        files[wrong] = tmp_path / "wrong.pem"
+        files[wrong].write_text("-----BEGIN NOTHING-----")
+    elif wrong == "another's key":
+        files["private_key"] = authority.issue("south")[1]
+    else:
+        locked = serialization.BestAvailableEncryption(b"secret")
+        loaded = serialization.load_pem_private_key(key.read_bytes(), None)
+        key.write_bytes(loaded.private_bytes(serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, locked))
+    options = "&".join(f"{name}={file}" for name, file in files.items())
+    connection = FabricConnection(parse_endpoint(f"zenoh://127.0.0.1:7447?link=tls&{options}"), Counter(), print)
+    named = files[wrong] if wrong in ("ca", "certificate") else files["private_key"]
+    with pytest.raises(OSError, match=f"{named}: expected "):
         await connection.open()
     await connection.close()
 
