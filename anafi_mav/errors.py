@@ -33,6 +33,10 @@ class LinkLost(AnafiMavError, ConnectionError):
         self.reason = reason
 
 
+class Disconnected(LinkLost):
+    """A command needs the link to the drone, which is absent or was lost meanwhile."""
+
+
 class HandshakeRefused(LinkLost):
     """The device refuses the connection.
 

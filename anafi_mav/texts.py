@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TypeVar
 
+from anafi_mav.errors import CommandTimeout, Disconnected
+
 STATUSTEXT_BYTES = 50
 """Of one message (MAVLink common.xml STATUSTEXT)."""
 
@@ -63,7 +65,8 @@ class Template:
 
     def fill(self, **values: object) -> OperatorText:
         """Return the text with these values."""
-        return self.kind(self.pattern.format(**values), self.pattern)
+        filled = {name: from_below(value) if isinstance(value, Exception) else value for name, value in values.items()}
+        return self.kind(self.pattern.format(**filled), self.pattern)
 
 
 class ReasonTemplate(Template):
@@ -98,8 +101,13 @@ BELOW = Below("no answer in 5 s")
 
 
 def from_below(text: object) -> OperatorText:
-    """Return the text of a lower layer: an error of the drone or of the operating system."""
-    return Reason(text)
+    """Return the text of a lower layer: an error of the drone or of the operating system.
+
+    That of a drone without an answer or a link fits one STATUSTEXT: the log has Parrot's name of the command.
+    """
+    if isinstance(text, CommandTimeout):
+        return NO_ANSWER.fill(seconds=text.seconds)
+    return LINK_LOST if isinstance(text, Disconnected) else Reason(text)
 
 
 def joined(reasons: Iterable[OperatorText]) -> OperatorText:
@@ -115,6 +123,9 @@ NOT_ABORTED = Template("{what} not aborted: {reason}", what="Landing", reason="a
 NOT_CANCELLED = Template("{what} not cancelled: {reason}", what="Return", reason="it has started")
 PROBLEMS = ReasonTemplate("{problems}", problems=BELOW)
 FAILED = Template("{what} failed: {reason}", what="Setpoint", reason="r" * REASON_BYTES)
+
+NO_ANSWER = ReasonTemplate("no answer in {seconds:g} s", seconds=0.75)
+LINK_LOST = Reason("link lost")
 
 # == Subjects of refusals ==
 

@@ -20,7 +20,14 @@ from anafi_mav.arsdk.codec.wire import Message, UnknownMessage
 from anafi_mav.arsdk.link.transport import Rank
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.drone.sent_commands import AUTOMATIC, QUIET, Event, Phase, SentCommand, SentCommands, Slot
-from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, LocalProtocolError
+from anafi_mav.errors import (
+    AnafiMavError,
+    CommandRejected,
+    CommandTimeout,
+    Disconnected,
+    LinkLost,
+    LocalProtocolError,
+)
 
 logger = logging.getLogger(__name__)
 message_log = logging.getLogger("anafi_mav.message")
@@ -207,7 +214,7 @@ class Commander:
     def require_link(self) -> None:
         """Raise `LinkLost` without a link."""
         if self._wire is None:
-            raise LinkLost("not connected")
+            raise Disconnected("not connected")
 
     def attach(self, wire: Wire) -> None:
         """Commands go out here from now on."""
@@ -218,10 +225,10 @@ class Commander:
         """The link is gone: every wait ends with `LinkLost`."""
         self._wire = None
         for expectation in tuple(self._open):
-            expectation.fail(LinkLost(reason))
+            expectation.fail(Disconnected(reason))
         for delivery in self._deliveries.values():
             if not delivery.done():
-                delivery.set_exception(LinkLost(reason))
+                delivery.set_exception(Disconnected(reason))
                 delivery.exception()  # it may have no waiter; asyncio would complain
         self._deliveries.clear()
         self.sent.abandon(loop_time())
@@ -254,7 +261,7 @@ class Commander:
         it leaves in this event-loop iteration, because nothing follows that could share its frame.
         """
         if self._wire is None:
-            raise LinkLost("not connected")
+            raise Disconnected("not connected")
         self._require_current(stops=stops)
         if self.gate is not None and not self.gate(message):
             return BLOCKED

@@ -203,3 +203,26 @@ async def test_photo_at_the_autopilot_enters_photo_mode_although_a_change_is_not
         ack = await second.command(DIGICAM, x=1.0)
         assert ack.result == stock.MAV_RESULT_ACCEPTED
         assert w.drone.firmware.payload.cameras[0].mode is camera.CameraCameraMode.PHOTO
+
+@pytest.mark.parametrize("is_mute", [False, True], ids=["unanswered", "without a link"])
+async def test_text_about_a_setting_without_an_answer_is_one_statustext(is_mute: bool) -> None:
+    async with world() as w:
+        mark = w.client.mark()
+        if is_mute:
+            w.drone.faults.mute = True
+        else:
+            w.drone.faults.unreported = frozenset({ardrone3.MaxAltitudeChanged.NAME})
+        send_set(w.client, "ANF_MAX_ALT", 66.0, REAL32)
+        text = await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("ANF_MAX_ALT"), since=mark, timeout=8.0)
+        why = "link lost" if is_mute else "no answer in 5 s"
+        assert (text.text, text.id) == (f"ANF_MAX_ALT not set: {why}", 0)
+
+
+async def test_text_about_a_command_without_an_answer_names_nothing_of_parrot() -> None:
+    async with world() as w:
+        w.drone.faults.unreported = frozenset({camera.CameraMode.NAME})
+        mark = w.client.mark()
+        ack = await w.client.command(SET_CAMERA_MODE, 0, stock.CAMERA_MODE_IMAGE, target=(1, CAMERA))
+        assert ack.result == stock.MAV_RESULT_FAILED
+        texts = [message.text for _, message in w.client.since(mark, "STATUSTEXT")]
+        assert "Command failed: no answer in 5 s" in texts

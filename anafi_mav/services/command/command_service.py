@@ -320,7 +320,7 @@ class CommandService(Service):
                 await handler(command)
             result = dialect.MAV_RESULT_ACCEPTED
         except AnafiMavError as error:
-            result, reason = self._explain(error), text_of(error)
+            result, reason = self._explain(error), str(error)
         except asyncio.CancelledError:
             result = dialect.MAV_RESULT_CANCELLED
             raise

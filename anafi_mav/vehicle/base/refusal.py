@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from anafi_mav import texts
-from anafi_mav.errors import AnafiMavError, CommandRejected
+from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, Disconnected
 from anafi_mav.texts import OperatorText, Template
 
 
@@ -71,4 +71,6 @@ def reason_of(error: AnafiMavError) -> OperatorText:
 
 def text_of(error: AnafiMavError) -> OperatorText:
     """Return the whole text of an error."""
+    if isinstance(error, CommandTimeout | Disconnected):
+        return texts.FAILED.fill(what=texts.FLIGHT_COMMAND, reason=error)
     return error.text if isinstance(error, Refused) else texts.from_below(error)

@@ -26,6 +26,7 @@ from anafi_mav.drone import Displacement, Drone, MoveEnd, PilotingCommand, Range
 from anafi_mav.errors import (
     CommandRejected,
     CommandTimeout,
+    Disconnected,
     LinkLost,
     LocalProtocolError,
     NotSupported,
@@ -147,7 +148,7 @@ async def test_lost_link_ends_every_wait_and_is_reported(drone: Drone, device: S
     await device.until(ardrone3.MaxTilt)
     device.session.end("gone")
     results = await asyncio.gather(*waits, return_exceptions=True)
-    assert [type(result) for result in results] == [LinkLost] * len(waits)
+    assert [type(result) for result in results] == [Disconnected] * len(waits)
     assert await asyncio.wait_for(asyncio.shield(drone.lost), 5.0)
     assert not drone.connected
     assert drone.moves_started == ()
