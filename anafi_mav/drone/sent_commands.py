@@ -414,30 +414,36 @@ class SentCommands:
         return sent
 
     def attribute_line(self, line: int, now: float) -> tuple[SentCommand | None, bool]:
-        """Return the start whose plan an executed line is of, and whether the line is late.
+        """Note an executed line; return the start whose plan it is of, and whether it is late.
+
+        See `plan_of_line`.
+        """
+        sent, is_late = self.plan_of_line(line, now)
+        if sent is not None:
+            sent.line = max(sent.line, line)
+        return sent, is_late
+
+    def plan_of_line(self, line: int, now: float) -> tuple[SentCommand | None, bool]:
+        """Return the start whose plan a reported line is of, and whether the line is late.
 
         None: no start of this program. A late line is of the plan before the newest one.
 
-        MissionItemExecuted has the number of the line alone. Lines of a plan are reported in their order, maybe after
+        The events have the number of the line alone. Lines of a plan are reported in their order, maybe after
         the next plan has begun. One that repeats or follows the newest line of the plan before, and does not follow
         that of the plan that plays, is therefore one of the plan before. One that neither repeats nor follows it, and
         that the newest start begins with, precedes the report that the plan of that start plays.
         """
-        sent, before, unbegun, is_late = None, None, None, False
+        sent, before, unbegun = None, None, None
         for one in self._slots[Slot.PLAN]:
             if one.begun_at > -math.inf:
                 before, sent, unbegun = sent, one, None
             else:
                 unbegun = one
         if unbegun is not None and line == unbegun.line + 1 and (sent is None or not sent.continues(line, now)):
-            unbegun.line = line
             return unbegun, False
-        if sent is None:
-            return None, False
-        if before is not None and line != sent.line + 1 and before.continues(line, now):
-            sent, is_late = before, True
-        sent.line = max(sent.line, line)
-        return sent, is_late
+        if sent is not None and before is not None and line != sent.line + 1 and before.continues(line, now):
+            return before, True
+        return sent, False
 
     def _attribute_stopped(self, uid: str, now: float) -> SentCommand | None:
         """PAUSED and STOPPED name the plan or nothing.

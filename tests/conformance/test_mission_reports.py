@@ -47,7 +47,7 @@ from support.plans import FENCE, Item, around, polygon, square, upload
 from support.setpoints import VELOCITY_ONLY, local, streaming
 from support.world import ARMED, HOLD, HOME, World, world
 
-from anafi_mav.arsdk.messages import ardrone3, common, piloting_style, rth
+from anafi_mav.arsdk.messages import ardrone3, common, flight_plan, piloting_style, rth
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklistType
 from anafi_mav.arsdk.messages.rth import StateReason
 from anafi_mav.drone.automatic.flight_plan import FlightPlan
@@ -604,6 +604,21 @@ async def test_line_of_the_file_before_that_is_reported_twice_is_none_of_the_new
         await w.drone.wait_log(lambda e: e.name == "plan" and e.args["state"] == "stopped", 60.0, since=begun)
         await state(w, COMPLETE, since=w.client.mark())
         assert reached(w, mark) == [1, 2, 3]
+
+
+async def test_way_point_of_the_file_before_that_is_reported_late_as_skipped_is_none_of_the_new_file() -> None:
+    async with world(speed=1.0, model="ai", web=True) as w:
+        await w.take_off(6.0)
+        await put(w, SQUARE)
+        assert (await w.client.command(START, 0, 0, timeout=20.0)).result == ACCEPTED
+        await state(w, ACTIVE, seq=1, since=0)
+        mark = w.client.mark()
+        await put(w, [way(0.0, 9.0, 6.0), way(6.0, 9.0, 6.0)])
+        assert (await w.client.command(START, 0, 0, timeout=20.0)).result == ACCEPTED
+        w.drone.inject(flight_plan.WaypointSkipped(1))
+        await state(w, COMPLETE, since=mark, timeout=60.0)
+        assert reached(w, mark) == [0, 1]
+        assert not [m.text for _, m in w.client.since(mark, "STATUSTEXT") if "skipped" in m.text]
 
 
 @pytest.mark.parametrize("is_replaced", [False, True], ids=["again", "replaced"])

@@ -171,6 +171,10 @@ class FlightPlan(Commanding[FlightPlanState]):
         """
         return self._commander.sent.attribute_line(line, now)[1]
 
+    def is_skipped_late(self, line: int, now: float) -> bool:
+        """Return True when a line that is reported as left out is of the plan before the newest one."""
+        return self._commander.sent.plan_of_line(line, now)[1]
+
     def is_undecided(self, uid: str) -> bool:
         """Return True when an earlier start of this plan may still begin; `start` refuses it then."""
         return self._commander.sent.is_undecided(uid, loop_time())

@@ -629,11 +629,10 @@ class MissionFlight(PlainTask):
 
     def subscriptions(self) -> Subscriptions:
         """Return the handlers of what reports how far the drone's plan is."""
-        machine = self.machine
         return {
             events.MavlinkFilePlayingStateChanged: self._on_playing,
             events.MissionItemExecuted: self._on_executed,
-            events.WaypointSkipped: lambda message, now: self._handle(machine.skipped(message.item)),
+            events.WaypointSkipped: self._on_skipped,
         }
 
     def value_subscriptions(self) -> ValueSubscriptions:
@@ -654,6 +653,10 @@ class MissionFlight(PlainTask):
     def _on_executed(self, message: events.MissionItemExecuted, now: float) -> None:
         if not self._vehicle.drone.flight_plan.attribute_line(message.idx, now):
             self._handle(self.machine.executed(message.idx, now))
+
+    def _on_skipped(self, message: events.WaypointSkipped, now: float) -> None:
+        if not self._vehicle.drone.flight_plan.is_skipped_late(message.item, now):
+            self._handle(self.machine.skipped(message.item))
 
     def _on_position(self, values: Values, now: float) -> None:
         if self.machine.state is not State.ENDING:

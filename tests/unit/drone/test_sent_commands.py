@@ -417,6 +417,12 @@ def test_line_before_the_report_of_its_plan_continues_no_plan_that_ended_long_ag
     assert (new.line, third.line) == (-1, 0)
 
 
+def test_skipped_line_is_attributed_like_an_executed_one_and_not_noted_as_executed(sent: SentCommands) -> None:
+    old, new = two_plans(sent, 0, 1)
+    assert [sent.plan_of_line(line, 10.5) for line in (2, 0, 2)] == [(old, True), (new, False), (old, True)]
+    assert (old.line, new.line) == (1, -1)
+
+
 def test_line_without_a_start_of_ours_is_of_no_start(sent: SentCommands) -> None:
     assert sent.attribute_line(0, 1.0) == (None, False)
 
