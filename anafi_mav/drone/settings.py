@@ -17,6 +17,7 @@ from typing import Any, TypeAlias, TypeVar
 import msgspec
 
 from anafi_mav.arsdk.codec.wire import Buffer, Message
+from anafi_mav.arsdk.messages import common
 from anafi_mav.drone.element import Element, Range, StateT, setting
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation
 from anafi_mav.errors import AnafiMavError, CommandRejected, LocalProtocolError, NotSupported
@@ -120,8 +121,9 @@ class Commanding(Element[StateT]):
         before that it may be of an older event. An answer of a kind that the link does not acknowledge may be lost: the
         command is sent once more first. `command` is called when it is its turn: a command of several settings repeats
         those that the change before it has left. `stops`: it ends something that goes on. `silence`: the error if the
-        drone has reported nothing by then; without it, it may still answer until `timeout`. Raises `CommandTimeout`,
-        too, if the drone has not received the command by then.
+        drone has reported nothing by then; without it, it may still answer until `timeout`. Its report may be lost, so
+        it is requested to report everything again. Raises `CommandTimeout`, too, if the drone has not received the
+        command by then.
         """
         change = self._changes[answer] = object()
         async with self._setting_locks.setdefault(answer, asyncio.Lock()):  # else whose answer would it be
@@ -155,8 +157,11 @@ class Commanding(Element[StateT]):
                 has_answered = True
                 if kept:
                     expectation.succeed(kept[0])
-                elif silence is not None:
-                    expectation.fail(silence)
+                elif not expectation.future.done():
+                    for query in self._queries():
+                        self._commander.send(query, is_setting=True)
+                    if silence is not None:
+                        expectation.fail(silence)
 
             expectation = self._commander.expect((answer,), listen)
             self._commander.dispatch(expectation, sent, timeout, stops=stops, is_setting=not stops)
@@ -165,6 +170,10 @@ class Commanding(Element[StateT]):
             if self._changes.get(answer) is change:
                 del self._changes[answer]
             return result
+
+    def _queries(self) -> list[Message]:
+        """Return the queries that the drone answers with the values of this element."""
+        return [common.AllSettings(), common.AllStates()]
 
     def _order(self, subject: Hashable, command: Message) -> int:
         """Send a target that is not acknowledged; every older one for the same subject is over."""

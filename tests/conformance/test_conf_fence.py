@@ -1005,8 +1005,8 @@ async def test_conf_077_home_type_is_restored_after_a_rally_point_whose_choice_i
         assert (await upload(w.client, [rally(around(PLACE, (-30.0, 0.0))[0], 20.0)], RALLY)).type == TAKEN
         await w.take_off()
         chosen = await w.drone.wait_log(lambda e: e.name == rth.SetPreferredHomeType.NAME, 10.0)
-        w.drone.faults.unreported = frozenset()
         await said(w.client, "Rally point 0 not used", since=0, timeout=10.0)
-        await w.drone.wait_log(lambda e: e.name == rth.PreferredHomeType.NAME, 10.0, since=chosen.t)
+        w.drone.faults.unreported = frozenset()
+        await w.drone.wait_log(lambda e: e.name == chosen.name and e is not chosen, 10.0, since=chosen.t)
         assert preferred(w) == [RthHomeType.CUSTOM, RthHomeType.TAKEOFF]
         assert w.drone.firmware.settings["home_type"] == RthHomeType.TAKEOFF

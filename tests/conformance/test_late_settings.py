@@ -19,6 +19,8 @@ from support.world import HOME, world
 
 from anafi_mav.arsdk.messages import ardrone3, camera, rth
 from anafi_mav.arsdk.messages import thermal as thermal_messages
+
+from anafi_mav.arsdk.messages.proto import camera2
 from anafi_mav.arsdk.messages.thermal import ThermalMode
 from anafi_mav.mavlink import dialect
 
@@ -226,3 +228,30 @@ async def test_text_about_a_command_without_an_answer_names_nothing_of_parrot() 
         assert ack.result == stock.MAV_RESULT_FAILED
         texts = [message.text for _, message in w.client.since(mark, "STATUSTEXT")]
         assert "Command failed: no answer in 5 s" in texts
+
+
+@pytest.mark.parametrize(
+    ("model", "command", "report"),
+    [
+        ("4k", camera.SetEvCompensation.NAME, camera.EvCompensation.NAME),
+        ("ai", camera2.Configure.NAME, camera2.State.NAME),
+    ],
+)
+async def test_camera_setting_whose_report_is_absent_is_requested(model: str, command: str, report: str) -> None:
+    async with world(model=model) as w:
+        w.drone.faults.unreported = frozenset({report})
+        setting = asyncio.ensure_future(write(w.client, "CAM_EV", 1.0, REAL32))
+        await w.drone.wait_log(lambda e: e.name == command)
+        w.drone.faults.unreported = frozenset()
+        ack = await setting
+        assert (ack.param_result, value_of(ack)) == (dialect.PARAM_ACK_ACCEPTED, 1.0)
+
+
+async def test_parameter_whose_report_is_absent_is_requested() -> None:
+    async with world() as w:
+        w.drone.faults.unreported = frozenset({ardrone3.MaxAltitudeChanged.NAME})
+        setting = asyncio.ensure_future(param_write(w.client, "ANF_MAX_ALT", 66.0, REAL32, timeout=8.0))
+        await w.drone.wait_log(lambda e: e.name == ardrone3.MaxAltitude.NAME)
+        w.drone.faults.unreported = frozenset()
+        assert (await setting).param_value == 66.0
+        assert not [m.text for _, m in w.client.since(0, "STATUSTEXT") if "not set" in m.text]

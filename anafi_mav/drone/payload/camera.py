@@ -539,6 +539,9 @@ class Camera(Commanding[CamerasState]):
 
     # -- inside
 
+    def _queries(self) -> list[Message]:
+        return [*super()._queries(), *(command for command, *_ in self.details())]
+
     async def until_active(self, kind: CameraKind) -> None:
         """Wait until the camera of this kind is reported to take the pictures.
 
