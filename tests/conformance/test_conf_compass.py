@@ -7,6 +7,8 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.flavours import both
 from support.world import World, world
 
+from anafi_mav.arsdk.messages import common
+
 ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 START = dialect.MAV_CMD_DO_START_MAG_CAL
@@ -90,3 +92,27 @@ async def test_compass_calibration_in_flight_is_refused() -> None:
         await w.take_off(5.0)
         assert (await w.client.command(START)).result == REJECTED
         assert asked(w) == []
+
+
+@both
+async def test_compass_calibration_that_another_controller_aborts_has_failed(flavour: str) -> None:
+    """The drone reports its end alike, and still requires a calibration."""
+    async with world(flavour=flavour, speed=1.0) as w:
+        mark = w.client.mark()
+        w.drone.faults.magneto_required = True
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "Magnetometer calibration required", since=mark)
+        if flavour == "px4":
+            ack = await w.client.command(dialect.MAV_CMD_PREFLIGHT_CALIBRATION, 0, 1, 0, 0, x=0.0, y=0.0, z=0.0)
+        else:
+            ack = await w.client.command(START)
+        assert ack.result == ACCEPTED
+        compass = w.drone.firmware.compass
+        for report in compass.handle(common.MagnetoCalibration(0), 0.0) or ():
+            w.drone.inject(report)
+        await w.client.wait("STATUSTEXT", lambda m: "calibration failed: failed or aborted" in m.text, since=mark)
+        assert not [m.text for _, m in w.client.since(mark, "STATUSTEXT") if "calibration done" in m.text]
+        assert compass.required
+        if flavour == "ardupilot":
+            report = await w.client.wait("MAG_CAL_REPORT", since=mark)
+            assert report.cal_status == dialect.MAG_CAL_FAILED
+            assert (await w.client.command(ACCEPT)).result == REJECTED

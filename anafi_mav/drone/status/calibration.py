@@ -13,7 +13,7 @@ from anafi_mav.arsdk.messages import common
 from anafi_mav.arsdk.messages.common import CalibrationAxis, Sensor
 from anafi_mav.drone.element import Reducer, with_item
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT
-from anafi_mav.drone.settings import Commanding
+from anafi_mav.drone.settings import ANSWERED_WITHIN, Commanding
 from anafi_mav.errors import AnafiMavError, CommandRejected
 
 _REQUIRED, _RECOMMENDED = 1, 2
@@ -44,6 +44,12 @@ class CalibrationState(msgspec.Struct, frozen=True):
     """The axes that are calibrated."""
     sensors: Mapping[Sensor, bool] = {}
     """Sensor -> works."""
+
+    @property
+    def is_magnetometer_done(self) -> bool:
+        """True when the last calibration has ended and nothing shows that it failed or was aborted."""
+        has_axes = self.done is None or self.done == frozenset(_AXES)
+        return not (self.started or self.failed or self.magneto_required) and has_axes
 
     @property
     def sensors_ok(self) -> bool | None:
@@ -106,25 +112,40 @@ class Calibration(Commanding[CalibrationState]):
     async def magnetometer_done(self, timeout: float = TURNING_TIMEOUT) -> None:
         """Wait for the end of a running calibration, at once when none runs.
 
-        Raises `CommandRejected` when it failed, `CommandTimeout` after so long without progress.
+        Raises `CommandRejected` when it failed or was aborted, `CommandTimeout` after so long without progress. The
+        drone reports its end alike in each case, and the axes before or after that: an end without all axes is a
+        success only if they are not reported at all, and the drone requires no calibration `ANSWERED_WITHIN` later.
         """
         self._require(self.state.started, "magnetometer calibration")
-        if not self.state.started:
-            return
+        failure = CommandRejected("failed or aborted")
 
         def judge(message: Any) -> bool | AnafiMavError | None:
-            if self.state.failed:
-                return CommandRejected("the calibration of the magnetometer failed")
-            if not self.state.started:
+            if isinstance(message, common.MagnetoCalibrationStateChanged) and message.calibrationFailed:
+                return failure
+            if self.state.started:
+                answer.expire_after(timeout, common.MagnetoCalibration.NAME)
+                return None
+            if self.state.is_magnetometer_done and self.state.done is not None:
                 return True
-            answer.expire_after(timeout, common.MagnetoCalibration.NAME)
+            answer.future.get_loop().call_later(ANSWERED_WITHIN, settle)
             return None
 
+        def settle() -> None:
+            if self.state.is_magnetometer_done:
+                answer.succeed(True)
+            elif not self.state.started:
+                answer.fail(failure)
+
+        if not self.state.started:
+            if not self.state.is_magnetometer_done:
+                raise failure
+            return
         answer = self._commander.expect(
             (
                 common.MagnetoCalibrationStartedChanged,
                 common.MagnetoCalibrationStateChanged,
                 common.MagnetoCalibrationAxisToCalibrateChanged,
+                common.MagnetoCalibrationRequiredState,
             ),
             judge,
         )

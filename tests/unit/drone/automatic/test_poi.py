@@ -144,6 +144,52 @@ async def test_magnetometer_calibration_without_turns_fails(device: ScriptedDevi
     assert drone.calibration.state.done == frozenset({CalibrationAxis.X_AXIS})
 
 
+NO_AXIS, ONE_AXIS, ALL_AXES = (
+    common.MagnetoCalibrationStateChanged(*axes, 0) for axes in ((0, 0, 0), (1, 0, 0), (1, 1, 1))
+)
+FAILED_AXES = common.MagnetoCalibrationStateChanged(1, 0, 0, 1)
+STOPPED = common.MagnetoCalibrationStartedChanged(0)
+
+
+@pytest.mark.parametrize(
+    ("reports", "is_success"),
+    [
+        ([ALL_AXES, STOPPED], True),
+        ([STOPPED, ALL_AXES], True),
+        ([STOPPED], True),
+        ([STOPPED, common.MagnetoCalibrationRequiredState(1)], False),
+        ([NO_AXIS, STOPPED], False),
+        ([ONE_AXIS, STOPPED], False),
+        ([STOPPED, FAILED_AXES], False),
+    ],
+)
+async def test_end_of_a_magnetometer_calibration_is_a_success_unless_it_lacks_an_axis(
+    device: ScriptedDevice, drone: Drone, reports: list[Message], is_success: bool
+) -> None:
+    device.script[common.MagnetoCalibration] = lambda _: [common.MagnetoCalibrationStartedChanged(1)]
+    await drone.calibration.start_magnetometer()
+    done = asyncio.ensure_future(drone.calibration.magnetometer_done())
+    await asyncio.sleep(0)
+    device.say(*reports)
+    if is_success:
+        await done
+    else:
+        with pytest.raises(CommandRejected, match="failed"):
+            await done
+
+
+async def test_failure_of_an_earlier_magnetometer_calibration_is_none_of_the_next_one(
+    device: ScriptedDevice, drone: Drone
+) -> None:
+    device.script[common.MagnetoCalibration] = lambda _: [common.MagnetoCalibrationStartedChanged(1)]
+    device.say(FAILED_AXES)
+    await drone.calibration.start_magnetometer()
+    done = asyncio.ensure_future(drone.calibration.magnetometer_done())
+    await asyncio.sleep(0)
+    device.say(common.MagnetoCalibrationAxisToCalibrateChanged(CalibrationAxis.X_AXIS), NO_AXIS, ALL_AXES, STOPPED)
+    await done
+
+
 async def test_a_reboot_is_confirmed_by_the_lost_link(device: ScriptedDevice, drone: Drone) -> None:
     with pytest.raises(CommandTimeout):
         await drone.reboot(timeout=0.2)
