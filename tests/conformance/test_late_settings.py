@@ -19,7 +19,6 @@ from support.world import HOME, world
 
 from anafi_mav.arsdk.messages import ardrone3, camera, rth
 from anafi_mav.arsdk.messages import thermal as thermal_messages
-
 from anafi_mav.arsdk.messages.proto import camera2
 from anafi_mav.arsdk.messages.thermal import ThermalMode
 from anafi_mav.mavlink import dialect
@@ -205,6 +204,7 @@ async def test_photo_at_the_autopilot_enters_photo_mode_although_a_change_is_not
         ack = await second.command(DIGICAM, x=1.0)
         assert ack.result == stock.MAV_RESULT_ACCEPTED
         assert w.drone.firmware.payload.cameras[0].mode is camera.CameraCameraMode.PHOTO
+
 
 @pytest.mark.parametrize("is_mute", [False, True], ids=["unanswered", "without a link"])
 async def test_text_about_a_setting_without_an_answer_is_one_statustext(is_mute: bool) -> None:
