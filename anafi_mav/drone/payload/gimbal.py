@@ -29,7 +29,7 @@ from anafi_mav.arsdk.messages.gimbal import (
     Model,
 )
 from anafi_mav.drone.element import Range, Reducer, members, with_item
-from anafi_mav.drone.expectation import ANSWER_TIMEOUT, require_number
+from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Expectation, require_number
 from anafi_mav.drone.settings import Commanding, is_limited, same_as
 from anafi_mav.drone.values import Values
 from anafi_mav.errors import AnafiMavError, CommandRejected, LocalProtocolError, NotSupported
@@ -175,6 +175,21 @@ def main_frames(values: Values) -> bytes | None:
 
 _FRAMES = 3 * 4
 """Bytes of three enums, behind the number of the gimbal."""
+
+
+class GimbalCalibration:
+    """A calibration of a gimbal that the drone has begun."""
+
+    def __init__(self, result: Expectation[bool]) -> None:
+        self._result = result
+
+    async def done(self) -> None:
+        """Wait for the end; returns when the calibration succeeded.
+
+        Raises `CommandRejected` when it failed, `CommandTimeout`, `LinkLost`.
+        """
+        await self._result.wait()
+
 
 Gimbals = Mapping[int, GimbalState]
 
@@ -395,23 +410,45 @@ class Gimbal(Commanding[Gimbals]):
 
         Raises `CommandRejected` when it failed.
         """
+        calibration = await self.start_calibration(id, timeout)
+        await calibration.done()
+
+    async def start_calibration(self, id: int = MAIN, timeout: float = CALIBRATION_TIMEOUT) -> GimbalCalibration:
+        """Begin to calibrate the gimbal; returns when the drone does so.
+
+        Raises `CommandRejected` when it has failed at once. `timeout`: of the whole calibration, s.
+        """
         require_number(timeout)
         self._require(self[id].calibration, gimbal.Calibrate.NAME)
 
-        def judge(message: gimbal.CalibrationResult | gimbal.CalibrationState) -> bool | AnafiMavError | None:
+        def begins(message: gimbal.CalibrationResult | gimbal.CalibrationState) -> bool | None:
             if message.gimbal_id != id:
                 return None
-            if isinstance(message, gimbal.CalibrationState):
-                if message.state == GimbalCalibrationState.IN_PROGRESS:
-                    answer.expire_after(timeout, gimbal.Calibrate.NAME)
+            if isinstance(message, gimbal.CalibrationState) and message.state != GimbalCalibrationState.IN_PROGRESS:
+                return None
+            return True
+
+        def judge(message: gimbal.CalibrationResult) -> bool | AnafiMavError | None:
+            if message.gimbal_id != id:
                 return None
             if message.result == GimbalCalibrationResult.SUCCESS:
                 return True
             return CommandRejected(f"gimbal calibration: {message.result.name.lower()}")
 
-        answer = self._commander.expect((gimbal.CalibrationResult, gimbal.CalibrationState), judge)
-        self._commander.dispatch(answer, gimbal.Calibrate(id), ANSWER_TIMEOUT)
-        await answer.wait()
+        result = self._commander.expect((gimbal.CalibrationResult,), judge)
+        calibration = GimbalCalibration(result)
+        try:
+            await self._commander.confirm(
+                gimbal.Calibrate(id), (gimbal.CalibrationResult, gimbal.CalibrationState), begins
+            )
+            if result.future.done():
+                await calibration.done()
+            else:
+                result.expire_after(timeout, gimbal.Calibrate.NAME)
+        except BaseException:
+            result.close()
+            raise
+        return calibration
 
     async def cancel_calibration(self, id: int = MAIN) -> None:
         """Cancel the calibration; returns when none is running."""

@@ -12,6 +12,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 
 from anafi_mav import texts
 from anafi_mav.drone.events import CalibrationAxis, MagnetoCalibrationStateChanged, Message
+from anafi_mav.drone.payload.gimbal import GimbalCalibration
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
 from anafi_mav.services.commands import Action, Altitude, Command, Effect, ProgressPolicy
@@ -76,8 +77,7 @@ class CalibrationService(Service):
         """Run MAV_CMD_PREFLIGHT_CALIBRATION for the magnetometer or the gimbal's horizon.
 
         param2 1: magnetometer; param5 2: horizon. With all parameters 0 the calibration under way ends; in the air
-        there is none, and what flies is not disturbed. The horizon's command ends with its calibration: ACCEPTED when
-        the drone reports that it has succeeded.
+        there is none, and what flies is not disturbed.
         """
         values = [0.0 if math.isnan(value) else value for value in (*command.params, command.x, command.y, command.z)]
         wanted = {index: value for index, value in enumerate(values, 1) if value != 0.0}
@@ -90,7 +90,7 @@ class CalibrationService(Service):
         elif wanted == {2: _MAGNETOMETER}:
             await self._magnetometer(command)
         elif wanted == {5: _HORIZON}:
-            await self._on_ground(command, texts.CALIBRATION, self._gimbal)
+            await self._horizon(command)
         else:
             # MAVSDK takes a refusal alone for a success; it believes the texts. Another client would take the text for
             # the end of its own calibration.
@@ -187,11 +187,35 @@ class CalibrationService(Service):
         finally:
             undo()
 
+    async def _horizon(self, command: Command) -> None:
+        """Start the calibration; ACCEPTED when the drone calibrates, as in PX4.
+
+        The reason is that of the magnetometer. In flavours that take `first_answer_as_final` it is ACCEPTED at the end,
+        as in ArduPilot.
+        """
+        if command.flavour.first_answer_as_final:
+            await self._on_ground(command, texts.CALIBRATION, self._gimbal)
+            return
+        await self._acquire(command, maintenance(texts.CALIBRATION))
+        calibration = await self._begin_gimbal()
+        self.host.run_action(command.client, self._end_gimbal(calibration))
+
     async def _gimbal(self) -> None:
+        await self._end_gimbal(await self._begin_gimbal())
+
+    async def _begin_gimbal(self) -> GimbalCalibration:
         gimbal = self.host.drone.gimbal
         self._say(texts.CAL_STARTED.fill(version=VERSION, name="level"))
         async with self._reported(gimbal.cancel_calibration):
-            await gimbal.calibrate()
+            return await gimbal.start_calibration()
+
+    async def _end_gimbal(self, calibration: GimbalCalibration) -> None:
+        """Report the calibration of the gimbal to its end.
+
+        A newer command ends it on the drone, too.
+        """
+        async with self._reported(self.host.drone.gimbal.cancel_calibration):
+            await calibration.done()
         self._say(texts.CAL_DONE.fill(name="level"))
 
     async def _reboot(self, command: Command) -> None:

@@ -179,6 +179,29 @@ async def test_calibration(device: ScriptedDevice, drone: Drone, result: GimbalC
     assert drone.gimbal[0].calibration_result == result
 
 
+async def test_started_calibration_is_waited_for_and_cancelled(device: ScriptedDevice, drone: Drone) -> None:
+    working = gimbal.CalibrationState(GimbalCalibrationState.IN_PROGRESS, 0)
+    device.script[gimbal.Calibrate] = lambda _: [working]
+    ended = gimbal.CalibrationState(GimbalCalibrationState.OK, 0)
+    device.script[gimbal.CancelCalibration] = lambda _: [
+        ended,
+        gimbal.CalibrationResult(0, GimbalCalibrationResult.CANCELED),
+    ]
+    calibration = await drone.gimbal.start_calibration()
+    await drone.gimbal.cancel_calibration()
+    with pytest.raises(CommandRejected, match="canceled"):
+        await calibration.done()
+    calibration = await drone.gimbal.start_calibration(timeout=0.1)
+    with pytest.raises(CommandTimeout):
+        await calibration.done()
+    device.script[gimbal.Calibrate] = lambda _: [
+        ended,
+        gimbal.CalibrationResult(0, GimbalCalibrationResult.FAILURE),
+    ]
+    with pytest.raises(CommandRejected, match="failure"):
+        await drone.gimbal.start_calibration()
+
+
 @pytest.mark.parametrize("model", ["4k", "ai"])
 async def test_in_the_simulator(model: str) -> None:
     async with connected(model) as (drone, _):
