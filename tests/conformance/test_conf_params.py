@@ -344,6 +344,20 @@ async def test_unconfirmed_parameter_write_changes_nothing() -> None:
             await w.client.wait("STATUSTEXT", lambda m: "ANF_HOME_TYPE not set" in m.text, since=mark)
 
 
+async def test_unconfirmed_parameter_write_is_reported_to_its_client_alone() -> None:
+    """As a write that is refused at once. The value that holds is the answer."""
+    async with world() as w:
+        other = await w.connect(sysid=250)
+        before = value_of(await read(w.client, "RTL_RETURN_ALT"))
+        w.drone.faults.unreported = frozenset({"rth.min_altitude"})
+        mark, elsewhere = w.client.mark(), other.mark()
+        value = await write(w.client, "RTL_RETURN_ALT", 33.0, REAL32, timeout=20.0)
+        assert value_of(value) == before
+        await w.client.wait("STATUSTEXT", lambda m: m.text.startswith("RTL_RETURN_ALT not set"), since=mark)
+        await read(other, "RTL_RETURN_ALT")
+        assert [m.text for _, m in other.since(elsewhere, "STATUSTEXT") if "RTL_RETURN_ALT" in m.text] == []
+
+
 async def qgroundcontrol_setup(values: dict[str, Any]) -> dict[str, bool]:
     """What QGroundControl's PX4 setup components make of the parameters (conformance A5)."""
     get = {name: value_of(message) for name, message in values.items()}

@@ -470,7 +470,9 @@ class ParameterService(Service):
                     self._refuse(inbound, dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, error.reason)
                     return
                 self.host.text(
-                    Severity.WARNING, texts.PARAMETER_NOT_SET.fill(name=parameter.name, reason=reason_of(error))
+                    Severity.WARNING,
+                    texts.PARAMETER_NOT_SET.fill(name=parameter.name, reason=reason_of(error)),
+                    inbound.channel,
                 )
         await self._settle()
         if listed.changes[index] == before:  # otherwise every client was notified, this one too
