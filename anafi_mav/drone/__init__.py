@@ -57,7 +57,7 @@ from anafi_mav.drone.payload.camera_state import (
     StyleSettings,
 )
 from anafi_mav.drone.payload.flight_logs import FlightLog, FlightLogs
-from anafi_mav.drone.payload.gimbal import Aim, Angles, Gimbal, GimbalAttitude, GimbalState
+from anafi_mav.drone.payload.gimbal import Aim, Angles, Gimbal, GimbalAttitude, GimbalCalibration, GimbalState
 from anafi_mav.drone.payload.media import Media, MediaItem, MediaState, Notification, Place, Resource
 from anafi_mav.drone.payload.storage import Storage, StorageState
 from anafi_mav.drone.payload.thermal import Colour, Palette, Thermal, ThermalState
@@ -133,6 +133,7 @@ __all__ = [
     "FrameMetadata",
     "Gimbal",
     "GimbalAttitude",
+    "GimbalCalibration",
     "GimbalState",
     "Gps",
     "GpsState",

@@ -182,6 +182,7 @@ class GimbalCalibration:
 
     def __init__(self, result: Expectation[bool]) -> None:
         self._result = result
+        result.future.add_done_callback(lambda _: result.close())  # perhaps nothing waits for the end
 
     async def done(self) -> None:
         """Wait for the end; returns when the calibration succeeded.

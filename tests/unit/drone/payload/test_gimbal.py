@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 
 import pytest
 from support.scripted_device import STATES, ScriptedDevice
@@ -194,12 +195,24 @@ async def test_started_calibration_is_waited_for_and_cancelled(device: ScriptedD
     calibration = await drone.gimbal.start_calibration(timeout=0.1)
     with pytest.raises(CommandTimeout):
         await calibration.done()
-    device.script[gimbal.Calibrate] = lambda _: [
-        ended,
-        gimbal.CalibrationResult(0, GimbalCalibrationResult.FAILURE),
-    ]
+    failed = [ended, gimbal.CalibrationResult(0, GimbalCalibrationResult.FAILURE)]
+    device.script[gimbal.Calibrate] = lambda _: failed
     with pytest.raises(CommandRejected, match="failure"):
         await drone.gimbal.start_calibration()
+
+
+async def test_end_of_a_calibration_that_nothing_waits_for_is_no_error(
+    device: ScriptedDevice, drone: Drone, caplog: pytest.LogCaptureFixture
+) -> None:
+    device.script[gimbal.Calibrate] = lambda _: [gimbal.CalibrationState(GimbalCalibrationState.IN_PROGRESS, 0)]
+    device.script[gimbal.CancelCalibration] = lambda _: [
+        gimbal.CalibrationResult(0, GimbalCalibrationResult.CANCELED),
+        gimbal.CalibrationState(GimbalCalibrationState.OK, 0),
+    ]
+    await drone.gimbal.start_calibration()
+    await drone.gimbal.cancel_calibration()
+    gc.collect()
+    assert [record.getMessage() for record in caplog.records] == []
 
 
 @pytest.mark.parametrize("model", ["4k", "ai"])
