@@ -61,3 +61,17 @@ async def test_mission_at_usual_heights_warns_of_nothing() -> None:
         await start(w)
         await state(w, ACTIVE, since=mark)
         assert not [text for text in texts(w.client, mark) if " low: " in text]
+
+
+@pytest.mark.parametrize(("model", "highest"), [("4k", 15), ("ai", 16)])
+async def test_mission_speed_above_the_drones_is_reported_at_upload(model: str, highest: int) -> None:
+    async with world(model=model) as w:
+        speed = Item(dialect.MAV_CMD_DO_CHANGE_SPEED, 0.0, 0.0, p1=1.0, p2=float(highest), frame=2)
+        mark = w.client.mark()
+        await put(w, [takeoff(6.0), speed, way(12.0, 0.0, 6.0)])
+        await said(w.client, "Mission: 3 items", mark)
+        mark = w.client.mark()
+        await put(w, [takeoff(6.0), replace(speed, p2=99.0), way(12.0, 0.0, 6.0)])
+        told = f"Mission: 3 items; approximated: item 2: speed 99 m/s: the drone flies {highest} m/s at most"
+        await said(w.client, told[:50], mark)
+        await said(w.client, told[50:], mark)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from anafi_mav import mav_enums
+from anafi_mav.models import MODELS
+from anafi_mav.plans.formats.parrot import Version
 from anafi_mav.plans.plan import DO_JUMP, FASTEST, SLOWEST, WAYPOINT, Item, Point
 from anafi_mav.plans.rules.flight_plan_writer import LARGEST_HEADING, SLOWEST_TURN, FlightPlanWriter
 from anafi_mav.plans.rules.rule import Fidelity, Rule
@@ -140,6 +142,11 @@ _AIRSPEED, _GROUNDSPEED = float(mav_enums.SPEED_TYPE_AIRSPEED), float(mav_enums.
 _SAME = -1.0
 
 
+def _highest_speed(version: Version) -> float:
+    """Return the speed (m/s over ground) of the fastest model that flies files of this version."""
+    return max(model.plans().max_speed for model in MODELS.values() if model.plan_version == version)
+
+
 def _speed(writer: FlightPlanWriter, item: Item) -> None:
     kind, speed, throttle, relative = item.params[:4]
     if kind not in (None, _AIRSPEED, _GROUNDSPEED):
@@ -152,6 +159,9 @@ def _speed(writer: FlightPlanWriter, item: Item) -> None:
         return
     if speed is None or not SLOWEST <= speed <= FASTEST:
         writer.refuse("no speed" if speed is None else f"invalid speed of {speed:g} m/s", 2)
+    highest = _highest_speed(writer.version)
+    if speed > highest:
+        writer.say(f"speed {speed:g} m/s: the drone flies {highest:g} m/s at most")
     writer.set_speed(_GROUNDSPEED if kind is None else kind, speed)
 
 
@@ -187,6 +197,6 @@ FLIGHT = (
         "place, nor waits, turns or makes a panorama, is refused: photos are not waited for; so is one that goes round "
         "very often for nothing."),
     Rule(178, _EXACT, "Speed. Other types than air and ground speed, -2 (the default) and differences are refused; a "
-        "throttle is left out and said.", _speed),
+        "throttle is left out and said. Above its highest speed the drone flies that, which is said.", _speed),
     Rule(189, _EXACT, "Nothing: a mark for aeroplanes that break off a landing.", _nothing),
 )  # fmt: skip

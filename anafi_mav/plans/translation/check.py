@@ -149,7 +149,11 @@ def _fault(fault: TranslationFault) -> Problem:
 
 
 def _ordered(problems: list[Problem]) -> tuple[Problem, ...]:
-    once = dict.fromkeys(problems)
+    """Return each problem once, by item; an item that has an error has no warnings."""
+    wrong = {problem.item for problem in problems if problem.severity is FindingSeverity.ERROR} - {None}
+    once = {
+        problem: None for problem in problems if problem.severity is FindingSeverity.ERROR or problem.item not in wrong
+    }
     return tuple(sorted(once, key=lambda problem: math.inf if problem.item is None else problem.item))
 
 
