@@ -63,6 +63,25 @@ async def test_mission_at_usual_heights_warns_of_nothing() -> None:
         assert not [text for text in texts(w.client, mark) if " low: " in text]
 
 
+async def test_mission_with_a_takeoff_elsewhere_warns_at_its_start() -> None:
+    """The drone flies to the item's place, as PX4 does; ArduCopter rises straight up."""
+    async with world(web=True) as w:
+        await put(w, [replace(way(30.0, 40.0, 6.0), command=dialect.MAV_CMD_NAV_TAKEOFF), way(12.0, 12.0, 6.0)])
+        mark = w.client.mark()
+        await start(w)
+        await said(w.client, "Mission item 1: takeoff place is 50 m away", mark)
+        await state(w, ACTIVE, since=mark)
+
+
+async def test_mission_with_a_takeoff_at_the_drone_warns_of_nothing() -> None:
+    async with world(web=True) as w:
+        await put(w, [replace(way(3.0, 4.0, 6.0), command=dialect.MAV_CMD_NAV_TAKEOFF), way(30.0, 40.0, 6.0)])
+        mark = w.client.mark()
+        await start(w)
+        await state(w, ACTIVE, since=mark)
+        assert not [text for text in texts(w.client, mark) if "takeoff place" in text]
+
+
 @pytest.mark.parametrize(("model", "highest"), [("4k", 15), ("ai", 16)])
 async def test_mission_speed_above_the_drones_is_reported_at_upload(model: str, highest: int) -> None:
     async with world(model=model) as w:

@@ -226,7 +226,7 @@ class MissionFlight(PlainTask):
         await self.storing.over()
         attempt = self.machine.attempt()
         course = await self._laid_out(attempt.mission.items, attempt.item, attempt)
-        await check_path(self._vehicle, course.parts, warns=False)
+        await check_path(self._vehicle, attempt.mission.items, course.parts, warns=False)
 
     async def _start_over(self) -> None:
         """Return when no start is under way; raise `Refused` if the mission was replaced.
@@ -519,7 +519,7 @@ class MissionFlight(PlainTask):
         elif not course.parts and course.rest is not None:
             course = await self._laid_out(items, course.rest, attempt)
         if attempt.course is None or course is not attempt.course:
-            await check_path(vehicle, course.parts, line)
+            await check_path(vehicle, items, course.parts, line)
         head = course.parts[0]
         if resumes or not isinstance(head, FlightPlanFile):
             return Prepared(course, progress.uid if resumes else "", line, resumes)

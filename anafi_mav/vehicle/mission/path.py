@@ -11,7 +11,7 @@ import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from anafi_mav import mav_enums, texts
+from anafi_mav import geo, mav_enums, texts
 from anafi_mav.drone.automatic.flight_plan import FlightPlan
 from anafi_mav.errors import CommandRejected, PlanError
 from anafi_mav.plans.plan import Item
@@ -37,6 +37,9 @@ MAX_FILES = 16
 
 REMEMBERED = 256
 """Next way points that are remembered: telemetry asks for each of them several times a second."""
+
+AWAY = 10.0
+"""m from the drone's place to that of a take-off item, more than an error of GPS at the same place."""
 
 _AMSL_FRAMES = (mav_enums.MAV_FRAME_GLOBAL, mav_enums.MAV_FRAME_GLOBAL_INT)
 
@@ -152,19 +155,27 @@ def next_place(content: bytes, after: int) -> tuple[GeoPoint, float] | None:
 
 
 async def check_path(
-    vehicle: Aircraft, parts: Sequence[FlightPlanFile | GatewayStep], after: int = -1, *, warns: bool = True
+    vehicle: Aircraft,
+    items: Sequence[Item],
+    parts: Sequence[FlightPlanFile | GatewayStep],
+    after: int = -1,
+    *,
+    warns: bool = True,
 ) -> None:
     """Raise `Refused` if a way point, or the straight way to it, is where the drone may not be.
 
-    `after` is the line of the first file after which it is flown. A text warns of the lowest way point below the height
-    at which an ANAFI hovers by itself, as PX4 does below home: over a slope that falls it is meant, elsewhere it is the
-    ground.
+    `items` are the mission, `after` is the line of the first file after which it is flown. A text warns of the lowest
+    way point below the height at which an ANAFI hovers by itself, as PX4 does below home: over a slope that falls it is
+    meant, elsewhere it is the ground. Another warns of a take-off item whose place is elsewhere: ArduCopter rises
+    straight up.
     """
-    where, seen, lowest = vehicle.place, 0, None
+    where, seen, lowest, away = vehicle.place, 0, None, None
     for part in parts:
         if isinstance(part, FlightPlanFile):
             for point in way_points(part, after):
                 _check(vehicle, where, point)
+                if items[point.item].command == mav_enums.MAV_CMD_NAV_TAKEOFF and point.place != where:
+                    away = point
                 where, seen = point.place, seen + 1
                 lowest = point if lowest is None or point.ato < lowest.ato else lowest
                 if seen % BREATH == 0:
@@ -173,6 +184,11 @@ async def check_path(
     if warns and lowest is not None and lowest.ato < LOWEST:
         item = lowest.item + texts.FIRST_LABEL
         vehicle.text(Severity.WARNING, texts.MISSION_LOW.fill(item=item, height=lowest.ato))
+    if warns and away is not None and (here := vehicle.place) is not None:
+        metres = geo.distance(here.latitude, here.longitude, away.place.latitude, away.place.longitude)
+        if metres > AWAY:
+            item = away.item + FIRST_LABEL
+            vehicle.text(Severity.WARNING, texts.MISSION_TAKEOFF_AWAY.fill(item=item, metres=metres))
 
 
 def _check(vehicle: Aircraft, start: GeoPoint | None, point: WayPoint) -> None:
