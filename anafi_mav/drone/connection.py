@@ -75,7 +75,8 @@ async def _settle(drone: Drone) -> None:
     piloting, home = drone.piloting, drone.home
     if not drone.connected:
         return
-    if piloting.about_to_fly or piloting.state.flying in _STARTING:
+    is_pilots = drone.controller.pilot_has_source and not piloting.has_launched
+    if piloting.about_to_fly or (piloting.state.flying in _STARTING and not is_pilots):
         await piloting.land()
     flying = piloting.state.flying
     if flying in _STANDING or flying in _LANDING:

@@ -987,18 +987,23 @@ class Vehicle(Aircraft):
                 self.control.release(self.return_end)
             return
         if self.control.leaves_to_pilot(Source.GATEWAY):
-            if self.drone.piloting.about_to_fly:
+            if self._starts_by_command:  # a hand launch, for one, does not take the sticks
                 await self._command_landing()
             return
         await self.control.perform(self._stay())
+
+    @property
+    def _starts_by_command(self) -> bool:
+        """True while a drone that has not left the ground starts, or may, by our command."""
+        piloting = self.drone.piloting
+        return piloting.about_to_fly or (self.may_rise and piloting.has_launched)
 
     async def _stay(self) -> None:
         """Hover, or stay on the ground.
 
         A drone whose motors start by a command of this program is landed: it would rise and hover without a program.
         """
-        piloting, hover = self.drone.piloting, Hover()
-        rising = piloting.about_to_fly or (self.may_rise and piloting.has_launched)
+        hover, rising = Hover(), self._starts_by_command
         rules = replace(hover.rules, start=Preparation.AS_IT_IS) if rising else None
         async with self.control.acquire(hover, by=Source.GATEWAY, rules=rules):
             if rising:

@@ -588,15 +588,27 @@ async def test_end_of_the_gateway_lands_a_drone_that_starts_its_motors() -> None
         assert w.drone.flying_state.name == "LANDED"
 
 
-async def test_end_of_the_gateway_stops_the_motors_of_a_drone_in_a_hand() -> None:
-    """A throw after it would be a take-off without a program."""
-    async with world(speed=1.0) as w:
+@pytest.mark.parametrize("skycontroller", [None, 3])
+async def test_end_of_the_gateway_stops_the_motors_of_a_drone_in_a_hand(skycontroller: int | None) -> None:
+    """A throw after it would be a take-off without a program. A hand launch does not take the pilot's sticks."""
+    async with world(speed=1.0, skycontroller=skycontroller) as w:
         await write(w.client, "ANF_HAND_LAUNCH", 1, dialect.MAV_PARAM_TYPE_INT32)
         assert (await w.client.command(ARM, 1)).result == ACCEPTED
         assert w.drone.flying_state.name == "USERTAKEOFF"
         await w.gateway.close()
         await watched(10.0)
         assert w.drone.flying_state.name == "LANDED"
+
+
+async def test_end_of_the_gateway_leaves_the_takeoff_of_a_skycontrollers_pilot() -> None:
+    async with world(speed=1.0, skycontroller=3) as w:
+        assert w.drone.skycontroller is not None
+        w.drone.skycontroller.press(1)
+        await w.drone.wait_log(lambda e: w.drone.flying_state.name == "MOTOR_RAMPING", 5.0)
+        await watched(0.1)
+        await w.gateway.close()
+        await watched(10.0)
+        assert w.drone.flying_state.name == "HOVERING"
 
 
 # Values that no one foresaw.

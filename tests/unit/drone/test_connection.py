@@ -164,6 +164,24 @@ async def test_block_behind_skycontroller_leaves_the_drone_to_its_pilot() -> Non
         assert sources(real) == ["CONTROLLER", "SKY_CONTROLLER"]
 
 
+async def test_block_behind_skycontroller_leaves_the_takeoff_of_its_pilot() -> None:
+    async with Simulator([spec(skycontroller=3)], speed=1.0, seed=1) as simulator:
+        real = simulator.drones[0]
+        assert real.skycontroller is not None
+        async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
+            real.skycontroller.press(1)
+            await drone.wait_for(FlyingState.MOTOR_RAMPING)
+        assert commands(real, "TakeOff", "UserTakeOff", "Landing") == ["TakeOff"]
+
+
+async def test_block_behind_skycontroller_stops_the_motors_of_its_hand_launch() -> None:
+    async with Simulator([spec(skycontroller=3)], speed=4.0, seed=1) as simulator:
+        real = simulator.drones[0]
+        async with connect("127.0.0.1", discovery_port=real.discovery_port) as drone:
+            await drone.piloting.hand_launch()
+        assert real.flying_state == FlyingState.LANDED
+
+
 async def test_move_behind_skycontroller_is_stopped_and_sticks_are_released() -> None:
     async with Simulator([spec(skycontroller=3)], speed=4.0, seed=1) as simulator:
         real = simulator.drones[0]
