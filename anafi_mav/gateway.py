@@ -26,7 +26,7 @@ from anafi_mav.clock import Clock, SystemClock
 from anafi_mav.config import Config, DroneConfig, MediaConfig
 from anafi_mav.disk_writer import HANGS
 from anafi_mav.drone import Drone, events
-from anafi_mav.drone.contention import Contention
+from anafi_mav.drone.contention import SHORT, Contention
 from anafi_mav.drone.rest import HTTP_PORT
 from anafi_mav.drone.values import VALUES
 from anafi_mav.errors import AnafiMavError, ConfigError, HandshakeRefused, WrongAircraft
@@ -252,7 +252,8 @@ class _Supervised:
             return
         self._judged = connection
         age = drone.last_heard - drone.handshake_at
-        if not contention.lost(age, displaced=drone.may_be_displaced, dismissed=drone.dismissed):
+        displaced = age <= SHORT and await drone.is_displaced()
+        if not contention.lost(age, displaced=displaced, dismissed=drone.dismissed):
             return
         self._report(Severity.CRITICAL, texts.OTHER_CONTROLLER)
         away = contention.stay_away()

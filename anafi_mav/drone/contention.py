@@ -50,8 +50,9 @@ class Contention:
         """Note a lost connection; return True when another controller acquired the drone.
 
         The connection was last heard `age` s after its handshake. `displaced`: it was lost as another handshake would
-        end it. One short connection alone may have been bad radio, unless the drone `dismissed` us, or was flown by
-        another controller already. A long one ends a row of short ones, however it was lost.
+        end it, and the drone is in reach. One short connection alone may have been bad radio, unless the drone
+        `dismissed` us, or was flown by another controller already. A long one ends a row of short ones, however it was
+        lost.
         """
         if age > SHORT:
             self._short = self._yields = 0

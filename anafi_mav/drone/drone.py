@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import enum
 import logging
 import math
 from collections import Counter
@@ -18,7 +19,7 @@ from typing import Any, TypeAlias, TypeVar
 from anafi_mav import models
 from anafi_mav.arsdk.codec.secret_fields import without_secrets
 from anafi_mav.arsdk.codec.wire import MAX_LAYOUTS, Message, Received, UnknownMessage, ValueLayout, join
-from anafi_mav.arsdk.link.controller import ControllerSession
+from anafi_mav.arsdk.link.controller import ControllerSession, look
 from anafi_mav.arsdk.link.handshake import DISCOVERY_PORT, DeviceInfo
 from anafi_mav.arsdk.messages import animation, ardrone3, common, drone_manager, follow_me, rth, skyctrl
 from anafi_mav.arsdk.messages import flight_plan as modern_plan
@@ -64,7 +65,14 @@ from anafi_mav.drone.values import OnValues, Values
 from anafi_mav.drone.video.route import Direct, Mux, VideoRoute
 from anafi_mav.drone.video.stream_choice import StreamChoice
 from anafi_mav.drone.video.video import Video
-from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, WrongAircraft
+from anafi_mav.errors import (
+    CommandRejected,
+    CommandTimeout,
+    LinkLost,
+    LocalProtocolError,
+    RemoteProtocolError,
+    WrongAircraft,
+)
 
 log = logging.getLogger("anafi_mav")
 message_log = logging.getLogger("anafi_mav.message")
@@ -89,6 +97,10 @@ HANDSHAKE_AFTER = 4.0
 """s of silence before the first new handshake. libarsdk keeps a silent session for 8 s, and an earlier handshake could
 throw out one that was only fading."""
 
+HEARD_WITHIN = 0.5
+"""s after an answer to discovery within which a drone that is in reach again, and has no other controller, is heard: it
+sends several datagrams a second."""
+
 UNHEARD_FOR = 4.0
 """s for which a drone that is not heard is sent what ends its motion, and gives a Skycontroller's pilot the sticks."""
 
@@ -97,6 +109,18 @@ CONTROLLER_TIMEOUT = 5.0
 
 After that the attempt fails, and the next one queries the Skycontroller again, so that its own state is current.
 """
+
+
+SWITCHED_OFF = frozenset({common.DisconnectionCause.OFF_BUTTON, common.DisconnectionCause.RESET_FACTORY})
+"""Announced ends of a connection that have nothing to do with another controller."""
+
+
+class LossCause(enum.Enum):
+    """How a link was lost, as far as that shows another controller."""
+
+    OTHER = "no sign of another controller"
+    SILENCED = "the drone was heard, and is silent: as after another handshake, or out of reach"
+    DISPLACED = "closed or announced as by another handshake"
 
 
 class Drone:
@@ -227,8 +251,8 @@ class Drone:
         """Loop time of the newest handshake."""
         self.last_heard = -math.inf
         """Loop time at which the drone was heard last before its link was lost."""
-        self.may_be_displaced = False
-        """The link was lost as another controller's handshake would end it."""
+        self._loss = LossCause.OTHER
+        """How the link was lost last."""
         self._dismissed: common.DisconnectionCause | None = None
         """Cause with which the drone announced the end of the connection."""
         self._hover_due: str | None = None
@@ -327,7 +351,7 @@ class Drone:
             await _abandon(attempt)
             raise
         self._drop_fading("replaced by a new session")
-        self.handshake_at, self._dismissed, self.may_be_displaced = loop_time(), None, False
+        self.handshake_at, self._dismissed, self._loss = loop_time(), None, LossCause.OTHER
         session.on_messages = partial(self._receive, session)
         return session
 
@@ -415,10 +439,13 @@ class Drone:
         after the handshake: its UDP does not arrive here.
         """
         self.last_heard = session.last_received
-        known = self._dismissed in (common.DisconnectionCause.OFF_BUTTON, common.DisconnectionCause.RESET_FACTORY)
         closed = session.closed_by_peer and isinstance(session, mux_link.MuxControllerSession)
-        is_silenced = silent and session.has_received
-        self.may_be_displaced = not known and (is_silenced or closed or self._dismissed is not None)
+        if self._dismissed in SWITCHED_OFF:
+            self._loss = LossCause.OTHER
+        elif closed or self._dismissed is not None:
+            self._loss = LossCause.DISPLACED
+        else:
+            self._loss = LossCause.SILENCED if silent and session.has_received else LossCause.OTHER
 
     def _on_dismissal(self, message: common.Disconnection, now: float) -> None:
         self._dismissed = message.cause
@@ -427,7 +454,28 @@ class Drone:
     @property
     def dismissed(self) -> bool:
         """The drone announced the end of the connection, and not because it is switched off."""
-        return self.may_be_displaced and self._dismissed is not None
+        return self._dismissed is not None and self._dismissed not in SWITCHED_OFF
+
+    async def is_displaced(self) -> bool:
+        """Return True when another controller seems to have ended the lost connection.
+
+        A drone that fell silent is looked for by discovery, which disturbs no controller: one that answers that, and
+        is not heard by `HEARD_WITHIN`, has another one. One that does not answer is out of reach.
+        """
+        if self._loss is not LossCause.SILENCED:
+            return self._loss is LossCause.DISPLACED
+        try:
+            await look(
+                self.address,
+                discovery_port=self._discovery_port,
+                local_address=self._local_address,
+                interface=self._interface,
+            )
+        except (LinkLost, RemoteProtocolError):
+            return False
+        if self._fading is not None:
+            await asyncio.wait({self._heard}, timeout=HEARD_WITHIN)
+        return self._fading is None or self._fading.silent
 
     async def heard_again(self) -> bool:
         """Wait until a silent session is heard again, or a new handshake is due.

@@ -74,6 +74,30 @@ async def test_gateway_connected_to_a_flying_drone_yields(tmp_path: Path) -> Non
             assert await goto(w, 30.0, 8.0) == 0
 
 
+@pytest.mark.parametrize("skycontroller", [None, 3, 4])
+async def test_link_cut_after_a_restart_in_flight_is_no_second_controller(
+    skycontroller: int | None, tmp_path: Path
+) -> None:
+    """The drone answers nothing then. The gateway connects as soon as it does, and the first Hold is accepted."""
+    async with world(speed=1.0, skycontroller=skycontroller) as w:
+        await w.take_off()
+        await w.gateway.close()
+        begun = now()
+        async with second(w, tmp_path) as (gateway, client):
+            await w.drone.wait_log(lambda e: (e.kind, e.name) == ("session", "up"), 10.0, since=begun)
+            assert await gateway.ready(10.0)
+            await watched(ups(w)[-1] + 3.5 - now())
+            w.drone.faults.mute = True
+            await client.silence("HEARTBEAT", 10.0)
+            w.drone.faults.mute = False
+            mark = client.mark()
+            await client.heartbeat(lambda beat: True, since=mark, timeout=5.0)
+            ack = await client.command(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 3, target=(2, 1))
+            assert ack.result == dialect.MAV_RESULT_ACCEPTED
+            texts = [m.text for _, m in client.since(0, "STATUSTEXT")]
+            assert not [text for text in texts if text.startswith((TAKEN, "Reconnecting"))]
+
+
 async def test_yielded_gateway_reconnects_at_once_on_a_command(tmp_path: Path) -> None:
     async with world(speed=1.0) as w:
         await w.take_off()

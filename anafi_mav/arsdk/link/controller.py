@@ -137,20 +137,25 @@ class ControllerSession(Session):
 
 
 async def look(
-    host: str, *, discovery_port: int = handshake.DISCOVERY_PORT, interface: str | None = None, timeout: float = 2.0
+    host: str,
+    *,
+    discovery_port: int = handshake.DISCOVERY_PORT,
+    local_address: str | None = None,
+    interface: str | None = None,
+    timeout: float = 2.0,
 ) -> DeviceInfo:
     """Return the discovery description of the device at `host`.
 
     A controller that is connected to the device does not notice it. Raises as `connect` does.
     """
     try:
-        return await asyncio.wait_for(_look(host, discovery_port, interface), timeout)
+        return await asyncio.wait_for(_look(host, discovery_port, local_address, interface), timeout)
     except asyncio.TimeoutError:
         raise LinkLost(f"no answer from {host} within {timeout:g} s") from None
 
 
-async def _look(host: str, port: int, interface: str | None) -> DeviceInfo:
-    reader, writer = await _open(host, port, None, interface)
+async def _look(host: str, port: int, local_address: str | None, interface: str | None) -> DeviceInfo:
+    reader, writer = await _open(host, port, local_address, interface)
     try:
         return await _read(reader, handshake.parse_discovery, f"{host}:{port}")
     finally:
