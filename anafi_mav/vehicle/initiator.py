@@ -25,6 +25,7 @@ class Initiator(enum.Enum):
     CLIENT = "a client, or the gateway for it"
     DRONE = "the drone"
     PILOT = "the pilot at the Skycontroller"
+    UNSEEN = "the pilot, or a plan: a landing that was found under way"
 
 
 class Initiators:
@@ -47,6 +48,16 @@ class Initiators:
         """Initiator of the return that ended last; None without one."""
         return None if self._returned is None else self._returned[0]
 
+    @property
+    def descending(self) -> Initiator | None:
+        """Initiator of the present landing or return; None without one."""
+        return self.landing or self.returning
+
+    def recall(self, initiator: Initiator, *, lands: bool, returns: bool) -> None:
+        """Note the stored initiator of a landing or return that a new connection has found."""
+        self.landing = initiator if lands else None
+        self.returning = initiator if returns else None
+
     def land_commanded(self, now: float) -> None:
         """Note that a Landing is about to be sent."""
         self._land_sent = now
@@ -58,11 +69,14 @@ class Initiators:
     def plan_ended(self, now: float) -> None:
         """Note that a flight plan has ended whose last line lands the drone."""
         self._plan_ended = now
+        if self.landing is Initiator.UNSEEN:
+            self.landing = Initiator.DRONE
 
-    def on_landing(self, now: float, *, plan_lands: bool, pilot_may_land: bool) -> None:
+    def on_landing(self, now: float, *, plan_lands: bool, pilot_may_land: bool, unseen: bool = False) -> None:
         """Note that the drone has begun to land.
 
         `plan_lands`: its flight plan ends so. `pilot_may_land`: there is a Skycontroller, and no plan that lands here.
+        `unseen`: a new connection has found it landing.
         """
         if now - self._land_sent <= REPORTED_WITHIN or plan_lands:
             self.landing = Initiator.CLIENT
@@ -72,8 +86,10 @@ class Initiators:
             self.landing = Initiator.DRONE
         elif self._returned is not None and now - self._returned[1] <= ENDS_IN_LANDING:
             self.landing = self._returned[0]
+        elif pilot_may_land:
+            self.landing = Initiator.UNSEEN if unseen else Initiator.PILOT
         else:
-            self.landing = Initiator.PILOT if pilot_may_land else Initiator.DRONE
+            self.landing = Initiator.DRONE
 
     def on_landing_over(self, *, unsent: bool) -> None:
         """Note that the drone does not land: it stands, or flies again.

@@ -337,7 +337,7 @@ class Vehicle(Aircraft):
             initiator = initiators.returning if self.returning else None
             if initiator is None and self._is_about_to_land:
                 initiator = initiators.last_return
-        return initiator in (Initiator.DRONE, Initiator.PILOT)
+        return initiator not in (None, Initiator.CLIENT)
 
     @property
     def overridable(self) -> Override:
@@ -644,7 +644,7 @@ class Vehicle(Aircraft):
             initiator = self._initiators.landing or Initiator.CLIENT
             if self._forced_landing:
                 raise Refused(what, texts.FORCED)
-            if initiator is Initiator.PILOT:
+            if initiator in (Initiator.PILOT, Initiator.UNSEEN):
                 raise Refused(what, texts.PILOT_LANDS)
             if extent is None or (initiator is Initiator.DRONE and extent is not Extent.ALL):
                 raise Refused(what, texts.LANDS)
@@ -891,10 +891,18 @@ class Vehicle(Aircraft):
         if self.on_ground:  # maybe another aircraft, or carried elsewhere
             self.flight_facts, self.commanded_speeds = FlightFacts(), CommandedSpeeds()
         self.return_end.watch_end()
+        self._recall_initiator(kept)
         self.on_flying_state()
         self.on_location()  # the one that it has reported counts for as long as a new one
         if self.flying_state is not None and not self.on_ground:
             self.flight_facts = replace(self.flight_facts, origin=self._origin_in_flight(kept))
+
+    def _recall_initiator(self, kept: TakeoffRecord | None) -> None:
+        """Adopt the stored initiator of a landing or return of this flight that is still under way."""
+        if kept is None or kept.flight_id != self.drone.product.state.flight_id:
+            return
+        if (initiator := Initiator.__members__.get(kept.initiator or "")) is not None:
+            self._initiators.recall(initiator, lands=self.flying_state in LANDING, returns=self.returning)
 
     def _origin_in_flight(self, kept: TakeoffRecord | None) -> GeoPoint | None:
         """Return where a drone took off that was found in the air; None when nothing reports it."""
@@ -924,8 +932,16 @@ class Vehicle(Aircraft):
         height, origin = self.height, self.origin
         if self.on_ground or not height.flight_id or height.takeoff_amsl is None:
             return None
-        place = (None, None) if origin is None else origin
-        return TakeoffRecord(height.flight_id, height.takeoff_amsl, height.estimated, *place)
+        latitude, longitude = (None, None) if origin is None else origin
+        initiator = self._initiators.descending
+        return TakeoffRecord(
+            height.flight_id,
+            height.takeoff_amsl,
+            height.estimated,
+            latitude,
+            longitude,
+            None if initiator is None else initiator.name,
+        )
 
     def on_return(self) -> None:
         """React to a drone's return that began, ended or changed.
@@ -1021,6 +1037,7 @@ class Vehicle(Aircraft):
                 now,
                 plan_lands=self.mission.ending,
                 pilot_may_land=self.drone.controller.present and not self.mission.lands_here,
+                unseen=before is None,
             )
 
     def _note_return(self) -> None:

@@ -1,7 +1,7 @@
-"""Stores the take-off point of the present flight for a restart of the gateway in the air.
+"""Stores take-off point and initiator of a descent for a restart of the gateway in the air.
 
-So no height is lost. The file of a drone is found by its serial number, and the record in it is valid for the flight
-that it names.
+So no height is lost, and clients can end the same landings and returns as before. The file of a drone is found by its
+serial number, and the record in it is valid for the flight that it names.
 """
 
 from __future__ import annotations
@@ -15,10 +15,16 @@ KEY = "takeoff"
 
 
 class TakeoffPointService(Service):
-    """Writes the take-off point of each flight once, or when more of it becomes known."""
+    """Writes the record of a flight whenever it changes."""
 
     def subscriptions(self) -> Subscriptions:
-        kinds = (events.FlightId, events.GpsLocationChanged, events.TakeoffLocation, events.FlyingStateChanged)
+        kinds = (
+            events.FlightId,
+            events.GpsLocationChanged,
+            events.TakeoffLocation,
+            events.FlyingStateChanged,
+            events.ReturnStateChanged,
+        )
         return dict.fromkeys(kinds, lambda message, now: self._keep())
 
     def link_up(self) -> None:

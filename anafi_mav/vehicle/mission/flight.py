@@ -731,9 +731,10 @@ class MissionFlight(PlainTask):
 
     def link_up(self, record: MissionRecord | None) -> None:
         """The drone is connected again, or to a new gateway: look if it flies our mission."""
-        plan = self._vehicle.drone.flight_plan.state
-        plays, in_air = plan.playing == PlayingState.PLAYING, self._vehicle.in_air
-        self._handle(self.machine.link_up(record, plan.uid, self._now, plays=plays, in_air=in_air))
+        vehicle, plan = self._vehicle, self._vehicle.drone.flight_plan.state
+        plays, landing = plan.playing == PlayingState.PLAYING, vehicle.place if self._lands else None
+        effects = self.machine.link_up(record, plan.uid, self._now, plays=plays, in_air=vehicle.in_air, landing=landing)
+        self._handle(effects)
         self.on_vehicle()  # it may have landed meanwhile
 
 

@@ -422,8 +422,10 @@ class MissionMachine:
 
         Not on the way to its last way point.
         """
-        leg = self._file
-        if leg is None or not self._leads_down:
+        return self._file_lands_at(self._file, place)
+
+    def _file_lands_at(self, leg: FlightPlanFile | None, place: GeoPoint | None) -> bool:
+        if leg is None or self.mission.items[leg.origins[-1]].command != mav_enums.MAV_CMD_NAV_LAND:
             return False
         points = [*way_points(leg)]
         return not points or _is_above(points[-1], place)
@@ -831,14 +833,21 @@ class MissionMachine:
 
     @_on(E.LINK_UP)
     def link_up(
-        self, record: MissionRecord | None, uid: str | None, now: float, *, plays: bool, in_air: bool
+        self,
+        record: MissionRecord | None,
+        uid: str | None,
+        now: float,
+        *,
+        plays: bool,
+        in_air: bool,
+        landing: GeoPoint | None = None,
     ) -> _Steps:
         """The drone is connected and reports its newest plan, and if it flies that.
 
-        `record` is the stored one.
+        `record` is the stored one, `landing` where the drone lands; None: it does not.
         """
         if self.progress.leg is None and record is not None and record.mission == self.mission.identity:
-            if uid != record.uid and not in_air:
+            if uid != record.uid and not in_air and landing is None:
                 return
             progress = MissionProgress(self.progress.current).in_file(record.uid, record.leg, record.line)
             course = Course((record.leg,), later=record.next)
@@ -858,6 +867,10 @@ class MissionMachine:
             yield SendText(Severity.NOTICE, texts.MISSION_FOUND_FLYING.fill(item=current))
         elif progress.leg_done and later is None:
             yield from self._complete()
+        elif later is None and uid in (None, "", progress.uid) and self._file_lands_at(progress.leg, landing):
+            self._flown_plan = progress.uid  # a plan that has stopped may have no name
+            yield from self._complete()
+            yield Release(lands=True)
         else:
             yield SendText(Severity.NOTICE, texts.MISSION_FOUND_PAUSED.fill(item=current))
 

@@ -6,7 +6,7 @@ import pytest
 
 from anafi_mav.vehicle.initiator import Initiator, Initiators
 
-CLIENT, DRONE, PILOT = Initiator.CLIENT, Initiator.DRONE, Initiator.PILOT
+CLIENT, DRONE, PILOT, UNSEEN = Initiator.CLIENT, Initiator.DRONE, Initiator.PILOT, Initiator.UNSEEN
 
 
 def lands(who: Initiators, now: float = 100.0, *, plan: bool = False, skycontroller: bool = False) -> Initiator | None:
@@ -113,3 +113,29 @@ def test_return_of_a_client_stays_the_clients() -> None:
     assert who.returning is None
     returns(who, 180.0, sc=True)
     assert who.returning is PILOT
+
+
+def test_landing_found_under_way_is_the_drones_once_a_plan_lands_there() -> None:
+    who = Initiators()
+    who.on_landing(100.0, plan_lands=False, pilot_may_land=True, unseen=True)
+    assert who.landing is UNSEEN
+    who.plan_ended(100.0)
+    assert who.landing is DRONE
+
+
+def test_landing_of_the_pilot_stays_the_pilots_as_a_plan_ends() -> None:
+    who = Initiators()
+    assert lands(who, skycontroller=True) is PILOT
+    who.plan_ended(100.0)
+    assert who.landing is PILOT
+
+
+@pytest.mark.parametrize("stored", [CLIENT, DRONE, PILOT])
+def test_stored_initiator_counts_for_the_landing_or_return_under_way(stored: Initiator) -> None:
+    who = Initiators()
+    who.recall(stored, lands=True, returns=False)
+    assert (who.landing, who.returning, who.descending) == (stored, None, stored)
+    who.recall(stored, lands=False, returns=True)
+    assert (who.landing, who.returning, who.descending) == (None, stored, stored)
+    who.recall(stored, lands=False, returns=False)
+    assert who.descending is None
