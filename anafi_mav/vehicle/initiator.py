@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import enum
 import math
+from dataclasses import dataclass
 
 REPORTED_WITHIN = 15.0
 """s after a Landing was sent in which a landing that begins is attributed to it.
@@ -28,24 +29,37 @@ class Initiator(enum.Enum):
     UNSEEN = "the pilot, or a plan: a landing that was found under way"
 
 
+@dataclass(frozen=True)
+class _Landing:
+    """A landing under way."""
+
+    initiator: Initiator
+    if_stopped: Initiator | None = None
+    """Its initiator if the return before it is reported as stopped; None: the same."""
+
+
 class Initiators:
     """Keeps the initiator of the present landing, and of the present or last return."""
 
     def __init__(self) -> None:
-        self.landing: Initiator | None = None
-        """None while the drone does not land."""
+        self._landing: _Landing | None = None
         self.returning: Initiator | None = None
         """None while the drone does not return."""
         self._land_sent = -math.inf
         self._return_sent = -math.inf
         self._returned: tuple[Initiator, float] | None = None
-        """Initiator of the return that ended last, and its end time."""
+        """Initiator of the return that ended last, and its end time; None if it was stopped."""
         self._plan_ended = -math.inf
         """End time of the newest plan whose last line lands the drone."""
 
     @property
+    def landing(self) -> Initiator | None:
+        """Initiator of the present landing; None while the drone does not land."""
+        return None if self._landing is None else self._landing.initiator
+
+    @property
     def last_return(self) -> Initiator | None:
-        """Initiator of the return that ended last; None without one."""
+        """Initiator of the return that ended last; None without one, and if it was stopped."""
         return None if self._returned is None else self._returned[0]
 
     @property
@@ -55,7 +69,7 @@ class Initiators:
 
     def recall(self, initiator: Initiator, *, lands: bool, returns: bool) -> None:
         """Note the stored initiator of a landing or return that a new connection has found."""
-        self.landing = initiator if lands else None
+        self._landing = _Landing(initiator) if lands else None
         self.returning = initiator if returns else None
 
     def land_commanded(self, now: float) -> None:
@@ -70,7 +84,7 @@ class Initiators:
         """Note that a flight plan has ended whose last line lands the drone."""
         self._plan_ended = now
         if self.landing is Initiator.UNSEEN:
-            self.landing = Initiator.DRONE
+            self._landing = _Landing(Initiator.DRONE)
 
     def on_landing(self, now: float, *, plan_lands: bool, pilot_may_land: bool, unseen: bool = False) -> None:
         """Note that the drone has begun to land.
@@ -78,27 +92,26 @@ class Initiators:
         `plan_lands`: its flight plan ends so. `pilot_may_land`: there is a Skycontroller, and no plan that lands here.
         `unseen`: a new connection has found it landing.
         """
+        unexplained = Initiator.PILOT if pilot_may_land else Initiator.DRONE
         if now - self._land_sent <= REPORTED_WITHIN or plan_lands:
-            self.landing = Initiator.CLIENT
+            self._landing = _Landing(Initiator.CLIENT)
         elif self.returning is not None:
-            self.landing = self.returning
+            self._landing = _Landing(self.returning, unexplained)
         elif now - self._plan_ended <= ENDS_IN_LANDING:
-            self.landing = Initiator.DRONE
+            self._landing = _Landing(Initiator.DRONE)
         elif self._returned is not None and now - self._returned[1] <= ENDS_IN_LANDING:
-            self.landing = self._returned[0]
-        elif pilot_may_land:
-            self.landing = Initiator.UNSEEN if unseen else Initiator.PILOT
+            self._landing = _Landing(self._returned[0])
         else:
-            self.landing = Initiator.DRONE
+            self._landing = _Landing(Initiator.UNSEEN if unseen and pilot_may_land else unexplained)
 
     def on_landing_over(self, *, unsent: bool) -> None:
         """Note that the drone does not land: it stands, or flies again.
 
         `unsent`: no Landing waits for its answer.
         """
-        if self.landing is not None and unsent:
+        if self._landing is not None and unsent:
             self._land_sent = -math.inf
-        self.landing = None
+        self._landing = None
 
     def on_return(self, now: float, *, by_itself: bool, by_plan: bool, skycontroller: bool) -> None:
         """Note that the drone returns; `by_itself` and `by_plan` are its reported reason."""
@@ -109,9 +122,14 @@ class Initiators:
         elif self.returning is not Initiator.CLIENT:
             self.returning = Initiator.PILOT
 
-    def on_return_over(self, now: float) -> None:
-        """Note that the drone does not return."""
+    def on_return_over(self, now: float, *, stopped: bool) -> None:
+        """Note that the drone does not return.
+
+        `stopped`: by a command, a landing by the pilot's button for example.
+        """
         if self.returning is not None:
-            self._returned = self.returning, now
+            self._returned = None if stopped else (self.returning, now)
+            if stopped and self._landing is not None and self._landing.if_stopped is not None:
+                self._landing = _Landing(self._landing.if_stopped)
             self.returning = None
             self._return_sent = -math.inf

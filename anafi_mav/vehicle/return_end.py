@@ -60,6 +60,9 @@ LAND_AGAIN = 5.0
 """s after a landing that the drone did not confirm until it is announced once more: no station may be left that could
 command it."""
 
+LANDS_WITHIN = 1.0
+"""s after a return was stopped, without a command of ours, in which the landing that has stopped it is reported."""
+
 UNREPORTED = 10.0
 """s of hovering at home after which a drone that reports no end of its return is asked for its states."""
 
@@ -82,6 +85,7 @@ class _Phase(enum.Enum):
     RETURNING = "the drone returns"
     WAITING = "the drone hovers at home, the gateway is about to land it"
     LANDING = "the landing is commanded, or the drone begins it by its own setting"
+    STOPPED = "the drone has stopped the return, to hover or to land"
 
 
 @dataclass
@@ -175,7 +179,7 @@ class ReturnEnd(PlainTask):
 
     @property
     def owns_descent(self) -> bool:
-        return self.active
+        return self._attempt is not None and self._attempt.phase is not _Phase.STOPPED
 
     @property
     def commands_landing(self) -> bool:
@@ -269,7 +273,9 @@ class ReturnEnd(PlainTask):
             if home.rth == RthState.AVAILABLE and home.reason == ReturnReason.FINISHED:
                 self._arrived(attempt)
             elif self._vehicle.in_air:
-                self._hover(texts.HOVER_STOPPED if home.reason == ReturnReason.STOPPED else texts.HOVER_UNFINISHED)
+                reason = texts.HOVER_STOPPED if home.reason == ReturnReason.STOPPED else texts.HOVER_UNFINISHED
+                attempt.phase = _Phase.STOPPED
+                attempt.task = asyncio.get_running_loop().create_task(self._see_hover(attempt, reason))
             else:
                 self._close()
 
@@ -355,6 +361,12 @@ class ReturnEnd(PlainTask):
         attempt.task = None
         if self._vehicle.flying_state not in LANDING:
             self._hover(texts.HOVER_NO_LANDING)
+
+    async def _see_hover(self, attempt: ReturnAttempt, reason: OperatorText) -> None:
+        """Report a hover once the return was not stopped by a landing, which ends the attempt."""
+        await asyncio.sleep(LANDS_WITHIN)
+        attempt.task = None
+        self._hover(reason)
 
     def _announce_landing(self) -> None:
         vehicle, home = self._vehicle, self._vehicle.drone.home.state

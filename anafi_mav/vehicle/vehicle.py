@@ -1044,7 +1044,8 @@ class Vehicle(Aircraft):
         """Record the initiator of the return that begins or ends."""
         now, home = self._clock.monotonic(), self.drone.home.state
         if not self.returning:
-            self._initiators.on_return_over(now)
+            stopped = home.rth == RthState.AVAILABLE and home.reason == ReturnReason.STOPPED
+            self._initiators.on_return_over(now, stopped=stopped)
             return
         self._initiators.on_return(
             now,

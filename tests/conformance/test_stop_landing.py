@@ -32,7 +32,7 @@ from support.missions import put, start, takeoff, way
 from support.setpoints import attitude, local, streaming
 from support.world import HOLD, LAND, POSITION, RETURN, World, world
 
-from anafi_mav.arsdk.messages import ardrone3
+from anafi_mav.arsdk.messages import ardrone3, rth
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.sim.world.quirks import Quirk
@@ -236,6 +236,29 @@ async def test_landing_by_skycontroller_button_is_ended_by_no_client(skycontroll
         await text(w.client, "Hold refused: Skycontroller pilot is landing", mark)
         assert (await w.client.command(TAKEOFF_CMD, x=0.0, y=0.0, z=5.0)).result == REJECTED
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
+
+
+@pytest.mark.parametrize("late", ["", rth.State.NAME, ardrone3.FlyingStateChanged.NAME])
+async def test_landing_by_skycontroller_button_in_a_clients_return_is_ended_by_no_client(late: str) -> None:
+    """It was taken for the end of that return: Hold ended it, Mission flew on, and a text had it hover."""
+    async with world(speed=1.0, web=True, skycontroller=3) as w:
+        assert w.drone.skycontroller is not None
+        await w.take_off(12.0)
+        await put(w, [takeoff(12.0), way(9.0, 0.0, 12.0)])
+        assert await goto(w, 40.0, 12.0) == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 39.0, 40.0)
+        assert (await w.client.command(RTL)).result == ACCEPTED
+        w.drone.faults.late = {late: 0.4}
+        mark = w.client.mark()
+        w.drone.skycontroller.press(1)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landing", 5.0)
+        await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.land)
+        await watched(0.6)
+        for mode in (PX4_HOLD, PX4_MISSION):
+            assert (await w.client.command(SET_MODE, *mode)).result == REJECTED
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
+        assert "hovering" not in flown(w)[flown(w).index("landing") :]
+        assert not [m.text for _, m in w.client.since(mark, "STATUSTEXT") if "hovering" in m.text]
 
 
 async def test_client_landing_behind_a_skycontroller_is_ended_by_clients() -> None:

@@ -41,7 +41,7 @@ def test_end_of_a_plan_that_lands_is_no_end_of_a_return() -> None:
     who = Initiators()
     who.return_commanded(99.0)
     returns(who)
-    who.on_return_over(100.0)
+    who.on_return_over(100.0, stopped=False)
     who.plan_ended(101.0)
     assert who.last_return is CLIENT
 
@@ -70,16 +70,16 @@ def test_landing_after_a_return_keeps_the_returns_initiator() -> None:
     assert lands(who) is DRONE  # reported before the return's end
     who = Initiators()
     returns(who, own=True, sc=True)
-    who.on_return_over(120.0)
+    who.on_return_over(120.0, stopped=False)
     assert lands(who, 121.0, skycontroller=True) is DRONE
     who = Initiators()
     who.return_commanded(99.0)
     returns(who, sc=True)
-    who.on_return_over(120.0)
+    who.on_return_over(120.0, stopped=False)
     assert lands(who, 121.0, skycontroller=True) is CLIENT
     who = Initiators()
     returns(who, own=True)
-    who.on_return_over(120.0)
+    who.on_return_over(120.0, stopped=False)
     who.on_landing_over(unsent=True)
     assert lands(who, 140.0, skycontroller=True) is PILOT  # another landing
 
@@ -109,7 +109,7 @@ def test_return_of_a_client_stays_the_clients() -> None:
     returns(who, 100.0, sc=True)
     returns(who, 160.0, sc=True)
     assert who.returning is CLIENT
-    who.on_return_over(170.0)
+    who.on_return_over(170.0, stopped=False)
     assert who.returning is None
     returns(who, 180.0, sc=True)
     assert who.returning is PILOT
@@ -139,3 +139,31 @@ def test_stored_initiator_counts_for_the_landing_or_return_under_way(stored: Ini
     assert (who.landing, who.returning, who.descending) == (None, stored, stored)
     who.recall(stored, lands=False, returns=False)
     assert who.descending is None
+
+
+@pytest.mark.parametrize("stops_first", [True, False])
+@pytest.mark.parametrize(("skycontroller", "expected"), [(True, PILOT), (False, DRONE)])
+def test_landing_that_stops_a_return_is_not_the_returns(
+    stops_first: bool, skycontroller: bool, expected: Initiator
+) -> None:
+    """The two reports may arrive in either order."""
+    who = Initiators()
+    who.return_commanded(99.0)
+    returns(who, sc=skycontroller)
+    if stops_first:
+        who.on_return_over(110.0, stopped=True)
+        assert lands(who, 110.4, skycontroller=skycontroller) is expected
+    else:
+        assert lands(who, 110.0, skycontroller=skycontroller) is CLIENT
+        who.on_return_over(110.4, stopped=True)
+        assert who.landing is expected
+    assert who.last_return is None
+
+
+def test_landing_of_a_client_that_stops_a_return_is_the_clients() -> None:
+    who = Initiators()
+    returns(who, sc=True)
+    who.land_commanded(109.9)
+    assert lands(who, 110.0, skycontroller=True) is CLIENT
+    who.on_return_over(110.4, stopped=True)
+    assert who.landing is CLIENT
