@@ -55,7 +55,7 @@ def check_certificates(ca: str | None, certificate: str | None, private_key: str
     zenoh's only report of them is that the router does not answer.
     """
     for path in (ca, certificate):
-        if path is not None and not _accepts(lambda context, file=path: context.load_verify_locations(file)):
+        if path is not None and not _accepts(partial(ssl.SSLContext.load_verify_locations, cafile=path)):
             raise OSError(f"{path}: expected a certificate (PEM)")
     if certificate is not None and private_key is not None:
         # An empty password, or OpenSSL asks for that of an encrypted key at the terminal. zenoh reads none.

@@ -187,7 +187,7 @@ async def check_path(
     if warns and away is not None and (here := vehicle.place) is not None:
         metres = geo.distance(here.latitude, here.longitude, away.place.latitude, away.place.longitude)
         if metres > AWAY:
-            item = away.item + FIRST_LABEL
+            item = away.item + texts.FIRST_LABEL
             vehicle.text(Severity.WARNING, texts.MISSION_TAKEOFF_AWAY.fill(item=item, metres=metres))
 
 
