@@ -27,6 +27,7 @@ from anafi_mav.errors import (
     Disconnected,
     LinkLost,
     LocalProtocolError,
+    NotSupported,
 )
 
 logger = logging.getLogger(__name__)
@@ -215,6 +216,15 @@ class Commander:
         """Raise `LinkLost` without a link."""
         if self._wire is None:
             raise Disconnected("not connected")
+
+    def require_feature(self, reported: object, feature: str) -> None:
+        """Raise `LinkLost` without a link, `NotSupported` for an absent feature.
+
+        It is absent when `reported`, a state that drones with the feature report, is None or empty.
+        """
+        self.require_link()
+        if reported is None or reported == frozenset() or reported == {}:
+            raise NotSupported(feature)
 
     def attach(self, wire: Wire) -> None:
         """Commands go out here from now on."""

@@ -20,7 +20,7 @@ from anafi_mav.arsdk.codec.wire import Buffer, Message
 from anafi_mav.arsdk.messages import common
 from anafi_mav.drone.element import Element, Range, StateT, setting
 from anafi_mav.drone.expectation import ANSWER_TIMEOUT, Commander, Expectation
-from anafi_mav.errors import AnafiMavError, CommandRejected, LocalProtocolError, NotSupported
+from anafi_mav.errors import AnafiMavError, CommandRejected, LocalProtocolError
 from anafi_mav.units import clip, is_finite
 
 T = TypeVar("T")
@@ -93,15 +93,6 @@ class Commanding(Element[StateT]):
     def is_settled(self) -> bool:
         """True when the drone has answered the newest change of each setting."""
         return not self._changes
-
-    def _require(self, reported: object, feature: str) -> None:
-        """Raise `LinkLost` without a link, `NotSupported` for an absent feature.
-
-        It is absent when `reported`, a state that drones with the feature report, is None or empty.
-        """
-        self._commander.require_link()
-        if reported is None or reported == frozenset() or reported == {}:
-            raise NotSupported(feature)
 
     async def _change(
         self,
@@ -204,5 +195,5 @@ class Commanding(Element[StateT]):
         """
         (value,) = (getattr(command, name) for name in command.__struct_fields__)
         number(value, command.NAME)
-        self._require(reported, command.NAME)
+        self._commander.require_feature(reported, command.NAME)
         return (await self._change(command, answer, setting, lambda result: is_limited(result, value))).current

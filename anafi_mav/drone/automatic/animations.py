@@ -252,7 +252,7 @@ class Animations(Commanding[AnimationsState]):
 
         False when it was cancelled. Raises `CommandTimeout` after `timeout` s without progress.
         """
-        self._require(self.state.running, "animations")
+        self._commander.require_feature(self.state.running, "animations")
         if self.state.running == Type.NONE:
             return not self.state.canceled
         what = "the end of an animation"
@@ -270,7 +270,7 @@ class Animations(Commanding[AnimationsState]):
 
     async def cancel(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """End the animation; returns when none is flown, at once when none is running or starting."""
-        self._require(self.state.running, "animations")
+        self._commander.require_feature(self.state.running, "animations")
         self._commander.abort_pending("stopped", Slot.ANIMATION)
         await self._commander.stops_delivered(animation.Cancel.NAME, timeout)
         if not self.state.is_running:
@@ -296,7 +296,7 @@ class Animations(Commanding[AnimationsState]):
             provided = sum(1 << param for param, value in zip(params, values, strict=True) if value is not None)
             order = command(provided, *(_argument(value, params(bit)) for bit, value in enumerate(values)))
         state = self.state
-        self._require(state.running, "animations")
+        self._commander.require_feature(state.running, "animations")
         known = frozenset().union(*state.modes.values(), state.missing)
         if known and type not in known:
             raise NotSupported(f"animation {spoken(type)}")

@@ -346,7 +346,7 @@ class FlightPlan(Commanding[FlightPlanState]):
 
     async def set_returns_on_disconnect(self, on: bool) -> bool:
         """Set if a lost link ends a plan with a return home."""
-        self._require(self.state.returns_on_disconnect, common.ReturnHomeOnDisconnect.NAME)
+        self._commander.require_feature(self.state.returns_on_disconnect, common.ReturnHomeOnDisconnect.NAME)
         return await self._change(
             common.ReturnHomeOnDisconnect(int(on)),
             common.ReturnHomeOnDisconnectChanged,
@@ -355,7 +355,7 @@ class FlightPlan(Commanding[FlightPlanState]):
         )
 
     def _available(self) -> None:
-        self._require(self.state.is_reported or None, "flight plans")
+        self._commander.require_feature(self.state.is_reported or None, "flight plans")
 
 
 def _checked(uid: str) -> str:

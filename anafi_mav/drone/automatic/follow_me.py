@@ -93,7 +93,7 @@ class FollowMe(Commanding[FollowMeState]):
         """
         if mode == Mode.NONE:
             raise LocalProtocolError("NONE is no way to follow")
-        self._require(self.state.mode, "follow me")
+        self._commander.require_feature(self.state.mode, "follow me")
         if mode not in self.state.missing:
             raise NotSupported(f"follow me: {spoken(mode)}")
 
@@ -119,7 +119,7 @@ class FollowMe(Commanding[FollowMeState]):
 
         Returns at once when the drone is neither following nor about to.
         """
-        self._require(self.state.mode, "follow me")
+        self._commander.require_feature(self.state.mode, "follow me")
         self._commander.abort_pending("stopped", Slot.FOLLOW)
         await self._commander.stops_delivered(follow_me.Stop.NAME, timeout)
         if self.state.mode == Mode.NONE:
@@ -136,7 +136,7 @@ class FollowMe(Commanding[FollowMeState]):
         Altitude above mean sea level; velocity north, east, down in m/s; `accuracy` in m. It is the target while
         `target_is_controller`. Send it once a second at least: it is not acknowledged.
         """
-        self._require(self.state.mode, "follow me")
+        self._commander.require_feature(self.state.mode, "follow me")
         north, east, down = (number(speed, "speed of the target") for speed in velocity)
         self._commander.send(
             controller_info.Gps(
@@ -154,7 +154,7 @@ class FollowMe(Commanding[FollowMeState]):
 
     async def set_target_is_controller(self, on: bool) -> bool:
         """Choose the target: the controller, or what the picture's `target_image_detection` reports."""
-        self._require(self.state.target_is_controller, "follow me")
+        self._commander.require_feature(self.state.target_is_controller, "follow me")
         return await self._change(
             follow_me.SetTargetIsController(int(on)),
             follow_me.TargetIsController,

@@ -64,7 +64,7 @@ class Poi(Commanding[PoiState]):
         """
         if position(latitude, longitude, altitude) is None:
             raise LocalProtocolError(f"no place on earth: {latitude}, {longitude}, {altitude}")
-        self._require(self.state.status, "points of interest")
+        self._commander.require_feature(self.state.status, "points of interest")
         if self.state.status == PoiStatus.UNAVAILABLE:
             raise CommandRejected(self._why())
 
@@ -92,7 +92,7 @@ class Poi(Commanding[PoiState]):
 
     async def stop(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """End pointing at the place; returns at once when none is active or about to be."""
-        self._require(self.state.status, "points of interest")
+        self._commander.require_feature(self.state.status, "points of interest")
         self._commander.abort_pending("stopped", Slot.POI)
         await self._commander.stops_delivered(ardrone3.StopPilotedPOI.NAME, timeout)
         if self.state.status not in (PoiStatus.RUNNING, PoiStatus.PENDING):

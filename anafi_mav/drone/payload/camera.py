@@ -419,7 +419,7 @@ class Camera(Commanding[CamerasState]):
         With `at` (x, y: 0 to 1 from the upper left) it is locked to the exposure of that place.
         """
         if not self[id].exposure_lockable:
-            self._require(None, "exposure lock")
+            self._commander.require_feature(None, "exposure lock")
         state = await self._ask(
             id,
             "exposure",
@@ -449,7 +449,7 @@ class Camera(Commanding[CamerasState]):
     async def lock_white_balance(self, on: bool = True, id: int = MAIN) -> bool | None:
         """Lock or unlock the white balance."""
         if not self[id].white_balance_lockable:
-            self._require(None, "white balance lock")
+            self._commander.require_feature(None, "white balance lock")
         state = await self._ask(
             id,
             "white_balance",
@@ -511,7 +511,7 @@ class Camera(Commanding[CamerasState]):
 
     async def set_antiflicker(self, mode: Antiflicker) -> Antiflicker | None:
         """Set the mains frequency that the exposure adapts to; one for all cameras."""
-        self._require(self.state.antiflicker, "antiflicker")
+        self._commander.require_feature(self.state.antiflicker, "antiflicker")
         speech, _ = self._known(min(self.state.cameras, default=MAIN))
         command, answer = speech.antiflicker(mode)
         return await self._change(command, answer, lambda message: self.state.antiflicker, same_as(mode))
@@ -570,7 +570,7 @@ class Camera(Commanding[CamerasState]):
     def _known(self, id: int) -> tuple[type[ClassicCamera] | type[ModernCamera], CameraState]:
         """How to ask this camera, and its state."""
         now = self[id]
-        self._require(now.feature, f"camera {id}")
+        self._commander.require_feature(now.feature, f"camera {id}")
         assert now.feature is not None
         return _SPEECH[now.feature], now
 
@@ -592,7 +592,7 @@ class Camera(Commanding[CamerasState]):
         `field` must have been reported.
         """
         speech, now = self._known(id)
-        self._require(getattr(now, field), f"camera {id}: {field.replace('_', ' ')}")
+        self._commander.require_feature(getattr(now, field), f"camera {id}: {field.replace('_', ' ')}")
         first, answer = ask(speech, now)
         if isinstance(first, camera2.Configure) and first.config == camera2.Config():
             raise LocalProtocolError("nothing to change")

@@ -365,7 +365,7 @@ class Gimbal(Commanding[Gimbals]):
         """
         if not is_finite(degrees_per_second):
             raise LocalProtocolError("a speed is not a number")
-        self._require(self[id].max_speed, gimbal.SetMaxSpeed.NAME)
+        self._commander.require_feature(self[id].max_speed, gimbal.SetMaxSpeed.NAME)
         return await self._change(
             gimbal.SetMaxSpeed(id, degrees_per_second, degrees_per_second, degrees_per_second),
             gimbal.MaxSpeed,
@@ -375,7 +375,7 @@ class Gimbal(Commanding[Gimbals]):
 
     async def open_offsets(self, on: bool, id: int = MAIN) -> bool:
         """Begin or end the correction by offsets; while it is open the gimbal keeps to them."""
-        self._require(self[id].offsets_open, gimbal.StartOffsetsUpdate.NAME)
+        self._commander.require_feature(self[id].offsets_open, gimbal.StartOffsetsUpdate.NAME)
         return await self._change(
             gimbal.StartOffsetsUpdate(id) if on else gimbal.StopOffsetsUpdate(id),
             gimbal.Offsets,
@@ -387,7 +387,7 @@ class Gimbal(Commanding[Gimbals]):
         self, *, yaw: float | None = None, pitch: float | None = None, roll: float | None = None, id: int = MAIN
     ) -> Mapping[Axis, Range]:
         """Set the offsets, deg, while they are open; None keeps one. Return those of the drone."""
-        self._require(self[id].offsets, gimbal.SetOffsets.NAME)
+        self._commander.require_feature(self[id].offsets, gimbal.SetOffsets.NAME)
         wishes = {Axis.YAW: yaw, Axis.PITCH: pitch, Axis.ROLL: roll}
         wanted = {axis: value for axis, value in wishes.items() if value is not None}
         if not is_finite(*wanted.values()):
@@ -420,7 +420,7 @@ class Gimbal(Commanding[Gimbals]):
         Raises `CommandRejected` when it has failed at once. `timeout`: of the whole calibration, s.
         """
         require_number(timeout)
-        self._require(self[id].calibration, gimbal.Calibrate.NAME)
+        self._commander.require_feature(self[id].calibration, gimbal.Calibrate.NAME)
 
         def begins(message: gimbal.CalibrationResult | gimbal.CalibrationState) -> bool | None:
             if message.gimbal_id != id:
@@ -453,7 +453,7 @@ class Gimbal(Commanding[Gimbals]):
 
     async def cancel_calibration(self, id: int = MAIN) -> None:
         """Cancel the calibration; returns when none is running."""
-        self._require(self[id].calibration, gimbal.CancelCalibration.NAME)
+        self._commander.require_feature(self[id].calibration, gimbal.CancelCalibration.NAME)
         await self._change(
             gimbal.CancelCalibration(id),
             gimbal.CalibrationState,
@@ -467,7 +467,7 @@ class Gimbal(Commanding[Gimbals]):
 
     def _axes(self, id: int) -> frozenset[Axis]:
         axes = self[id].axes
-        self._require(axes, f"gimbal {id}")
+        self._commander.require_feature(axes, f"gimbal {id}")
         return axes or frozenset()
 
     def _targets(self, wanted: Mapping[Axis, Aim | None], id: int) -> dict[Axis, Aim]:

@@ -371,5 +371,5 @@ class Media(Commanding[MediaState]):
                 yield notification
 
     def _available(self) -> MediaClient:
-        self._require(self.state.index, "media store")
+        self._commander.require_feature(self.state.index, "media store")
         return self._client

@@ -367,7 +367,7 @@ class Storage(Commanding[Storages]):
 
     def _addressed(self, id: int | None) -> tuple[_Speech, int]:
         """How to ask, and the id of a storage that there is."""
-        self._require(self.state, "storage")
+        self._commander.require_feature(self.state, "storage")
         storage = self.main if id is None else id
         speech = SPEECHES.get(self[storage].feature or "")
         if speech is None:

@@ -119,7 +119,7 @@ class Thermal(Commanding[ThermalState]):
 
     async def set_mode(self, mode: ThermalMode) -> ThermalMode:
         """Switch the thermal camera on or off, or blend it with the visible picture."""
-        self._require(self.state.mode, "thermal camera")
+        self._commander.require_feature(self.state.mode, "thermal camera")
         return await self._change(thermal.SetMode(mode), thermal.Mode, lambda m: ThermalMode(m.mode), same_as(mode))
 
     async def set_rendering(self, mode: RenderingMode, blending: float | None = None) -> tuple[RenderingMode, float]:
@@ -127,7 +127,7 @@ class Thermal(Commanding[ThermalState]):
 
         Return both.
         """
-        self._require(self.state.rendering, "thermal camera")
+        self._commander.require_feature(self.state.rendering, "thermal camera")
         if blending is not None:
             number(blending, "share of the thermal picture")
         return await self._change(
@@ -139,7 +139,7 @@ class Thermal(Commanding[ThermalState]):
 
     async def set_palette(self, palette: Palette) -> Palette:
         """Set the relation of temperatures to colours; return that of the drone."""
-        self._require(self.state.palette, "thermal camera")
+        self._commander.require_feature(self.state.palette, "thermal camera")
         for value in (palette.lowest_k, palette.highest_k, palette.spot_threshold):
             number(value, "palette")
         command = thermal.SetPaletteSettings(
@@ -155,7 +155,7 @@ class Thermal(Commanding[ThermalState]):
 
     async def set_colours(self, colours: Sequence[Colour]) -> tuple[Colour, ...]:
         """Set the colours of the palette; return those of the drone."""
-        self._require(self.state.mode, "thermal camera")
+        self._commander.require_feature(self.state.mode, "thermal camera")
         if not 1 <= len(colours) <= MAX_COLOURS:
             raise LocalProtocolError(f"expected 1 to {MAX_COLOURS} colours, got {len(colours)}")
         last = len(colours) - 1
@@ -181,13 +181,13 @@ class Thermal(Commanding[ThermalState]):
 
     async def set_emissivity(self, emissivity: float) -> float:
         """Set the emissivity of the objects, 0 to 1."""
-        self._require(self.state.emissivity, "thermal camera")
+        self._commander.require_feature(self.state.emissivity, "thermal camera")
         command = thermal.SetEmissivity(number(emissivity, "emissivity"))
         return await self._change(command, thermal.Emissivity, lambda m: float(m.emissivity), same_as(emissivity))
 
     async def set_background(self, kelvin: float) -> float:
         """Set the temperature of the background that objects reflect, K."""
-        self._require(self.state.background_k, "thermal camera")
+        self._commander.require_feature(self.state.background_k, "thermal camera")
         return await self._change(
             thermal.SetBackgroundTemperature(number(kelvin, "temperature")),
             thermal.BackgroundTemperature,
@@ -197,7 +197,7 @@ class Thermal(Commanding[ThermalState]):
 
     async def set_sensitivity(self, sensitivity: Sensitivity) -> Sensitivity:
         """Set the sensitivity: HIGH covers hotter objects, LOW finer differences."""
-        self._require(self.state.sensitivity, "thermal camera")
+        self._commander.require_feature(self.state.sensitivity, "thermal camera")
         return await self._change(
             thermal.SetSensitivity(sensitivity),
             thermal.Sensitivity,
@@ -207,7 +207,7 @@ class Thermal(Commanding[ThermalState]):
 
     async def set_shutter(self, trigger: ShutterTrigger) -> ShutterTrigger:
         """Set if the sensor calibrates itself or by `trigger_shutter`."""
-        self._require(self.state.shutter, "thermal camera")
+        self._commander.require_feature(self.state.shutter, "thermal camera")
         return await self._change(
             thermal.SetShutterMode(trigger),
             thermal.ShutterMode,
@@ -217,5 +217,5 @@ class Thermal(Commanding[ThermalState]):
 
     def trigger_shutter(self) -> None:
         """Calibrate the sensor now. The drone does not confirm it."""
-        self._require(self.state.shutter, "thermal camera")
+        self._commander.require_feature(self.state.shutter, "thermal camera")
         self._commander.send(thermal.TriggShutter())

@@ -40,7 +40,7 @@ class PilotingSettings(Commanding[PilotingState]):
 
         It keeps the drone within `max_distance` of `PilotingState.geofence_centre`.
         """
-        self._require(self.state.geofence, ardrone3.NoFlyOverMaxDistance.NAME)
+        self._commander.require_feature(self.state.geofence, ardrone3.NoFlyOverMaxDistance.NAME)
         return await self._change(
             ardrone3.NoFlyOverMaxDistance(int(on)),
             ardrone3.NoFlyOverMaxDistanceChanged,
@@ -77,14 +77,14 @@ class PilotingSettings(Commanding[PilotingState]):
 
     async def set_banked_turn(self, on: bool) -> bool:
         """Switch banked turns, in which the drone leans into a turn."""
-        self._require(self.state.banked_turn, ardrone3.BankedTurn.NAME)
+        self._commander.require_feature(self.state.banked_turn, ardrone3.BankedTurn.NAME)
         return await self._change(
             ardrone3.BankedTurn(int(on)), ardrone3.BankedTurnChanged, lambda message: bool(message.state), same_as(on)
         )
 
     async def set_style(self, style: PilotingStyleStyle) -> PilotingStyleStyle:
         """Set the frame of the sticks: the drone or the direction of the camera."""
-        self._require(self.state.style, piloting_style.SetStyle.NAME)
+        self._commander.require_feature(self.state.style, piloting_style.SetStyle.NAME)
         return await self._change(
             piloting_style.SetStyle(style),
             piloting_style.Style,
@@ -94,7 +94,7 @@ class PilotingSettings(Commanding[PilotingState]):
 
     async def set_obstacle_avoidance(self, on: bool) -> bool:
         """Switch obstacle avoidance; `PilotingState.avoidance` reports if it can work now. Ai only."""
-        self._require(self.state.avoidance, obstacle_avoidance.SetMode.NAME)
+        self._commander.require_feature(self.state.avoidance, obstacle_avoidance.SetMode.NAME)
         return await self._change(
             obstacle_avoidance.SetMode(AvoidanceMode.STANDARD if on else AvoidanceMode.DISABLED),
             obstacle_avoidance.Status,

@@ -90,7 +90,7 @@ class Calibration(Commanding[CalibrationState]):
 
         Returns when the drone waits to be turned about `state.axis`.
         """
-        self._require(self.state.started, "magnetometer calibration")
+        self._commander.require_feature(self.state.started, "magnetometer calibration")
         await self._change(
             common.MagnetoCalibration(1),
             common.MagnetoCalibrationStartedChanged,
@@ -100,7 +100,7 @@ class Calibration(Commanding[CalibrationState]):
 
     async def abort_magnetometer(self, timeout: float = ANSWER_TIMEOUT) -> None:
         """Abort the calibration; returns when none is running."""
-        self._require(self.state.started, "magnetometer calibration")
+        self._commander.require_feature(self.state.started, "magnetometer calibration")
         await self._change(
             common.MagnetoCalibration(0),
             common.MagnetoCalibrationStartedChanged,
@@ -116,7 +116,7 @@ class Calibration(Commanding[CalibrationState]):
         drone reports its end alike in each case, and the axes before or after that: an end without all axes is a
         success only if they are not reported at all, and the drone requires no calibration `ANSWERED_WITHIN` later.
         """
-        self._require(self.state.started, "magnetometer calibration")
+        self._commander.require_feature(self.state.started, "magnetometer calibration")
         failure = CommandRejected("failed or aborted")
 
         def judge(message: Any) -> bool | AnafiMavError | None:

@@ -178,7 +178,7 @@ class Home(Commanding[HomeState]):
 
     async def set_ending(self, ending: RthEndingBehavior) -> RthEndingBehavior:
         """Set the end of a return: landing or hovering."""
-        self._require(self.state.ending, rth.SetEndingBehavior.NAME)
+        self._commander.require_feature(self.state.ending, rth.SetEndingBehavior.NAME)
         return await self._change(
             rth.SetEndingBehavior(ending),
             rth.EndingBehavior,
@@ -194,12 +194,12 @@ class Home(Commanding[HomeState]):
 
     async def set_delay(self, seconds: int) -> int:
         """Set the time between the loss of the link and the return, s."""
-        self._require(self.state.delay_s, rth.SetDelay.NAME)
+        self._commander.require_feature(self.state.delay_s, rth.SetDelay.NAME)
         return await self._change(rth.SetDelay(seconds), rth.Delay, lambda m: int(m.delay), same_as(seconds))
 
     async def set_by_itself(self, allowed: bool) -> bool:
         """Allow or forbid the drone's own return at low battery."""
-        self._require(self.state.by_itself, rth.SetAutoTriggerMode.NAME)
+        self._commander.require_feature(self.state.by_itself, rth.SetAutoTriggerMode.NAME)
         return await self._change(
             rth.SetAutoTriggerMode(RthAutoTriggerMode.ON if allowed else RthAutoTriggerMode.OFF),
             rth.AutoTriggerMode,
@@ -223,7 +223,7 @@ class Home(Commanding[HomeState]):
 
         Raises `NotSupported` for a kind that this drone does not have.
         """
-        self._require(self.state.preferred_type, rth.SetPreferredHomeType.NAME)
+        self._commander.require_feature(self.state.preferred_type, rth.SetPreferredHomeType.NAME)
         if self.state.types is not None and kind not in self.state.types:
             raise NotSupported(f"home of type {kind.name.lower()}")
         return await self._change(
@@ -247,7 +247,7 @@ class Home(Commanding[HomeState]):
         wanted = position(latitude, longitude, altitude)
         if wanted is None:
             raise LocalProtocolError(f"no place on earth: {latitude}, {longitude}, {altitude}")
-        self._require(self.state.types, rth.SetCustomLocation.NAME)
+        self._commander.require_feature(self.state.types, rth.SetCustomLocation.NAME)
         if self.state.types is not None and RthHomeType.CUSTOM not in self.state.types:
             raise NotSupported("home of type custom")
 
@@ -271,7 +271,7 @@ class Home(Commanding[HomeState]):
 
     async def set_precise(self, on: bool) -> bool:
         """Switch the precise return, which looks for the picture of the take-off place."""
-        self._require(self.state.precise_mode, precise_home.SetMode.NAME)
+        self._commander.require_feature(self.state.precise_mode, precise_home.SetMode.NAME)
         return await self._change(
             precise_home.SetMode(PreciseHomeMode.STANDARD if on else PreciseHomeMode.DISABLED),
             precise_home.Mode,

@@ -30,7 +30,7 @@ class Sound(Commanding[SoundState]):
 
     async def start(self) -> None:
         """Start the alert sound; returns when the drone beeps."""
-        self._require(self.state.playing, "alert sound")
+        self._commander.require_feature(self.state.playing, "alert sound")
         await self._change(
             ardrone3.StartAlertSound(),
             ardrone3.AlertSound,
@@ -39,7 +39,7 @@ class Sound(Commanding[SoundState]):
 
     async def stop(self) -> None:
         """Stop the alert sound; returns when the drone is silent."""
-        self._require(self.state.playing, "alert sound")
+        self._commander.require_feature(self.state.playing, "alert sound")
         await self._change(
             ardrone3.StopAlertSound(),
             ardrone3.AlertSound,
