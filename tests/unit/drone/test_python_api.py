@@ -20,7 +20,8 @@ Aim Alerts AlertsState AnafiMavError Angles Animations AnimationsState Antiflick
 BatteryState Blocker BlockerKind Bracketing Burst Calibration CalibrationState Camera CameraKind CameraMode
 CameraState CamerasState Colour CommandRejected CommandTimeout Controller ControllerState Displacement Drone
 ExposureMode ExposureSettings Feature FlightLog FlightLogs FlightPlan FlightPlanState FlyingState FollowMe
-FollowMeState FrameMetadata Gimbal GimbalAttitude GimbalState Gps GpsState HandshakeRefused Home HomeState Identity
+FollowMeState FrameMetadata Gimbal GimbalAttitude GimbalCalibration GimbalState Gps GpsState HandshakeRefused Home
+HomeState Identity
 KnownDrone Limits Link LinkLost LinkState LocalProtocolError Location MODELS Media MediaItem MediaState Metering Model
 Move MoveEnd Ned NotSupported Notification Palette PhotoFile PhotoFormat PhotoMode PhotoOption PhotoSettings Picture
 Piloting PilotingCommand PilotingState Place PlanOnDrone PlayingState Poi PoiState Position Product ProductState
