@@ -256,7 +256,7 @@ class Drone:
         self._dismissed: common.DisconnectionCause | None = None
         """Cause with which the drone announced the end of the connection."""
         self._hover_due: str | None = None
-        """Serial number of the aircraft whose motion is to be stopped when its silence ends; None: of none."""
+        """Serial number of the aircraft whose motion is to be stopped when it is connected again; None: of none."""
         self._opening = False
         self._complete = False
         self._counters: Counter[str] = Counter()
@@ -310,7 +310,7 @@ class Drone:
             self._complete = True
             self.streams.link_up()
             self.video.link_up(self._video_route(session))
-            self._hover_after_silence()
+            self._hover_after_loss()
         finally:
             self._opening = False
         log.info("%s: connected to %s, protocol %d", self.name, self.identity, session.version)
@@ -381,11 +381,18 @@ class Drone:
         self._complete = True
         self.controller.link_heard()
         self.video.link_up(self._video_route(session))
-        self._hover_after_silence()
+        self._hover_after_loss()
         return True
 
-    def _hover_after_silence(self) -> None:
-        """Stop motion that continues from before a silence.
+    def _note_hover_due(self) -> None:
+        """Note that motion is to be stopped once the drone is connected again.
+
+        Where the pilot at a Skycontroller has control, nothing of ours flies, and a hover would be against him.
+        """
+        self._hover_due = None if self.controller.pilot_has_source else self.identity.serial
+
+    def _hover_after_loss(self) -> None:
+        """Stop motion that continues from before a silence, or before the end of a connection.
 
         A flight plan, a landing and a return are not stopped, and neither is another aircraft that answers there now.
         """
@@ -412,10 +419,8 @@ class Drone:
             return
         self._fading = session
         self._heard = asyncio.get_running_loop().create_future()
-        # Where the pilot at a Skycontroller has control, nothing of ours flies, and a hover would be against him.
-        is_ours = not self.controller.pilot_has_source
-        self._hover_due = self.identity.serial if is_ours else None
-        stops = self.piloting.stopping() if is_ours and self._has_motion_to_stop else ()
+        self._note_hover_due()
+        stops = self.piloting.stopping() if self._hover_due is not None and self._has_motion_to_stop else ()
         last = (*stops, *self.controller.hand_back_due)
         self._disconnected(reason, silent=True)
         for message in last:
@@ -698,6 +703,8 @@ class Drone:
             return
         if not session.silent:
             self._note_loss(session, silent=False)
+            if self._complete:  # behind a Skycontroller the drone does not notice, and flies its move on
+                self._note_hover_due()
         self._disconnected("closed" if reason.cancelled() else reason.result(), silent=False)
 
     def _disconnected(self, why: str, *, silent: bool) -> None:
@@ -735,6 +742,7 @@ class Drone:
                 await asyncio.sleep(0)  # a session sends at the end of a turn of the loop
                 await session.close()
                 self._on_lost(session, session.lost)
+                self._hover_due = None  # it ends by our will
         self.streams.link_lost()
         self.video.link_lost()
         await self.media.close()

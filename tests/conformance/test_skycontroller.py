@@ -292,6 +292,35 @@ async def test_pilot_gets_the_sticks_of_a_skycontroller_that_is_not_heard(versio
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] < north - 1.0, 10.0)
 
 
+async def test_goto_is_stopped_after_a_skycontroller_has_closed_the_connection() -> None:
+    """The drone does not notice it: it flew the goto on, in mode Hold."""
+    async with world(speed=1.0, skycontroller=3) as w:
+        await to_the_pilot(w)
+        assert await goto(w, 300.0, 10.0) == ACCEPTED
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 10.0, 20.0)
+        session, mark, began = w.drone.session, w.client.mark(), asyncio.get_running_loop().time()
+        assert session is not None
+        session.end("closed")
+        await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.hold, since=mark, timeout=15.0)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 5.0, since=began)
+        assert w.drone.pose.north < 100.0
+
+
+async def test_pilot_who_flies_as_the_connection_is_closed_is_left_alone() -> None:
+    async with world(speed=1.0, skycontroller=3) as w:
+        pilot, session = w.drone.skycontroller, w.drone.session
+        assert pilot is not None
+        assert session is not None
+        await to_the_pilot(w)
+        pilot.stick(PITCH_STICK, 60)
+        before, mark = heard(w, *ACTS), w.client.mark()
+        session.end("closed")
+        await w.client.heartbeat(lambda beat: True, since=mark, timeout=15.0)
+        north = w.drone.pose.north
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > north + 3.0, 10.0)
+        assert heard(w, *ACTS) == before
+
+
 @generations
 async def test_silence_while_pilot_flies_sends_nothing_against_him(generation: int) -> None:
     async with world(speed=1.0, skycontroller=generation) as w:
