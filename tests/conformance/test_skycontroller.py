@@ -19,6 +19,7 @@ from support.world import HOME, World, world
 
 from anafi_mav.arsdk.messages import alarms, skyctrl
 from anafi_mav.arsdk.messages.skyctrl import BatteryStatus, Source
+from anafi_mav.sim import SimulatedDrone
 from anafi_mav.sim.world.faults import Impairment
 
 PITCH_STICK = 3
@@ -304,6 +305,22 @@ async def test_goto_is_stopped_after_a_skycontroller_has_closed_the_connection()
         await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.hold, since=mark, timeout=15.0)
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 5.0, since=began)
         assert w.drone.pose.north < 100.0
+
+
+@generations
+async def test_sticks_that_are_grabbed_before_the_gateway_connects_fly_again(generation: int) -> None:
+    """A Skycontroller may keep the grab of a gateway that was killed: its pilot had no sticks until the next flight."""
+
+    def keep_grab(drone: SimulatedDrone) -> None:
+        assert drone.skycontroller is not None
+        drone.skycontroller.grabbed_axes = 0b1111
+
+    async with world(speed=1.0, skycontroller=generation, before=keep_grab) as w:
+        assert w.drone.skycontroller is not None
+        w.drone.skycontroller.press(1)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "hovering", 20.0)
+        w.drone.skycontroller.stick(PITCH_STICK, 60)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 3.0, 10.0)
 
 
 async def test_pilot_who_flies_as_the_connection_is_closed_is_left_alone() -> None:

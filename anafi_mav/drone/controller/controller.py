@@ -73,7 +73,7 @@ QUIET = 0.4
 second of the end."""
 
 CLAIM_EVERY = 1.0
-"""s between two attempts to give back a source that is ours by the Skycontroller's report only."""
+"""s between two attempts to give back a source, or sticks, that are ours by the Skycontroller's report only."""
 
 GOODBYE = 0.5
 """s to wait for the controller's answer when the connection is about to be closed."""
@@ -285,11 +285,21 @@ class Controller(Element[ControllerState]):
 
     def reactions(self) -> Mapping[type[Message], Callable[[Any, float], None]]:
         """Events to be shown to this element beyond its reducers."""
-        return {mapper.GrabAxisEvent: self._on_axis, skyctrl.PilotingSource: self._on_source}
+        return {
+            mapper.GrabAxisEvent: self._on_axis,
+            mapper.GrabState: self._on_grab,
+            skyctrl.PilotingSource: self._on_source,
+        }
 
     def _on_axis(self, message: mapper.GrabAxisEvent, now: float) -> None:
         if self.taken and STICKS >> message.axis & 1 and abs(message.value) > DEFLECTION:
             self._yield("stick moved")
+
+    def _on_grab(self, message: mapper.GrabState, now: float) -> None:
+        if not self.taken and message.axes & STICKS and loop_time() - self._gave_back >= CLAIM_EVERY:
+            # By an earlier connection or another program: nothing of ours flies, and the pilot's sticks are dead.
+            log.warning("the sticks of the Skycontroller were grabbed without a flight: released")
+            self._send_back()
 
     def _on_source(self, message: skyctrl.PilotingSource, now: float) -> None:
         if not self.taken:

@@ -638,6 +638,22 @@ async def test_source_of_an_earlier_connection_is_given_back() -> None:
         assert device.got(mapper.Grab)[-1].axes == 0
 
 
+async def test_sticks_of_the_pilot_that_are_found_grabbed_are_released() -> None:
+    """By an earlier connection, or another program: the pilot's sticks are dead, and nothing of ours flies."""
+    async with behind() as (_, device):
+        device.say(mapper.GrabState(0, STICKS, 0))
+        released = await device.until(mapper.Grab)
+        assert (released.buttons, released.axes) == (0, 0)
+
+
+async def test_wheels_that_are_found_grabbed_stay_so() -> None:
+    async with behind() as (drone, device):
+        device.say(mapper.GrabState(0, 1 << TILT, 0))
+        await asyncio.sleep(0.3)
+        assert drone.controller.state.grabbed_axes == 1 << TILT
+        assert device.got(mapper.Grab) == []
+
+
 async def test_host_stall_ends_the_active_flight_task() -> None:
     async with behind() as (drone, device):
         device.script[ardrone3.MoveTo] = under_way
