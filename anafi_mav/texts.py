@@ -426,6 +426,7 @@ ROLL_SIGN_VERIFIED = OperatorText("Roll sign verified")
 # == Follow ==
 
 TARGET_LOST = Reason("target lost")
+FOLLOW_DISTANCE = ReasonTemplate("{low:g}-{high:g} m from target", low=1, high=100)
 NO_TARGET = Reason("no target received")
 TARGET_IGNORED = Template("Target ignored: {reason}", reason="r" * REASON_BYTES)
 TARGET_FAR = ReasonTemplate("{distance:.0f} m away", distance=99999999)

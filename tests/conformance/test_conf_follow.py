@@ -11,6 +11,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.flavours import both
 from support.mav import NAN, Client
+from support.params import read
 from support.setpoints import allow_speed, heard, idle_mode, motion, said, streaming
 from support.world import HOLD, HOME, World, world
 
@@ -89,6 +90,40 @@ async def test_conf_107_a_target_leads(flavour: str) -> None:
         assert math.degrees(pose.yaw) == pytest.approx(45.0, abs=12.0)
         assert pose.up == pytest.approx(10.0, abs=0.5)
         assert (pose.vn, pose.ve) == pytest.approx((1.06, 1.06), abs=0.4)
+
+
+async def test_ardupilot_offsets_place_the_drone() -> None:
+    """4 m behind a target that walks to the north-east and 3 m to its right: 5 m at 143 deg from its course."""
+    async with world(speed=1.0, flavour="ardupilot") as w:
+        await w.take_off(8.0)
+        allow_speed(w)
+        for name, value in (("FOLL_OFS_X", -4.0), ("FOLL_OFS_Y", 3.0), ("FOLL_OFS_Z", -10.0), ("FOLL_ALT_TYPE", 1.0)):
+            await write(w, name, value)
+        for name, value in (("FOLL_OFS_X", -4.0), ("ANF_FOLLOW_DST", 5.0), ("ANF_FOLLOW_ANG", 143.13)):
+            assert (await read(w.client, name)).param_value == pytest.approx(value, abs=0.01)
+        began, half = now(), math.sqrt(0.5)
+
+        def where() -> tuple[float, float]:
+            walked = 1.5 * (now() - began) * half
+            return 5.0 + walked, walked
+
+        assert await follow(w.client, "ardupilot") == 0
+        async with streaming(w.client, lambda: target(*where(), (1.5 * half, 1.5 * half)), 0.5):
+            await asyncio.sleep(12.0)
+            pose, (north, east) = w.drone.pose, where()
+        assert pose.north - north == pytest.approx((-4.0 - 3.0) * half, abs=1.0)
+        assert pose.east - east == pytest.approx((-4.0 + 3.0) * half, abs=1.0)
+        assert pose.up == pytest.approx(10.0, abs=0.5)
+
+
+async def test_ardupilot_offset_at_the_target_is_refused() -> None:
+    async with world(flavour="ardupilot") as w:
+        mark = w.client.mark()
+        w.client.send(dialect.MAVLink_param_set_message(1, 1, b"FOLL_OFS_X", 0.0, 9))
+        kept = await w.client.wait("PARAM_VALUE", lambda m: m.param_id == "FOLL_OFS_X", since=mark)
+        assert kept.param_value == -8.0
+        text = "FOLL_OFS_X not set: 1-100 m from target"
+        await w.client.wait("STATUSTEXT", lambda m: m.text == text, since=mark)
 
 
 async def test_follow_height_below_1_m_keeps_the_present_height() -> None:

@@ -34,6 +34,7 @@ from anafi_mav.services.parameter.parameter_table import (
     put_end_of_return,
 )
 from anafi_mav.services.parameter.parameter_table_fence import FENCE_ARDUPILOT
+from anafi_mav.services.parameter.parameter_table_follow import FOLLOW_ARDUPILOT
 from anafi_mav.services.parameter.parameter_table_setup import SETUP_ARDUPILOT
 from anafi_mav.services.service import Host
 from anafi_mav.vehicle.base.move_heading import MoveHeading
@@ -228,4 +229,10 @@ FACTS_ARDUPILOT: tuple[Parameter, ...] = (
     ),
 )
 
-ARDUPILOT_NAMES: tuple[Parameter, ...] = (*ALIASES, *FENCE_ARDUPILOT, *FACTS_ARDUPILOT, *SETUP_ARDUPILOT)
+ARDUPILOT_NAMES: tuple[Parameter, ...] = (
+    *ALIASES,
+    *FENCE_ARDUPILOT,
+    *FOLLOW_ARDUPILOT,
+    *FACTS_ARDUPILOT,
+    *SETUP_ARDUPILOT,
+)

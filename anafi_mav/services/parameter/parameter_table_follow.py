@@ -1,14 +1,22 @@
-"""Parameters of mode Follow: the gateway's own settings, and their PX4 aliases.
+"""Parameters of mode Follow: the gateway's own settings, PX4's and ArduPilot's aliases.
 
-MAVSDK's follow me writes the aliases.
+MAVSDK's follow me writes PX4's. ArduPilot's offsets are in m from the target: X along its course, Y to its right, Z
+down (AP_Follow).
 """
 
 from __future__ import annotations
 
-from anafi_mav.services.parameter.parameter import Parameter, alias, mapped, own
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+from anafi_mav import texts
+from anafi_mav.services.parameter.parameter import Parameter, alias, fact, mapped, own
 from anafi_mav.services.parameter.parameter_codec import ParamType
 from anafi_mav.services.service import Host
-from anafi_mav.vehicle.follow import AltitudeMode
+from anafi_mav.units import DEG_PER_RAD
+from anafi_mav.vehicle.base.refusal import Refused
+from anafi_mav.vehicle.follow import REACH, AltitudeMode
 
 GROUP = "Follow"
 
@@ -39,8 +47,14 @@ def _number(
     )
 
 
-HEIGHT = _number("ANF_FOLLOW_HT", "height", "Height while following a target", 1.0, 500.0, 8.0, unit="m")
-DISTANCE = _number("ANF_FOLLOW_DST", "distance", "Distance while following a target", 1.0, 100.0, 8.0, unit="m")
+LOWEST, HIGHEST = 1.0, 500.0
+"""m of height."""
+
+NEAREST, FARTHEST = 1.0, 100.0
+"""m from the target over ground."""
+
+HEIGHT = _number("ANF_FOLLOW_HT", "height", "Height while following a target", LOWEST, HIGHEST, 8.0, unit="m")
+DISTANCE = _number("ANF_FOLLOW_DST", "distance", "Distance while following a target", NEAREST, FARTHEST, 8.0, unit="m")
 ANGLE = _number(
     "ANF_FOLLOW_ANG", "angle", "Side of the target, clockwise from its course", -180.0, 180.0, 180.0, unit="deg"
 )
@@ -86,4 +100,79 @@ FOLLOW_PX4: tuple[Parameter, ...] = (
     alias(RESPONSIVENESS, "FLW_TGT_RS"),
     mapped(ALTITUDE, "FLW_TGT_ALT_M", ParamType.INT32, ALTITUDE.values, {0: 0, 1: 1, 2: 2}),
     alias(TANGENTIAL, "FLW_TGT_MAX_VEL"),
+)
+
+
+Offsets = tuple[float, float]
+"""m ahead of the target and to its right."""
+
+MILLIMETRES = 3
+"""Decimals of an offset: the angle behind it is in degrees."""
+
+
+def _offsets(host: Host) -> Offsets:
+    settings = host.vehicle.follow.settings
+    angle = settings.angle / DEG_PER_RAD
+    ahead, right = settings.distance * math.cos(angle), settings.distance * math.sin(angle)
+    return round(ahead, MILLIMETRES), round(right, MILLIMETRES)
+
+
+def _put_offsets(host: Host, offsets: Offsets) -> None:
+    distance = math.hypot(*offsets)
+    if not NEAREST <= distance <= FARTHEST:
+        raise Refused(texts.FOLLOW, texts.FOLLOW_DISTANCE.fill(low=NEAREST, high=FARTHEST), lasting=True)
+    settings = host.vehicle.follow.settings
+    settings.distance, settings.angle = distance, math.atan2(offsets[1], offsets[0]) * DEG_PER_RAD
+
+
+def _offset(name: str, index: int, short: str, put: Callable[[Offsets, float], Offsets], default: float) -> Parameter:
+    """Return one of the two offsets over ground that are distance and angle for other clients."""
+    return replace(
+        DISTANCE,
+        name=name,
+        short=short,
+        read=lambda host: _offsets(host)[index],
+        write=own(lambda host, value: _put_offsets(host, put(_offsets(host), value))),
+        put=None,
+        limits=lambda host: (-FARTHEST, FARTHEST),
+        decimals=MILLIMETRES,
+        derived=True,
+        native=DISTANCE.name,
+        default=default,
+    )
+
+
+def _put_down(host: Host, value: float) -> None:
+    host.vehicle.follow.settings.height = -value
+
+
+OFFSET_DOWN = replace(
+    HEIGHT,
+    name="FOLL_OFS_Z",
+    short="Offset down from the reference of FOLL_ALT_TYPE",
+    read=lambda host: -HEIGHT.read(host),
+    write=own(_put_down),
+    put=None,
+    limits=lambda host: (-HIGHEST, -LOWEST),
+    derived=True,
+    native=HEIGHT.name,
+    default=-8.0,
+)
+
+FOLLOW_ARDUPILOT: tuple[Parameter, ...] = (
+    fact("FOLL_ENABLE", 1, "Mode Follow is available", ParamType.INT8, group=GROUP),
+    fact("FOLL_SYSID", 0, "The first sender of a target leads", ParamType.INT16, group=GROUP),
+    fact("FOLL_OFS_TYPE", 1, "Offsets are relative to the target's course", ParamType.INT8, group=GROUP),
+    fact("FOLL_YAW_BEHAVE", 1, "The nose is towards the target", ParamType.INT8, group=GROUP),
+    fact("FOLL_DIST_MAX", REACH, "A target farther away is not followed", ParamType.REAL32, unit="m", group=GROUP),
+    _offset("FOLL_OFS_X", 0, "Offset ahead of the target", lambda old, value: (value, old[1]), -8.0),
+    _offset("FOLL_OFS_Y", 1, "Offset to the right of the target", lambda old, value: (old[0], value), 0.0),
+    OFFSET_DOWN,
+    mapped(
+        ALTITUDE,
+        "FOLL_ALT_TYPE",
+        ParamType.INT8,
+        {0: "Target", 1: "Take-off point", 3: "Ground below"},
+        {0: AltitudeMode.TARGET, 1: AltitudeMode.TAKEOFF, 3: AltitudeMode.TERRAIN},
+    ),
 )
