@@ -32,12 +32,13 @@ from support.plans import Item
 from support.world import HOME, World, loopback, world
 
 from anafi_mav import geo, units
+from anafi_mav.arsdk.messages import common, gimbal
 from anafi_mav.arsdk.messages.ardrone3 import PoiMode, PoiStatus
 from anafi_mav.config import Config, DroneConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.mavlink import dialect as newer
 from anafi_mav.sim import DroneSpec, Simulator
-from anafi_mav.sim.world.faults import Impairment
+from anafi_mav.sim.world.faults import CLEAR, Impairment
 from anafi_mav.vehicle.base.modes import FlightMode
 
 ACCEPTED, DENIED, REJECTED, UNSUPPORTED = (
@@ -384,6 +385,34 @@ async def test_conf_074_payload_changed_during_a_pause_is_set_again(flavour: str
         await state(w, ACTIVE, seq=3)
         before, after = (entry.args["filepath"] for entry in w.commands("common.Mavlink.Start"))
         assert (before != after) is bool(changes)
+
+
+async def test_resumed_mission_that_aims_at_once_reports_no_change() -> None:
+    """Near to a way point the line after it, which aims, is reported in one frame with the resumption.
+
+    An event that is not acknowledged holds the others back, so that they share the next frame.
+    """
+    executed = common.MissionItemExecuted.NAME
+    aim = Item(MOUNT, 0.0, 0.0, z=TARGETING, p1=-60.0, p2=NAN, p3=NAN, p4=NAN, frame=2)
+    async with world(web=True) as w:
+        await put(w, [takeoff(6.0), way(40.0, 0.0, 6.0, p2=10.0), aim, way(60.0, 0.0, 6.0)])
+        await start(w)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 27.0, 30.0)
+        mark = w.client.mark()
+        assert (await w.client.command(PAUSE, 0.0)).result == ACCEPTED
+        await state(w, PAUSED, seq=1, since=mark)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["vn"]) < 0.1 and e.args["north"] > 30.0)
+        w.drone.faults.unreported = frozenset({gimbal.Attitude.NAME})
+        w.drone.faults.late = dict.fromkeys((common.MavlinkFilePlayingStateChanged.NAME, executed), 0.2)
+        w.client.send_command(PAUSE, 1.0)
+        await w.drone.wait_log(lambda e: e.kind == "command" and e.name == common.Start.NAME)
+        w.drone.faults.down = Impairment(loss=1.0)
+        w.drone.faults.battery = 80
+        await w.drone.wait_log(lambda e: e.name == executed and e.args["idx"] == 3)
+        w.drone.faults.down = CLEAR
+        await state(w, COMPLETE, since=mark)
+        said = [m.text for _, m in w.client.since(mark, "STATUSTEXT")]
+        assert "Mission resumes: gimbal or camera were changed" not in said
 
 
 @pytest.mark.parametrize("tilts", [True, False])

@@ -592,11 +592,13 @@ class MissionFlight(PlainTask):
         plan = self._vehicle.drone.flight_plan
         goes_on = plan.state.returns_on_disconnect is False if plan.starts_anywhere else None
         uid, line = work.prepared.uid, work.prepared.line + 1 if plan.starts_anywhere else 0
+        # Before the start: with its confirmation the drone may report lines whose effect takes a while.
+        is_changed = work.prepared.resumes and not self._payload_holds
         try:
             await plan.start(uid, line, continue_on_disconnect=goes_on, cause=work.attempt)
         except CommandRejected as error:
             raise DroneRefused(_refusal_text(plan.state, error)) from error
-        if work.prepared.resumes and not self._payload_holds:
+        if is_changed:
             self._vehicle.text(Severity.WARNING, texts.MISSION_PAYLOAD_CHANGED)
 
     def _require_freedom(self, attempt: MissionAttempt, *, ends_return: bool = False) -> None:
