@@ -606,6 +606,32 @@ async def test_line_of_the_file_before_that_is_reported_twice_is_none_of_the_new
         assert reached(w, mark) == [1, 2, 3]
 
 
+async def found_flying(w: World) -> None:
+    """`SQUARE` is flown while the link is lost for some seconds, in which the drone passes an item."""
+    await write(w.client, "ANF_MIS_RTH", 0, dialect.MAV_PARAM_TYPE_INT32)
+    await w.take_off(6.0)
+    await put(w, SQUARE)
+    assert (await w.client.command(START, 0, 0)).result == ACCEPTED
+    await state(w, ACTIVE, seq=1, since=0)
+    mark = w.client.mark()
+    w.drone.faults.mute = True
+    await w.drone.wait_log(lambda entry: entry.name == "item" and entry.args["index"] == 2, 40.0)
+    w.drone.faults.mute = False
+    await said(w, "Mission flying: at item 2 or later", mark)
+
+
+async def test_item_that_the_drone_has_passed_without_a_link_is_flown_to_again_when_it_is_chosen() -> None:
+    """After the loss of the link it is the last known item: the drone does not report how far it is."""
+    async with world(speed=1.0, web=True) as w:
+        await found_flying(w)
+        begun = w.drone.log[-1].t
+        assert (await w.client.command(CHOOSE, 1)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.name == "plan" and e.args["state"] == "playing", 10.0, since=begun)
+        mark = w.client.mark()
+        await state(w, COMPLETE, since=mark, timeout=60.0)
+        assert reached(w, mark) == [1, 2, 3]
+
+
 async def test_way_point_of_the_file_before_that_is_reported_late_as_skipped_is_none_of_the_new_file() -> None:
     async with world(speed=1.0, model="ai", web=True) as w:
         await w.take_off(6.0)

@@ -346,10 +346,12 @@ class MissionMachine:
         return 0 if self.rest is S.COMPLETE else self.progress.current
 
     def is_at(self, item: int) -> bool:
-        """Return True while this item is flown, with all turns of every loop to come."""
-        return (
-            self.state in (S.FLYING_FILE, S.FLYING_ITEM) and self.progress.current == item and not self.progress.jumps
-        )
+        """Return True while this item is flown, with all turns of every loop to come.
+
+        False in a plan that the drone was found flying, or that another controller has resumed: it may be further.
+        """
+        is_flown = self.state in (S.FLYING_FILE, S.FLYING_ITEM) and self.phase.plays is None
+        return is_flown and self.progress.current == item and not self.progress.jumps
 
     @property
     def ending(self) -> bool:
