@@ -382,6 +382,11 @@ async def test_conf_103_yaw_has_one_frame_and_agrees_with_the_heading() -> None:
         await turn_to(70.0, -1.0)
         await looks(w, yaw_absolute=locked)
 
+        # To north, given as a share of the range from the nose: half of 48 deg to the right.
+        half = dialect.MAVLink_gimbal_manager_set_manual_control_message(1, 1, LEVEL | YAW_LOCK, 1, NAN, 0.5, NAN, NAN)
+        w.client.send(half)
+        await looks(w, yaw_relative=24.0, yaw_absolute=math.degrees(w.drone.pose.yaw) + 24.0)
+
         # To the nose, given to north.
         assert await angles(w, -20.0, 60.0, LEVEL | EARTH_FRAME) == ACCEPTED
         await looks(w, yaw_absolute=60.0)

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from anafi_mav import texts, units
 from anafi_mav.drone import Aim
@@ -210,8 +210,11 @@ def from_manual(
 ) -> GimbalTarget | OperatorText:
     """Return the target of a GIMBAL_MANAGER_SET_MANUAL_CONTROL, or a reason to refuse it.
 
-    Its values are shares, -1..1: of the ranges (deg) on either side of 0, and of the speeds (deg/s) that are set.
+    Its values are shares, -1..1: of the ranges (deg) on either side of 0, and of the speeds (deg/s) that are set. The
+    range of yaw is that from the nose, whichever frame the axis is held in.
     """
+    if not frames.flags & dialect.GIMBAL_MANAGER_FLAGS_YAW_IN_EARTH_FRAME:
+        frames = replace(frames, flags=frames.flags | dialect.GIMBAL_MANAGER_FLAGS_YAW_IN_VEHICLE_FRAME)
     shares = (message.pitch, message.yaw, message.pitch_rate, message.yaw_rate)
     if any(abs(share) > 1.0 for share in shares):
         return texts.GIMBAL_SHARE

@@ -125,6 +125,13 @@ def test_manual_control_is_a_share_of_range_and_speed() -> None:
     assert read(1.1, NAN, NAN, NAN) == texts.GIMBAL_SHARE
 
 
+def test_manual_yaw_that_is_locked_to_north_is_a_share_of_the_range_from_the_nose() -> None:
+    """Half of 48 deg to the right of a nose at 170 deg is 194 deg from north."""
+    message = dialect.MAVLink_gimbal_manager_set_manual_control_message(1, 1, YAW_LOCK, 1, NAN, 0.5, NAN, NAN)
+    target = targets.from_manual(message, frames(YAW_LOCK, heading=170.0), {Axis.YAW: (-48.0, 48.0)}, {})
+    assert target == GimbalTarget({Axis.YAW: Aim(-166.0, ABSOLUTE)})
+
+
 @pytest.mark.parametrize(("id", "is_ours"), [(0, True), (NAN, True), (1, True), (154, True), (2, False), (171, False)])
 def test_device_ids_that_mean_the_gimbal(id: float, is_ours: bool) -> None:
     assert targets.is_device(id) is is_ours
