@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 from msgspec.structs import replace
 
@@ -35,7 +35,7 @@ from anafi_mav.arsdk.messages.camera import (
     WhiteBalanceTemperature,
     ZoomControlMode,
 )
-from anafi_mav.drone.element import FIRST, Range, Reducer, finite, members
+from anafi_mav.drone.element import EMPTY, FIRST, REMOVE, Range, Reducer, finite, members
 from anafi_mav.drone.payload.camera_enums import (
     Antiflicker,
     Bracketing,
@@ -82,6 +82,8 @@ from anafi_mav.errors import NotSupported
 
 FEATURE = "camera"
 
+OptionT = TypeVar("OptionT", PhotoOption, RecordingOption)
+
 _CAMERA_OF_CAPABILITY = 8
 """The number of a recording or photo capability has its camera above these bits (512 is the first of camera 2 in what
 anafi_ros recorded)."""
@@ -127,11 +129,12 @@ def _recording_option(state: CamerasState, m: wire.RecordingCapabilities) -> Cam
         words(Resolution, members(m.resolutions, wire.Resolution)),
         quantities(members(m.framerates, Framerate)),
         m.hdr == Supported.SUPPORTED,
+        m.id,
     )
-    if m.list_flags & FIRST:
+    if m.list_flags & (FIRST | EMPTY):
         state = replace(state, cameras={id: replace(one, recordings=()) for id, one in state.cameras.items()})
     id = m.id >> _CAMERA_OF_CAPABILITY
-    return changed(state, id, recordings=(*_camera(state, id).recordings, option)[:MAX_OPTIONS])
+    return changed(state, id, recordings=_with_option(_camera(state, id).recordings, option, m.list_flags))
 
 
 def _photo_option(state: CamerasState, m: wire.PhotoCapabilities) -> CamerasState:
@@ -140,11 +143,22 @@ def _photo_option(state: CamerasState, m: wire.PhotoCapabilities) -> CamerasStat
         words(PhotoFormat, members(m.photo_formats, wire.PhotoFormat)),
         words(PhotoFile, members(m.photo_file_formats, PhotoFileFormat)),
         m.hdr == Supported.SUPPORTED,
+        m.id,
     )
-    if m.list_flags & FIRST:
+    if m.list_flags & (FIRST | EMPTY):
         state = replace(state, cameras={id: replace(one, photos=()) for id, one in state.cameras.items()})
     id = m.id >> _CAMERA_OF_CAPABILITY
-    return changed(state, id, photos=(*_camera(state, id).photos, option)[:MAX_OPTIONS])
+    return changed(state, id, photos=_with_option(_camera(state, id).photos, option, m.list_flags))
+
+
+def _with_option(options: tuple[OptionT, ...], option: OptionT, flags: int) -> tuple[OptionT, ...]:
+    """Return the options of a camera after an event about one of them, with its list flags."""
+    if flags & EMPTY:
+        return options
+    others = [one for one in options if one.number != option.number]
+    if not flags & REMOVE:
+        others.append(option)
+    return tuple(others[:MAX_OPTIONS])
 
 
 def _camera(state: CamerasState, id: int) -> CameraState:

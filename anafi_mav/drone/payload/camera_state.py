@@ -110,6 +110,8 @@ class PhotoOption(msgspec.Struct, frozen=True):
     formats: frozenset[PhotoFormat]
     files: frozenset[PhotoFile]
     hdr: bool
+    number: int = 0
+    """Parrot's, within the camera's list. Not on the Ai."""
 
 
 class RecordingOption(msgspec.Struct, frozen=True):
@@ -119,6 +121,8 @@ class RecordingOption(msgspec.Struct, frozen=True):
     resolutions: frozenset[Resolution]
     framerates: tuple[float, ...]
     hdr: bool
+    number: int = 0
+    """Parrot's, within the camera's list. Not on the Ai."""
 
 
 class CameraState(msgspec.Struct, frozen=True):

@@ -116,7 +116,7 @@ def test_maps_and_lists_do_not_grow_without_end() -> None:
         gimbals = Gimbal.REDUCERS[gimbal.Alert](gimbals, gimbal.Alert(id, 0))
         cameras = Camera.REDUCERS[old.ZoomLevel](cameras, old.ZoomLevel(id, 1.0))
         cameras = Camera.REDUCERS[old.PhotoCapabilities](
-            cameras, old.PhotoCapabilities(0, 1, 1, 1, old.Supported.SUPPORTED, 0)
+            cameras, old.PhotoCapabilities(id, 1, 1, 1, old.Supported.SUPPORTED, 0)
         )
     assert len(gimbals) == len(cameras.cameras) == MAX_ITEMS
     modern = CamerasState()

@@ -330,6 +330,33 @@ async def test_zoom_is_clipped_repeated_and_replaced(device: ScriptedDevice, dro
         drone.camera.zoom_rate(NAN)
 
 
+async def test_capabilities_of_a_list_are_replaced_removed_and_emptied(device: ScriptedDevice, drone: Drone) -> None:
+    """By Parrot's list flags and the number of each; an event may be received twice."""
+
+    async def after(*events: Message) -> tuple[int, int]:
+        heard = asyncio.ensure_future(drone.expect(type(events[-1])))
+        await asyncio.sleep(0)
+        device.say(*events)
+        await heard
+        return len(drone.camera[0].recordings), len(drone.camera[0].photos)
+
+    def recording(number: int, resolution: int, flags: int) -> Message:
+        return old.RecordingCapabilities(number, 1, 1 << resolution, 1, old.Supported.SUPPORTED, flags)
+
+    def photo(number: int, flags: int) -> Message:
+        return old.PhotoCapabilities(number, 1, 1, 1, old.Supported.SUPPORTED, flags)
+
+    assert await after(recording(1, 1, 2)) == (2, 1)
+    assert await after(recording(1, 3, 2)) == (2, 1)
+    assert drone.camera[0].recordings[1].resolutions == {Resolution.R1080P}
+    assert await after(recording(1, 3, 8)) == (1, 1)
+    assert await after(photo(1, 2)) == (1, 2)
+    assert await after(photo(1, 2)) == (1, 2)
+    assert await after(photo(1, 8)) == (1, 1)
+    assert await after(recording(0, 0, 4)) == (0, 1)
+    assert await after(photo(0, 4)) == (0, 0)
+
+
 # -- the Ai
 
 CONFIG = new.Config(
