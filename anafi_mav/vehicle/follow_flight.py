@@ -83,7 +83,7 @@ class FollowFlight(PlainTask):
         Raises `Refused`.
         """
         if not self._vehicle.in_air:
-            raise Refused(texts.FOLLOW, texts.TAKE_OFF_FIRST)
+            raise Refused(texts.FOLLOW, texts.TAKE_OFF_FIRST if self._vehicle.on_ground else self._vehicle.activity)
         async with self._vehicle.control.acquire(self, by=by):
             self._following = Following(
                 TargetFollower(self.settings), VelocityController(self._motion()), client_of(by)

@@ -117,6 +117,26 @@ async def test_setpoint_before_its_mode_is_chosen_is_silent() -> None:
         assert refusals(w.client) == []
 
 
+async def test_setpoint_in_guided_during_a_landing_reports_the_landing() -> None:
+    async with world(speed=1.0, flavour="ardupilot") as w:
+        await w.take_off(10.0)
+        mark = w.client.mark()
+        assert (await w.client.command(dialect.MAV_CMD_NAV_LAND)).result == ACCEPTED
+        async with streaming(w.client, velocity(2.0)):
+            await w.client.wait("STATUSTEXT", lambda m: "Setpoint refused" in m.text, since=mark)
+        assert refusals(w.client, mark) == ["Setpoint refused: drone is landing"]
+
+
+async def test_follow_chosen_during_a_landing_reports_the_landing() -> None:
+    async with world(speed=1.0) as w:
+        await w.take_off(10.0)
+        mark = w.client.mark()
+        assert (await w.client.command(dialect.MAV_CMD_NAV_LAND)).result == ACCEPTED
+        ack = await w.client.command(SET_MODE, 1, 4, 8)
+        assert ack.result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
+        assert refusals(w.client, mark) == ["Follow refused: drone is landing"]
+
+
 async def test_climb_in_a_mode_of_another_client_is_reported() -> None:
     """The station arms and chooses Offboard: the program has to do both by itself."""
     async with world() as w:

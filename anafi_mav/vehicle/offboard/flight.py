@@ -388,7 +388,7 @@ class OffboardFlight(PlainTask):
         if self._takeoff.under_way and vehicle.control.mode is FlightMode.GUIDED:
             return None  # at its end the next setpoint is flown
         if not vehicle.in_air:
-            return texts.TAKE_OFF_FIRST
+            return vehicle.activity
         if vehicle.control.paused:
             return texts.PAUSED_BY_CLIENT
         if vehicle.mode is not FlightMode.GUIDED:
