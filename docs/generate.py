@@ -359,7 +359,7 @@ def dialect() -> str:
 PARAMETERS = """\
 # Parameters
 
-<!-- Made by docs/generate.py from anafi_mav/services/parameter_table*.py. -->
+<!-- Made by docs/generate.py from anafi_mav/services/parameter/parameter_table*.py. -->
 
 For people who set up a drone. After reading you know each parameter, its names for PX4's and ArduPilot's clients, and
 when a write counts.
@@ -378,9 +378,9 @@ QGroundControl and MAVSDK load by themselves over MAVLink FTP.
 | a read of a name that is not listed | PARAM_ERROR |
 | a read of an unknown value | -1; no parameter is ever NaN |
 
-The drone keeps its own settings, and the gateway keeps its settings for each drone. Six begin with their default at
-each start: `ANF_HAND_LAUNCH`, `ANF_CRUISE_SPEED`, `ANF_CLIMB_SPEED`, `ANF_FENCE_ON`, `ANF_SC_WHEELS` and
-`ANF_SC_BUTTONS`.
+The drone keeps its own settings, and the gateway keeps its settings for each drone. Seven begin with their default at
+each start: `ANF_HAND_LAUNCH`, `ANF_CRUISE_SPEED`, `ANF_CLIMB_SPEED`, `ANF_FENCE_ON`, `ANF_SC_OFFBOARD`, `ANF_SC_WHEELS`
+and `ANF_SC_BUTTONS`.
 """
 
 PARAMETERS_NATIVE = """
