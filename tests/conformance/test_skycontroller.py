@@ -323,6 +323,23 @@ async def test_sticks_that_are_grabbed_before_the_gateway_connects_fly_again(gen
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 3.0, 10.0)
 
 
+@generations
+async def test_goto_of_a_killed_gateway_flies_on_until_the_pilots_button(generation: int) -> None:
+    """The drone would miss the Skycontroller alone, which gives its pilot the sticks once it misses the gateway."""
+    async with world(speed=1.0, skycontroller=generation) as w:
+        pilot = w.drone.skycontroller
+        assert pilot is not None
+        await to_the_pilot(w)
+        assert await goto(w, 300.0, 10.0) == ACCEPTED
+        await source_is(w, Source.CONTROLLER)
+        w.drone.faults.mute = True  # what the gateway sends at its end is not received
+        await w.gateway.close()
+        await w.drone.wait_log(lambda e: pilot.source is Source.SKY_CONTROLLER and pilot.grabbed_axes == 0, 15.0)
+        assert w.drone.pose.vn > 3.0
+        pilot.press(1)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
+
+
 async def test_pilot_who_flies_as_the_connection_is_closed_is_left_alone() -> None:
     async with world(speed=1.0, skycontroller=3) as w:
         pilot, session = w.drone.skycontroller, w.drone.session
