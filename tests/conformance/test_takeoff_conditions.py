@@ -9,8 +9,9 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.fault_scenarios import ACCEPTED, ARM, REJECTED, TAKEOFF_CMD, goto, heard, watched
 from support.mav import NAN
 from support.params import write
-from support.world import ARMED, MODES, world
+from support.world import ARMED, HOME, MODES, world
 
+from anafi_mav import geo
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.alarms import TakeoffChecklist, TakeoffChecklistType
 from anafi_mav.sim import SimulatedDrone
@@ -63,6 +64,29 @@ async def test_armed_state_expires_after_a_takeoff_that_the_drone_has_not_begun(
         await w.client.heartbeat(lambda beat: beat.base_mode & ARMED)
         await w.client.heartbeat(lambda beat: not beat.base_mode & ARMED, timeout=2.0 * AUTO_DISARM)
         assert math.isclose(now() - began, AUTO_DISARM, abs_tol=1.5)
+
+
+async def test_takeoff_with_a_place_elsewhere_reports_that_it_is_ignored() -> None:
+    async with world() as w:
+        mark = w.client.mark()
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        latitude, longitude = geo.destination(*HOME[:2], 30.0, 40.0)
+        ack = await w.client.command(TAKEOFF_CMD, 0, 0, 0, NAN, x=latitude, y=longitude, z=HOME[2] + 6.0)
+        assert ack.result == ACCEPTED
+        text = "Takeoff straight up: place 50 m away ignored"
+        await w.client.wait("STATUSTEXT", lambda m: m.text == text, since=mark)
+        await w.at_height(6.0)
+        assert math.hypot(w.drone.pose.north, w.drone.pose.east) < 0.5
+
+
+async def test_takeoff_with_the_place_of_the_drone_reports_nothing() -> None:
+    async with world() as w:
+        mark = w.client.mark()
+        assert (await w.client.command(ARM, 1)).result == ACCEPTED
+        ack = await w.client.command(TAKEOFF_CMD, 0, 0, 0, NAN, x=HOME[0], y=HOME[1], z=HOME[2] + 6.0)
+        assert ack.result == ACCEPTED
+        await w.at_height(6.0)
+        assert [m.text for _, m in w.client.since(mark, "STATUSTEXT") if "straight up" in m.text] == []
 
 
 async def test_mode_during_the_climb_is_takeoff() -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from anafi_mav import texts
+from anafi_mav import geo, texts
 from anafi_mav.mavlink import dialect
 from anafi_mav.mavlink.node import Inbound
 from anafi_mav.services.commands import (
@@ -26,6 +26,8 @@ from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
 from anafi_mav.vehicle.base.right import Extent, Right
+from anafi_mav.vehicle.base.severity import Severity
+from anafi_mav.vehicle.mission.path import AWAY
 from anafi_mav.vehicle.vehicle import Vehicle
 
 FORCE = 21196
@@ -108,14 +110,25 @@ class FlightService(Service):
 
         Unset: the height of MIS_TAKEOFF_ALT. COMMAND_LONG with latitude and longitude exactly 0, or from a client whose
         family means it so: above the take-off point (MAVProxy, dronekit, Mission Planner). Any other COMMAND_LONG: AMSL
-        (QGroundControl). COMMAND_INT: as its frame says. The position is not used: an ANAFI takes off where it stands.
+        (QGroundControl). COMMAND_INT: as its frame says. The position is not used: an ANAFI takes off where it stands,
+        and a text reports a position elsewhere.
         """
         vehicle = self.host.vehicle
         relative = command.flavour.relative_takeoff or (command.x == 0.0 and command.y == 0.0)
         if command.frame is None and relative and not math.isnan(command.z):
             await vehicle.take_off(command.z, command.right)
-            return
-        await vehicle.take_off(command.height(vehicle), command.right)
+        else:
+            await vehicle.take_off(command.height(vehicle), command.right)
+        self._report_place(command)
+
+    def _report_place(self, command: Command) -> None:
+        """Report that the position of a take-off command is not used, when it is elsewhere."""
+        here = self.host.vehicle.place
+        if here is None or not (abs(command.x) <= 90.0 and abs(command.y) <= 180.0) or command.x == command.y == 0.0:
+            return  # unset; QGroundControl and MAVSDK send NaN, the others 0
+        metres = geo.distance(here.latitude, here.longitude, command.x, command.y)
+        if metres > AWAY:
+            self.host.text(Severity.WARNING, texts.TAKEOFF_PLACE.fill(metres=metres))
 
     async def _reposition(self, command: Command) -> None:
         """Run MAV_CMD_DO_REPOSITION: go to a place, height and heading.
