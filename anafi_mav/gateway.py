@@ -110,6 +110,8 @@ def state_in_use(folder: Path, holder: Holder) -> ConfigError:
 
 def download_folder(media: MediaConfig) -> Path | None:
     """Return the folder for copies of media; None: they are not copied. Raises `ConfigError`."""
+    if "\0" in (media.download_folder or ""):
+        raise ConfigError("media.download_folder", f"expected the path of a folder, got {media.download_folder!r}")
     try:
         return None if media.download_folder is None else Path(media.download_folder).expanduser()
     except RuntimeError as error:  # no such home

@@ -297,7 +297,7 @@ def check_folder(folder: Path, *names: str) -> None:
     Nothing is made.
     """
     present = folder
-    while not os.path.lexists(present):
+    while not _exists(present):
         present = present.parent
     if not present.is_dir():
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
@@ -308,6 +308,18 @@ def check_folder(folder: Path, *names: str) -> None:
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(file))
         if file.exists() and not os.access(file, os.W_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(file))
+
+
+def _exists(path: Path) -> bool:
+    """Return True for what exists, also a link that leads nowhere.
+
+    Raises `OSError` for a name that cannot exist, as one that is too long.
+    """
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    return True
 
 
 def replace_file(path: Path, data: bytes) -> None:

@@ -109,6 +109,8 @@ def test_check_shows_the_warnings_of_a_start(tmp_path: Path, capsys: pytest.Capt
     [
         ("FOLDER/fleet.yaml/x", "media.download_folder: WRONG: FOLDER/fleet.yaml/x: Not a directory"),
         ("~no-such-user/x", "media.download_folder: WRONG: expected the path of a folder: "),
+        ("FOLDER/" + 300 * "x", "media.download_folder: WRONG: FOLDER/" + 300 * "x" + ": File name too long"),
+        (r'"a\0b"', "media.download_folder: WRONG: expected the path of a folder, got 'a\\x00b'"),
         ("FOLDER/photos", "media.download_folder: ok: folder can be written: FOLDER/photos"),
     ],
 )
