@@ -32,7 +32,7 @@ from anafi_mav.mavlink.base import Endpoint, EndpointUrl, Outbox, Sink, shaped_c
 from anafi_mav.mavlink.channel import Channel
 from anafi_mav.mavlink.frames import ReceivedFrame
 from anafi_mav.mavlink.node import Inbound
-from anafi_mav.mavlink.peer_table import REPLACEABLE
+from anafi_mav.mavlink.peer_table import REPLACEABLE, PlaceLog
 from anafi_mav.mavlink.router import targets
 from anafi_mav.units import counted
 
@@ -133,6 +133,7 @@ class FabricEndpoint(Endpoint):
         """Looks at the router's tokens before the first claim."""
         self._stations: dict[str, _Station] = {}
         self._places = StationPlaces(url.options.max_clients)
+        self._place_log = PlaceLog(logger, self.url)
         self._silent: set[str] = set()
         """Stations that were lost by their silence, and whose tokens have not ended; `MAX_WAITING` at most."""
         self._readers: set[int] = set()
@@ -280,7 +281,8 @@ class FabricEndpoint(Endpoint):
                     self._add(key.owner)
                 else:
                     self.counters["refused_peers"] += 1
-                    logger.warning("%s: station %s waits: all places are taken", self.url, key.owner)
+                    now = self._clock.monotonic()
+                    self._place_log.warn("refused", f"station {key.owner} waits: all places are taken", now)
 
     def _claim(self) -> None:
         keys, session = self._connection.keys, self._connection.zenoh
@@ -330,7 +332,7 @@ class FabricEndpoint(Endpoint):
             if now - station.heard < REPLACEABLE or not self._places.has_waiting:
                 return
             self.counters["evicted_peers"] += 1
-            logger.warning("%s: station %s gives way, silent for %.0f s", self.url, name, now - station.heard)
+            self._place_log.warn("replaced", f"station {name} gives way, silent for {now - station.heard:.0f} s", now)
             station.lane.channel.ends_with_station = False
             self._drop(name)
             self._follow(self._places.give_way(name))

@@ -11,15 +11,12 @@ from typing import Any, ClassVar
 from anafi_mav.clock import Clock
 from anafi_mav.mavlink.base import Endpoint, EndpointUrl, Sink
 from anafi_mav.mavlink.channel import Channel
-from anafi_mav.mavlink.peer_table import PeerTable
+from anafi_mav.mavlink.peer_table import PeerTable, PlaceLog
 
 logger = logging.getLogger(__name__)
 
 SWEEP_EVERY = 5.0
 """s between looks for idle clients."""
-
-PLACES_EVERY = 10.0
-"""s between two lines in the log about places of one kind: each made-up address may cause one."""
 
 MAX_LOGGED = 64
 """Refused addresses that are logged, each once: an address is easily made up, and a log is read by people."""
@@ -42,8 +39,7 @@ class Listener(Endpoint):
             lambda peer: self._channel_of(peer).proved_at,
         )
         self._refused: set[str] = set()
-        self._lines: dict[str, tuple[float, int]] = {}
-        """Of each kind of line about places: when the next may be written, and how many were left out."""
+        self._place_log = PlaceLog(logger, self.url)
         self._sweep: asyncio.TimerHandle | None = None
 
     @abstractmethod
@@ -104,23 +100,11 @@ class Listener(Endpoint):
         other = self._table.replaceable(now, known=known)
         if other is None:
             self.counters["refused_peers"] += 1
-            self._log_place("refused", f"{name} refused: all {len(self._table)} places are taken", now)
+            self._place_log.warn("refused", f"{name} refused: all {len(self._table)} places are taken", now)
             return False
         self.counters["evicted_peers"] += 1
         silence = self._table.silence(other, now)
         kind = "known" if known else "unknown"
-        self._log_place(kind, f"{name} replaces {self._shown(other)}, silent for {silence:.0f} s", now)
+        self._place_log.warn(kind, f"{name} replaces {self._shown(other)}, silent for {silence:.0f} s", now)
         self._drop(other)
         return True
-
-    def _log_place(self, kind: str, text: str, now: float) -> None:
-        """Log which client has got a place, or none.
-
-        One line in ten seconds: a flood of addresses fills no log.
-        """
-        due, left_out = self._lines.get(kind, (now, 0))
-        if now < due:
-            self._lines[kind] = due, left_out + 1
-            return
-        self._lines[kind] = now + PLACES_EVERY, 0
-        logger.warning("%s: %s%s", self.url, text, f" ({left_out} more since the last line)" if left_out else "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Hashable
 from typing import Generic, TypeVar
 
@@ -10,6 +11,9 @@ PeerT = TypeVar("PeerT", bound=Hashable)
 REPLACEABLE = 5.0
 """s of silence after which a known client gives its place to another when all are taken: four or five missed
 heartbeats are a lost link (MAVLink heartbeat.md)."""
+
+PLACES_EVERY = 10.0
+"""s between two lines of one kind: each made-up client may cause one."""
 
 
 class PeerTable(Generic[PeerT]):
@@ -78,3 +82,25 @@ class PeerTable(Generic[PeerT]):
         """Return when a client was heard last, or got its place."""
         since, heard_at = self._since[peer], self._heard_at(peer)
         return since if heard_at is None else max(since, heard_at)
+
+
+class PlaceLog:
+    """Lines in the log about which client has got a place, or none.
+
+    One of each kind in `PLACES_EVERY` s, with the number of those left out: a flood of clients fills no log.
+    """
+
+    def __init__(self, logger: logging.Logger, url: str) -> None:
+        self._logger = logger
+        self._url = url
+        self._lines: dict[str, tuple[float, int]] = {}
+        """Of each kind: when the next line may be written, and how many were left out."""
+
+    def warn(self, kind: str, text: str, now: float) -> None:
+        """Write a line, or count it; `kind`: which lines it counts with."""
+        due, left_out = self._lines.get(kind, (now, 0))
+        if now < due:
+            self._lines[kind] = due, left_out + 1
+            return
+        self._lines[kind] = now + PLACES_EVERY, 0
+        self._logger.warning("%s: %s%s", self._url, text, f" ({left_out} more since the last line)" if left_out else "")

@@ -314,6 +314,18 @@ async def test_silent_station_gives_its_place_to_one_that_waits(monkeypatch: pyt
         assert counted(w, "refused_peers") == counted(w, "evicted_peers") == 1
 
 
+async def test_flood_of_stations_without_a_place_fills_no_log(caplog: pytest.LogCaptureFixture) -> None:
+    async with router() as node, world(endpoints=(f"{node.url}?max_clients=1",)) as w:
+        with await asyncio.to_thread(opened, node) as session:
+            names = [f"anafi/station/v1/{number:016x}-1" for number in range(1, 51)]
+            tokens = [session.liveliness().declare_token(name) for name in names]
+            while counted(w, "refused_peers") < 49:
+                await watched(0.05)
+            assert len([line for line in caplog.messages if "all places are taken" in line]) == 1
+            for token in tokens:
+                token.undeclare()
+
+
 async def test_killed_gateway_that_returns_is_found_by_its_stations(tmp_path: Path) -> None:
     file = tmp_path / "fleet.yaml"
     async with router() as node, ground(node.url) as port:
