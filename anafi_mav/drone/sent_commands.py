@@ -42,6 +42,9 @@ reports anything."""
 LATE_LINES = 2.0
 """s after the end of a flight plan in which lines of it may still be reported."""
 
+UNKNOWN_LINE = -2
+"""Newest line of a plan that this program has not started, or that began before the session, until one is reported."""
+
 TAKEN_OFF = frozenset({FlyingState.TAKINGOFF, FlyingState.HOVERING, FlyingState.FLYING})
 RISING = TAKEN_OFF | {FlyingState.MOTOR_RAMPING}
 
@@ -200,9 +203,10 @@ class SentCommand(msgspec.Struct, eq=False):
     def continues(self, line: int, now: float) -> bool:
         """Return True for a line that repeats or follows the newest one.
 
-        False once its plan has ended `LATE_LINES` ago.
+        Any line does that while the newest one is unknown. False once its plan has ended `LATE_LINES` ago.
         """
-        return self.line <= line <= self.line + 1 and now < self.ended_at + LATE_LINES
+        follows = self.line == UNKNOWN_LINE or self.line <= line <= self.line + 1
+        return follows and now < self.ended_at + LATE_LINES
 
     def apply(self, event: Event, now: float = -math.inf) -> None:
         """Change the phase. `now` is needed for WITHDRAWN and ABANDONED."""
@@ -223,6 +227,9 @@ class SentCommands:
 
     def __init__(self) -> None:
         self._slots: dict[Slot, deque[SentCommand]] = {slot: deque(maxlen=KEPT) for slot in Slot}
+        self._foreign: SentCommand | None = None
+        """The newest start of a plan by another controller, or by this program in an earlier session: its lines may be
+        reported after the start of the next plan."""
 
     def place(self, sent: SentCommand, now: float) -> list[SentCommand]:
         """Add a command; return those that it replaces, whose verbs are not to wait any longer."""
@@ -307,8 +314,8 @@ class SentCommands:
 
     def newest_line(self, plan: str) -> int:
         """Return the newest line of this plan that was reported as executed, from 0; -1: none."""
-        named = self._plan_named(plan)
-        return -1 if named is None else named.line
+        starts = (self._plan_named(plan), self._foreign)
+        return max([-1, *(one.line for one in starts if one is not None and one.target == plan)])
 
     def rule_out(self) -> None:
         """Note that no withdrawn command starts the motors any more.
@@ -335,6 +342,7 @@ class SentCommands:
         """Forget all: the commands of an earlier session do not count in a new one."""
         for commands in self._slots.values():
             commands.clear()
+        self._foreign = None
 
     # -- what the drone reports
 
@@ -406,11 +414,18 @@ class SentCommands:
             if one is not sent and one.is_in_effect:
                 one.ended_at = now
                 one.apply(Event.OVER)  # the drone plays one plan at a time
+        foreign = self._foreign
         if sent is not None:
             sent.target = uid or sent.target
             if not sent.is_in_effect:
                 sent.begun_at = now
             sent.apply(Event.EXECUTED)
+            if foreign is not None:
+                foreign.ended_at = min(foreign.ended_at, now)
+        elif foreign is None or foreign.target != uid or foreign.ended_at < math.inf:
+            is_unknown = self._plan_named(uid) is None and (foreign is None or foreign.target != uid)
+            line = UNKNOWN_LINE if is_unknown else self.newest_line(uid)
+            self._foreign = SentCommand(Slot.PLAN, uid, phase=Phase.ENDED, line=line, begun_at=now)
         return sent
 
     def attribute_line(self, line: int, now: float) -> tuple[SentCommand | None, bool]:
@@ -433,17 +448,16 @@ class SentCommands:
         that of the plan that plays, is therefore one of the plan before. One that neither repeats nor follows it, and
         that the newest start begins with, precedes the report that the plan of that start plays.
         """
-        sent, before, unbegun = None, None, None
-        for one in self._slots[Slot.PLAN]:
-            if one.begun_at > -math.inf:
-                before, sent, unbegun = sent, one, None
-            else:
-                unbegun = one
+        plans, foreign = self._slots[Slot.PLAN], self._foreign
+        started = [one for one in plans if one.begun_at > -math.inf]
+        begun = sorted([*started, *([foreign] if foreign is not None else [])], key=lambda one: one.begun_at)
+        before, sent = [None, None, *begun][-2:]
+        unbegun = plans[-1] if plans and plans[-1].begun_at == -math.inf else None
         if unbegun is not None and line == unbegun.line + 1 and (sent is None or not sent.continues(line, now)):
             return unbegun, False
-        if sent is not None and before is not None and line != sent.line + 1 and before.continues(line, now):
-            return before, True
-        return sent, False
+        if sent is None or before is None or sent.line == UNKNOWN_LINE or line == sent.line + 1:
+            return sent, False
+        return (before, True) if before.continues(line, now) else (sent, False)
 
     def _attribute_stopped(self, uid: str, now: float) -> SentCommand | None:
         """PAUSED and STOPPED name the plan or nothing.
@@ -451,8 +465,10 @@ class SentCommands:
         - One that names another plan of this program than the one that plays is an older one.
         - Without a plan that plays it answers the command against a withdrawn start. That start may still begin.
         """
-        plans, named = self._slots[Slot.PLAN], self._plan_named(uid)
+        plans, named, foreign = self._slots[Slot.PLAN], self._plan_named(uid), self._foreign
         playing = next((one for one in plans if one.is_in_effect), None)
+        if foreign is not None and (playing is None or uid == foreign.target != playing.target):
+            foreign.ended_at = min(foreign.ended_at, now)
         if playing is not None:
             if named is not None and named.target != playing.target:
                 return named

@@ -632,6 +632,25 @@ async def test_item_that_the_drone_has_passed_without_a_link_is_flown_to_again_w
         assert reached(w, mark) == [1, 2, 3]
 
 
+async def test_line_of_a_file_that_another_controller_has_resumed_is_none_of_the_new_file() -> None:
+    async with world(speed=1.0, web=True) as w:
+        await w.take_off(6.0)
+        await put(w, SQUARE)
+        assert (await w.client.command(START, 0, 0)).result == ACCEPTED
+        await state(w, ACTIVE, seq=1, since=0)
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        (command,) = w.commands(common.Start.NAME)
+        another_controller(w, common.Start(**command.args))
+        await said(w, "Mission resumed by another controller")
+        w.drone.faults.late = {EXECUTED: 0.8}
+        await w.drone.wait_log(lambda entry: entry.name == "item" and entry.args["index"] == 3, 40.0)
+        mark, begun = w.client.mark(), w.drone.log[-1].t
+        assert (await w.client.command(CHOOSE, 0)).result == ACCEPTED
+        await w.drone.wait_log(lambda e: e.name == "plan" and e.args["state"] == "stopped", 60.0, since=begun + 2.0)
+        await state(w, COMPLETE, since=mark, timeout=60.0)
+        assert reached(w, mark) == [0, 1, 2, 3]
+
+
 async def test_way_point_of_the_file_before_that_is_reported_late_as_skipped_is_none_of_the_new_file() -> None:
     async with world(speed=1.0, model="ai", web=True) as w:
         await w.take_off(6.0)

@@ -417,6 +417,42 @@ def test_line_before_the_report_of_its_plan_continues_no_plan_that_ended_long_ag
     assert (new.line, third.line) == (-1, 0)
 
 
+@pytest.mark.parametrize("is_ended", [False, True])
+def test_line_of_a_plan_from_before_the_session_is_late_for_two_seconds(sent: SentCommands, is_ended: bool) -> None:
+    """The drone reports at the connection that it plays a plan, and not how far it is."""
+    sent.attribute(playing(PLAYING, "a"), 1.0)
+    if is_ended:
+        sent.attribute(playing(STOPPED, "a"), 10.0)
+    new = plan("b", before="a")
+    sent.place(new, 10.0)
+    assert sent.attribute(playing(PLAYING, "b"), 10.0) is new
+    assert [sent.attribute_line(*line)[1] for line in ((2, 10.5), (0, 10.6), (3, 10.7), (1, 10.8))] == [
+        True,
+        False,
+        True,
+        False,
+    ]
+    assert new.line == 1
+    assert sent.attribute_line(4, 12.1) == (new, False)
+
+
+def test_lines_of_a_paused_plan_that_another_controller_resumes_are_not_late(sent: SentCommands) -> None:
+    one = plan("a")
+    sent.place(one, 0.0)
+    sent.attribute(playing(PLAYING, "a"), 0.1)
+    lines(sent, (0, 1.0), (1, 2.0))
+    sent.attribute(playing(common.PlayingState.PAUSED, "a"), 2.5)
+    sent.attribute(playing(PLAYING, "a"), 3.0)
+    assert [sent.attribute_line(*line)[1] for line in ((2, 3.5), (3, 4.0))] == [False, False]
+    sent.attribute(playing(common.PlayingState.PAUSED, "a"), 4.1)
+    again = plan("a")
+    again.line = sent.newest_line("a")
+    sent.place(again, 4.2)
+    sent.attribute(playing(PLAYING, "a"), 4.3)
+    assert again.line == 3
+    assert sent.attribute_line(4, 4.5) == (again, False)
+
+
 def test_skipped_line_is_attributed_like_an_executed_one_and_not_noted_as_executed(sent: SentCommands) -> None:
     old, new = two_plans(sent, 0, 1)
     assert [sent.plan_of_line(line, 10.5) for line in (2, 0, 2)] == [(old, True), (new, False), (old, True)]
