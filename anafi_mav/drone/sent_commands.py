@@ -13,6 +13,7 @@ import itertools
 import math
 from collections import deque
 from collections.abc import Mapping
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import msgspec
@@ -450,7 +451,7 @@ class SentCommands:
         """
         plans, foreign = self._slots[Slot.PLAN], self._foreign
         started = [one for one in plans if one.begun_at > -math.inf]
-        begun = sorted([*started, *([foreign] if foreign is not None else [])], key=lambda one: one.begun_at)
+        begun = sorted([*started, *([foreign] if foreign is not None else [])], key=attrgetter("begun_at"))
         before, sent = [None, None, *begun][-2:]
         unbegun = plans[-1] if plans and plans[-1].begun_at == -math.inf else None
         if unbegun is not None and line == unbegun.line + 1 and (sent is None or not sent.continues(line, now)):
