@@ -704,6 +704,60 @@ def _camera_rows(system: Any) -> str:
     return "".join(parts)
 
 
+COMMANDS = """\
+# Commands
+
+<!-- Made by docs/generate.py from the tables of the services and tests/support/autopilot_commands.py. -->
+
+For people who write a MAVLink program or wonder about a refusal. After reading you know which commands fly the vehicle.
+
+A command goes to the vehicle's system id and component 1, as COMMAND_LONG or COMMAND_INT. One to component 0 is
+answered by the component that has it. Those of camera, gimbal, storage and video are in [camera.md](camera.md). Every
+other one is UNSUPPORTED.
+
+ACCEPTED means that the drone has confirmed it. IN_PROGRESS is sent while it takes longer, and a refusal has a
+STATUSTEXT with the reason ([texts](texts.md)). COMMAND_CANCEL ends a command under way, but no take-off, landing,
+return or other stop.
+
+"place": x and y are latitude and longitude. "height": z is one. "frame": as its frame says, above mean sea level in a
+COMMAND_LONG. "AMSL": above mean sea level in relative frames too, except for clients of the ArduPilot flavour.
+
+| id | MAV_CMD | what it does | place | height | flavours |
+|---|---|---|---|---|---|
+"""
+
+
+def commands() -> str:
+    """docs/commands.md."""
+    import asyncio
+
+    from support import autopilot_commands, camera_commands
+
+    async def rows() -> str:
+        return _command_rows(*camera_commands.make_system().components, dict(autopilot_commands.FLIGHT))
+
+    return asyncio.run(rows())
+
+
+def _command_rows(autopilot: Any, camera: Any, texts: dict[str, str]) -> str:
+    from support import autopilot_commands
+
+    from anafi_mav.services.commands import Altitude
+    from anafi_mav.services.flavours import ARDUPILOT, PX4, STANDARD
+
+    heights = {Altitude.UNUSED: "–", Altitude.BY_FRAME: "frame", Altitude.AMSL: "AMSL"}
+    flavours = {"PX4": PX4, "ArduPilot": ARDUPILOT, "standard": STANDARD}
+    parts = [COMMANDS]
+    for id, name, row in autopilot_commands.rows(autopilot, camera):
+        offered = [title for title, flavour in flavours.items() if row is None or row.offered(flavour)]
+        place, height = ("–", "–") if row is None else ("yes" if row.location else "–", heights[row.altitude])
+        clients = "all" if len(offered) == len(flavours) else ", ".join(offered)
+        parts.append(f"| {id} | {name} | {texts.pop(name)} | {place} | {height} | {clients} |\n")
+    if texts:
+        raise ValueError(f"tests/support/autopilot_commands.py: no component has {', '.join(texts)}")
+    return "".join(parts)
+
+
 SILENCE = """\
 # Commands that the simulator does not answer
 
@@ -982,6 +1036,7 @@ def dropped_inputs() -> str:
 PAGES: dict[str, Callable[[], str]] = {
     "camera.md": camera,
     "camera-settings.md": camera_settings,
+    "commands.md": commands,
     "configuration.md": configuration,
     "dialect.md": dialect,
     "dropped-inputs.md": dropped_inputs,

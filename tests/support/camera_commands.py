@@ -56,7 +56,7 @@ REASONS = {
 """By name; everything else that has one of the words is in a table of a service."""
 
 
-def _is_payload(name: str) -> bool:
+def is_payload(name: str) -> bool:
     return any(word in name for word in WORDS) and name not in NOT_PAYLOAD
 
 
@@ -64,14 +64,14 @@ def commands() -> Iterator[tuple[int, str]]:
     """Number and name of all MAV_CMD about the payload."""
     for id, entry in sorted(dialect.enums["MAV_CMD"].items()):
         name = entry.name.removeprefix("MAV_CMD_")
-        if _is_payload(name):
+        if is_payload(name):
             yield id, name
 
 
 def messages() -> Iterator[tuple[int, str]]:
     """Number and name of all messages about the payload."""
     for id, kind in sorted(dialect.mavlink_map.items()):
-        if _is_payload(kind.msgname) and not kind.msgname.startswith("ANAFI"):
+        if is_payload(kind.msgname) and not kind.msgname.startswith("ANAFI"):
             yield id, kind.msgname
 
 
