@@ -566,6 +566,21 @@ async def test_conf_143_kinds_of_a_fence_and_its_switch_are_independent() -> Non
         assert ack.result == DENIED
 
 
+@pytest.mark.parametrize("way", ["command", "parameter"])
+async def test_fence_switched_off_by_one_client_is_reported_to_all(way: str) -> None:
+    async with world(clients=2) as w:
+        first, second = w.clients
+        assert (await upload(first, square(PLACE, 30.0), FENCE)).type == TAKEN
+        mark = second.mark()
+        for _ in range(2):  # the second time changes nothing
+            if way == "command":
+                assert (await first.command(ENABLE, 0)).result == ACCEPTED
+            else:
+                assert (await put(w, "ANF_FENCE_ON", 0)).param_value == 0
+        await bits(second, True, False, True)
+        assert [text for text in texts(second, mark) if "Fence" in text] == ["Fence off: no boundary is in force"]
+
+
 async def test_fence_switched_on_without_a_boundary_is_reported() -> None:
     """Accepted, for a fence that is uploaded later is to be in force."""
     async with world() as w:

@@ -66,7 +66,7 @@ async def _enable(host: Host, value: float) -> None:
     if value == 1:
         host.vehicle.fence.enable()
     else:
-        host.vehicle.fence.disable()
+        host.vehicle.disable_fence()
 
 
 FENCE_ENABLED = Parameter(

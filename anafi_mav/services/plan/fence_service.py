@@ -333,5 +333,5 @@ class FenceService(Service):
             if not watch.in_force and not own_circle:
                 self.host.text(Severity.WARNING, texts.FENCE_ON_WITHOUT)
         else:
-            watch.disable(int(wanted))
+            self.host.vehicle.disable_fence(int(wanted))
         self._look(self.host.clock.monotonic())

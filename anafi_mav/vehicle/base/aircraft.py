@@ -33,7 +33,7 @@ from anafi_mav.vehicle.base.requester import By
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.roll_sign import RollCheck, RollSign
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.fence.fence_watch import FenceWatch, OutsideFence
+from anafi_mav.vehicle.fence.fence_watch import EVERYTHING, FenceWatch, OutsideFence
 from anafi_mav.vehicle.fence.rally import RallyPoints
 
 ALTITUDE_WAIT = 3.0
@@ -225,6 +225,13 @@ class Aircraft(Conditions):
         if home is not None:
             return GeoPoint(home.latitude, home.longitude)
         return self.place if self.on_ground else None
+
+    def disable_fence(self, types: int = EVERYTHING) -> None:
+        """Switch kinds of boundaries of the fence off; a text reports when none is in force any more."""
+        was_in_force = self.fence.in_force
+        self.fence.disable(types)
+        if was_in_force and not self.fence.in_force:
+            self.text(Severity.WARNING, texts.FENCE_OFF)
 
     @property
     def fence_home(self) -> GeoPoint | None:
