@@ -228,7 +228,8 @@ class MissionService(Service):
             its = fields[flavour.zero_home]
             return None if its == before.get(flavour.zero_home) else dialect.MAVLink_mission_current_message(*its)
 
-        self.host.send_by_flavour(changed)
+        # To all: it answers MISSION_SET_CURRENT, and PX4 and ArduPilot send it whatever its interval is.
+        self.host.send_by_flavour(changed, self.host.channels)
         if status is not None and mode is FlightMode.MISSION:
             self.host.send_heartbeat(status)
         self._sent_item = current
