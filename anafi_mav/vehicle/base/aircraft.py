@@ -227,7 +227,7 @@ class Aircraft(Conditions):
         return self.place if self.on_ground else None
 
     def disable_fence(self, types: int = EVERYTHING) -> None:
-        """Switch kinds of boundaries of the fence off; a text reports when none is in force any more."""
+        """Switch kinds of boundaries off; a text reports when none is in force any more."""
         was_in_force = self.fence.in_force
         self.fence.disable(types)
         if was_in_force and not self.fence.in_force:
