@@ -42,7 +42,6 @@ takes half of it at 5 Mbit/s."""
 CONNECTIONS = 8
 """At a time: two files, notifications, a list, a checksum and a flight plan, which must not wait for them."""
 
-NOT_INDEXED_YET = "the drone has not indexed its media yet"
 NOT_INDEXED = 541
 """Parrot's status for a question about media while there is no index yet (developer.parrot.com, media API)."""
 
@@ -82,6 +81,13 @@ class _Range(NamedTuple):
 
 class NotFound(CommandRejected):
     """The web server has no such thing (status 404)."""
+
+
+class MediaNotIndexed(CommandRejected):
+    """The drone has not indexed its media yet (status 541)."""
+
+    def __init__(self) -> None:
+        super().__init__("the drone has not indexed its media yet")
 
 
 class Rest:
@@ -254,6 +260,8 @@ class Rest:
             ) as response:
                 if response.status == UNAVAILABLE:
                     raise LinkLost(await _refusal(what, response))
+                if response.status == NOT_INDEXED:
+                    raise MediaNotIndexed
                 if response.status == NOT_FOUND:
                     raise NotFound(await _refusal(what, response))
                 if response.status >= 300:
@@ -302,8 +310,6 @@ async def _bounded(path: str, pieces: AsyncIterator[bytes]) -> AsyncGenerator[by
 
 
 async def _refusal(what: str, response: aiohttp.ClientResponse) -> str:
-    if response.status == NOT_INDEXED:
-        return NOT_INDEXED_YET
     reason = ""
     with suppress(aiohttp.ClientError, asyncio.TimeoutError, AttributeError, *UNREADABLE):
         answer = msgspec.json.decode(await response.content.read(1 << 12))

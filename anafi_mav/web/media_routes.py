@@ -24,7 +24,7 @@ from anafi_mav.drone import Drone
 from anafi_mav.drone.payload.media import API, Listing, MediaItem, Resource
 from anafi_mav.drone.payload.media_file import content_type
 from anafi_mav.drone.payload.media_index import SORTED_IN_LOOP
-from anafi_mav.drone.rest import NOT_INDEXED, NOT_INDEXED_YET, NotFound
+from anafi_mav.drone.rest import NOT_INDEXED, MediaNotIndexed, NotFound
 from anafi_mav.errors import AnafiMavError, CommandRejected, CommandTimeout, LinkLost, NotSupported
 from anafi_mav.relay.uri_host import is_loopback
 from anafi_mav.web.server import HttpServer
@@ -67,9 +67,10 @@ class MediaRoutes:
                 return await answer(request, drone)
             except (NotFound, NotSupported) as error:
                 return _refuse(404, str(error))
+            except MediaNotIndexed as error:
+                return _refuse(NOT_INDEXED, str(error))
             except CommandRejected as error:
-                status = NOT_INDEXED if error.reason == NOT_INDEXED_YET else 409
-                return _refuse(status, str(error))
+                return _refuse(409, str(error))
             except (LinkLost, CommandTimeout) as error:
                 return _refuse(503, str(error))
             except AnafiMavError as error:

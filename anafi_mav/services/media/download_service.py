@@ -16,7 +16,7 @@ from anafi_mav.drone import Drone
 from anafi_mav.drone.events import FlyingStateChanged
 from anafi_mav.drone.payload.media import Resource
 from anafi_mav.drone.payload.media_copy import copy
-from anafi_mav.drone.rest import NOT_INDEXED_YET
+from anafi_mav.drone.rest import MediaNotIndexed
 from anafi_mav.errors import AnafiMavError, CommandRejected, RemoteProtocolError
 from anafi_mav.services.media.media_folder import busy
 from anafi_mav.services.service import Host, Service
@@ -95,9 +95,8 @@ class DownloadService(Service):
                 continue
             try:
                 listing = await drone.media.listing()
-            except CommandRejected as error:
-                if error.reason != NOT_INDEXED_YET:
-                    raise
+            except MediaNotIndexed:
+                continue
             else:
                 return [resource for day in listing.files.values() for resource in day.values()]
 

@@ -17,8 +17,8 @@ from typing import TypeVar
 from anafi_mav import texts
 from anafi_mav.drone import Drone
 from anafi_mav.drone.payload.media import Listing, Resource
-from anafi_mav.drone.rest import NOT_INDEXED_YET, NotFound
-from anafi_mav.errors import AnafiMavError, CommandRejected
+from anafi_mav.drone.rest import MediaNotIndexed, NotFound
+from anafi_mav.errors import AnafiMavError
 from anafi_mav.services.checksum import crc32
 from anafi_mav.services.files import MAX_SIZE, Entry, FileError, FileRefused, FileSource
 
@@ -162,7 +162,7 @@ def refusing() -> Iterator[None]:
     except FileRefused:
         raise
     except AnafiMavError as error:
-        if isinstance(error, CommandRejected) and error.reason == NOT_INDEXED_YET:
+        if isinstance(error, MediaNotIndexed):
             raise FileRefused(FileError.FAIL, texts.MEDIA_NOT_INDEXED) from error
         if isinstance(error, NotFound):
             raise FileRefused(FileError.FILE_NOT_FOUND) from error
