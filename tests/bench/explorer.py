@@ -382,12 +382,12 @@ class Explored(Flight):
                 self.wrong.append(f"list {kind} differs between clients: {found}")
         home = w.drone.firmware.homing.home
         for index in range(len(self.drawn.flavours)):
-            self.client(index).send_command(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_HOME_POSITION)
-        await asyncio.sleep(1.0)
-        for index in range(len(self.drawn.flavours)):
-            shown = [m for _, m in self.client(index).since(0, "HOME_POSITION")]
-            if shown and home is not None:
-                apart = math.dist((shown[-1].latitude / 1e7, shown[-1].longitude / 1e7), home[:2]) * 111_195.0
+            client = self.client(index)
+            mark = client.mark()
+            ack = await client.command(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_HOME_POSITION)
+            if ack.result == dialect.MAV_RESULT_ACCEPTED and home is not None:
+                shown = await client.wait("HOME_POSITION", since=mark)
+                apart = math.dist((shown.latitude / 1e7, shown.longitude / 1e7), home[:2]) * 111_195.0
                 if apart > 2.0:
                     self.wrong.append(f"HOME_POSITION of client {index} is {apart:.0f} m from the drone's home")
         for name in SETTINGS:

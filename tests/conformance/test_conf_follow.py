@@ -107,9 +107,13 @@ async def test_ardupilot_offsets_place_the_drone() -> None:
             walked = 1.5 * (now() - began) * half
             return 5.0 + walked, walked
 
+        def is_as_fast() -> bool:
+            pose = w.drone.pose
+            return now() - began > 5.0 and (pose.vn, pose.ve) == pytest.approx((1.06, 1.06), abs=0.1)
+
         assert await follow(w.client, "ardupilot") == 0
         async with streaming(w.client, lambda: target(*where(), (1.5 * half, 1.5 * half)), 0.5):
-            await asyncio.sleep(12.0)
+            await w.client.wait("GLOBAL_POSITION_INT", lambda _: is_as_fast(), timeout=30.0)
             pose, (north, east) = w.drone.pose, where()
         assert pose.north - north == pytest.approx((-4.0 - 3.0) * half, abs=1.0)
         assert pose.east - east == pytest.approx((-4.0 + 3.0) * half, abs=1.0)

@@ -8,6 +8,7 @@ import math
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.flavours import both
+from support.mav import Client
 from support.world import ARMED, World, world
 
 from anafi_mav.mavlink import dialect as newer
@@ -70,18 +71,23 @@ async def test_conf_130_not_in_flight() -> None:
         assert w.commands("common.Common.Reboot") == []
 
 
+async def cancel(client: Client, mark: int) -> None:
+    """Cancel the calibration that began after a mark: the text follows the acknowledgement."""
+    cancelled = client.mark()
+    client.send_command(CALIBRATE, 0, 0, 0, 0, **MAGNETOMETER)
+    ack = await client.place("COMMAND_ACK", lambda m: m.command == CALIBRATE, since=cancelled)
+    assert client.received[ack][1].result == ACCEPTED
+    text = await client.place("STATUSTEXT", lambda m: m.text == "[cal] calibration cancelled", since=mark)
+    assert ack < text  # MAVSDK hangs when the text arrives first
+
+
 async def test_conf_129_calibration_of_the_compass_is_cancelled() -> None:
     """QGroundControl and MAVSDK cancel by the same command, and send it once the first one is answered."""
     async with world() as w:
         mark = w.client.mark()
         assert (await w.client.command(CALIBRATE, 0, 1, 0, 0, **MAGNETOMETER)).result == ACCEPTED
         await w.client.wait("STATUSTEXT", lambda m: "turn it" in m.text, since=mark)
-        cancelled = w.client.mark()
-        w.client.send_command(CALIBRATE, 0, 0, 0, 0, **MAGNETOMETER)
-        ack = await w.client.place("COMMAND_ACK", lambda m: m.command == CALIBRATE, since=cancelled)
-        assert w.client.received[ack][1].result == ACCEPTED
-        text = await w.client.place("STATUSTEXT", lambda m: m.text == "[cal] calibration cancelled", since=mark)
-        assert ack < text  # MAVSDK hangs when the text arrives first
+        await cancel(w.client, mark)
         asked = "common.Calibration.MagnetoCalibration"
         await w.drone.wait_log(lambda e: e.kind == "command" and e.name == asked and e.args["calibrate"] == 0)
 
@@ -130,12 +136,7 @@ async def test_conf_129_calibration_of_the_gimbal_is_cancelled_by_px4_clients() 
         mark = w.client.mark()
         assert (await w.client.command(CALIBRATE, 0, 0, 0, 0, x=2.0, y=0.0, z=0.0)).result == ACCEPTED
         assert len(w.commands("gimbal.calibrate")) == 1
-        cancelled = w.client.mark()
-        w.client.send_command(CALIBRATE, 0, 0, 0, 0, **MAGNETOMETER)
-        ack = await w.client.place("COMMAND_ACK", lambda m: m.command == CALIBRATE, since=cancelled)
-        assert w.client.received[ack][1].result == ACCEPTED
-        text = await w.client.place("STATUSTEXT", lambda m: m.text == "[cal] calibration cancelled", since=mark)
-        assert ack < text  # MAVSDK hangs when the text arrives first
+        await cancel(w.client, mark)
         await w.drone.wait_log(lambda e: e.kind == "command" and e.name == "gimbal.cancel_calibration")
 
 

@@ -466,8 +466,9 @@ async def test_silent_station_with_a_token_is_lost_and_returns_with_its_next_sam
             token.undeclare()
 
 
-async def test_frames_that_do_not_reach_a_station_are_counted() -> None:
-    beat = pack(own.MAVLink_heartbeat_message(2, 12, 81, 0, 4, 3))
+@asynccontextmanager
+async def station_of_system_1(*frames: bytes) -> AsyncIterator[tuple[FabricGround, FabricStation]]:
+    """A ground process and its station; these bytes were put for the station under the key of system 1."""
     async with router() as node:
         fabric = FabricGround(parse_endpoint(node.url), [parse_endpoint("udpin://127.0.0.1:0")], SystemClock())
         await fabric.start()
@@ -476,32 +477,27 @@ async def test_frames_that_do_not_reach_a_station_are_counted() -> None:
             tokens = session.liveliness().declare_subscriber("anafi/station/v1/*", history=True)
             joining = asyncio.ensure_future(station.join(fabric.endpoints[0].local_port or 0))
             name = str((await asyncio.to_thread(tokens.recv)).key_expr).rpartition("/")[2]
-            for number in (250, 251, 2, 3):
-                session.put(f"anafi/1/down/{name}", frame(beat, number, 1, 1))
+            for data in frames:
+                session.put(f"anafi/1/down/{name}", data)
             await joining
-            await station.heartbeat(lambda beat: beat.get_seq() == 3, since=0)
-            assert fabric.all_counters()["lost_frames"] == 6
+            yield fabric, station
         await station.close()
         await fabric.close()
+
+
+async def test_frames_that_do_not_reach_a_station_are_counted() -> None:
+    beat = pack(own.MAVLink_heartbeat_message(2, 12, 81, 0, 4, 3))
+    async with station_of_system_1(*(frame(beat, number, 1, 1) for number in (250, 251, 2, 3))) as (fabric, station):
+        await station.heartbeat(lambda beat: beat.get_seq() == 3, since=0)
+        assert fabric.all_counters()["lost_frames"] == 6
 
 
 async def test_frame_of_another_system_than_the_keys_reaches_no_station() -> None:
     """A router's rules name the keys that a gateway may publish: otherwise it could speak for every drone."""
     beat = pack(own.MAVLink_heartbeat_message(2, 12, 81, 0, 4, 3))
-    async with router() as node:
-        fabric = FabricGround(parse_endpoint(node.url), [parse_endpoint("udpin://127.0.0.1:0")], SystemClock())
-        await fabric.start()
-        station = FabricStation()
-        with await asyncio.to_thread(opened, node) as session:
-            tokens = session.liveliness().declare_subscriber("anafi/station/v1/*", history=True)
-            joining = asyncio.ensure_future(station.join(fabric.endpoints[0].local_port or 0))
-            name = str((await asyncio.to_thread(tokens.recv)).key_expr).rpartition("/")[2]
-            session.put(f"anafi/1/down/{name}", frame(beat, 1, 7, 1) + frame(beat, 2, 1, 1))
-            await joining
-            assert {message.get_srcSystem() for _, message in station.received} == {1}
-            assert fabric.all_counters()["misdirected_frames"] == 1
-        await station.close()
-        await fabric.close()
+    async with station_of_system_1(frame(beat, 1, 7, 1) + frame(beat, 2, 1, 1)) as (fabric, station):
+        assert {message.get_srcSystem() for _, message in station.received} == {1}
+        assert fabric.all_counters()["misdirected_frames"] == 1
 
 
 async def test_command_to_a_system_whose_token_is_late_is_published() -> None:

@@ -91,6 +91,6 @@ async def test_mission_speed_above_the_drones_is_reported_at_upload(model: str, 
         await said(w.client, "Mission: 3 items", mark)
         mark = w.client.mark()
         await put(w, [takeoff(6.0), replace(speed, p2=99.0), way(12.0, 0.0, 6.0)])
-        told = f"Mission: 3 items; approximated: item 2: speed 99 m/s: the drone flies {highest} m/s at most"
-        await said(w.client, told[:50], mark)
-        await said(w.client, told[50:], mark)
+        text = f"Mission: 3 items; approximated: item 2: speed 99 m/s: the drone flies {highest} m/s at most"
+        await said(w.client, text[:50], mark)
+        await said(w.client, text[50:], mark)

@@ -169,8 +169,7 @@ async def test_end_of_a_magnetometer_calibration_is_a_success_unless_it_lacks_an
     device.script[common.MagnetoCalibration] = lambda _: [common.MagnetoCalibrationStartedChanged(1)]
     await drone.calibration.start_magnetometer()
     done = asyncio.ensure_future(drone.calibration.magnetometer_done())
-    await asyncio.sleep(0)
-    device.say(*reports)
+    device.say(*reports)  # received in a later event-loop iteration than the first step of `done`
     if is_success:
         await done
     else:
@@ -185,7 +184,6 @@ async def test_failure_of_an_earlier_magnetometer_calibration_is_none_of_the_nex
     device.say(FAILED_AXES)
     await drone.calibration.start_magnetometer()
     done = asyncio.ensure_future(drone.calibration.magnetometer_done())
-    await asyncio.sleep(0)
     device.say(common.MagnetoCalibrationAxisToCalibrateChanged(CalibrationAxis.X_AXIS), NO_AXIS, ALL_AXES, STOPPED)
     await done
 

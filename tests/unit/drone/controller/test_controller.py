@@ -648,8 +648,8 @@ async def test_sticks_of_the_pilot_that_are_found_grabbed_are_released() -> None
 
 async def test_wheels_that_are_found_grabbed_stay_so() -> None:
     async with behind() as (drone, device):
-        device.say(mapper.GrabState(0, 1 << TILT, 0))
-        await asyncio.sleep(0.3)
+        await device.acknowledged(mapper.GrabState(0, 1 << TILT, 0))
+        await device.quiet(mapper.Grab)
         assert drone.controller.state.grabbed_axes == 1 << TILT
         assert device.got(mapper.Grab) == []
 

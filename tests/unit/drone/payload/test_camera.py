@@ -334,10 +334,8 @@ async def test_capabilities_of_a_list_are_replaced_removed_and_emptied(device: S
     """By Parrot's list flags and the number of each; an event may be received twice."""
 
     async def after(*events: Message) -> tuple[int, int]:
-        heard = asyncio.ensure_future(drone.expect(type(events[-1])))
-        await asyncio.sleep(0)
-        device.say(*events)
-        await heard
+        device.say(*events[:-1])
+        await device.acknowledged(events[-1])
         return len(drone.camera[0].recordings), len(drone.camera[0].photos)
 
     def recording(number: int, resolution: int, flags: int) -> Message:

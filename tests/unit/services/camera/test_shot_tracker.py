@@ -60,7 +60,7 @@ def test_shutter_of_a_time_lapse_that_is_reported_twice_is_one_picture() -> None
 
 
 def test_time_lapse_has_no_more_pictures_than_its_time_allows() -> None:
-    """Pictures every second are too close to be told from repeated reports, but no more than 3 are taken in 1.1 s."""
+    """Pictures every second look like repeated reports, but no more than 3 are taken in 1.1 s."""
     tracker = ShotTracker()
     for at, progress in ((0.0, STARTED), *((0.1 + 0.1 * n, TAKEN) for n in range(11))):
         tracker.receive(CaptureUpdate(0, progress), at, interval=1.0)
