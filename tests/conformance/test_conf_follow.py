@@ -97,7 +97,7 @@ async def test_ardupilot_offsets_place_the_drone() -> None:
     async with world(speed=1.0, flavour="ardupilot") as w:
         await w.take_off(8.0)
         allow_speed(w)
-        for name, value in (("FOLL_OFS_X", -4.0), ("FOLL_OFS_Y", 3.0), ("FOLL_OFS_Z", -10.0), ("FOLL_ALT_TYPE", 1.0)):
+        for name, value in (("FOLL_OFS_X", -4.0), ("FOLL_OFS_Y", 3.0), ("ANF_FOLLOW_HT", 10.0)):
             await write(w, name, value)
         for name, value in (("FOLL_OFS_X", -4.0), ("ANF_FOLLOW_DST", 5.0), ("ANF_FOLLOW_ANG", 143.13)):
             assert (await read(w.client, name)).param_value == pytest.approx(value, abs=0.01)

@@ -1,7 +1,9 @@
 """Parameters of mode Follow: the gateway's own settings, PX4's and ArduPilot's aliases.
 
-MAVSDK's follow me writes PX4's. ArduPilot's offsets are in m from the target: X along its course, Y to its right, Z
-down (AP_Follow).
+MAVSDK's follow me writes PX4's. ArduPilot's offsets are in m from the target: X along its course, Y to its right. Its
+FOLL_OFS_Z counts from the target whatever FOLL_ALT_TYPE is (AP_Follow::get_target_dist_and_vel_ned), which only selects
+a source of the target's height. Heights here count from the take-off point by default, so that neither exists: the same
+number could mean below the target.
 """
 
 from __future__ import annotations
@@ -47,13 +49,10 @@ def _number(
     )
 
 
-LOWEST, HIGHEST = 1.0, 500.0
-"""m of height."""
-
 NEAREST, FARTHEST = 1.0, 100.0
 """m from the target over ground."""
 
-HEIGHT = _number("ANF_FOLLOW_HT", "height", "Height while following a target", LOWEST, HIGHEST, 8.0, unit="m")
+HEIGHT = _number("ANF_FOLLOW_HT", "height", "Height while following a target", 1.0, 500.0, 8.0, unit="m")
 DISTANCE = _number("ANF_FOLLOW_DST", "distance", "Distance while following a target", NEAREST, FARTHEST, 8.0, unit="m")
 ANGLE = _number(
     "ANF_FOLLOW_ANG", "angle", "Side of the target, clockwise from its course", -180.0, 180.0, 180.0, unit="deg"
@@ -142,23 +141,6 @@ def _offset(name: str, index: int, short: str, put: Callable[[Offsets, float], O
     )
 
 
-def _put_down(host: Host, value: float) -> None:
-    host.vehicle.follow.settings.height = -value
-
-
-OFFSET_DOWN = replace(
-    HEIGHT,
-    name="FOLL_OFS_Z",
-    short="Offset down from the reference of FOLL_ALT_TYPE",
-    read=lambda host: -HEIGHT.read(host),
-    write=own(_put_down),
-    put=None,
-    limits=lambda host: (-HIGHEST, -LOWEST),
-    derived=True,
-    native=HEIGHT.name,
-    default=-8.0,
-)
-
 FOLLOW_ARDUPILOT: tuple[Parameter, ...] = (
     fact("FOLL_ENABLE", 1, "Mode Follow is available", ParamType.INT8, group=GROUP),
     fact("FOLL_SYSID", 0, "The first sender of a target leads", ParamType.INT16, group=GROUP),
@@ -167,12 +149,4 @@ FOLLOW_ARDUPILOT: tuple[Parameter, ...] = (
     fact("FOLL_DIST_MAX", REACH, "A target farther away is not followed", ParamType.REAL32, unit="m", group=GROUP),
     _offset("FOLL_OFS_X", 0, "Offset ahead of the target", lambda old, value: (value, old[1]), -8.0),
     _offset("FOLL_OFS_Y", 1, "Offset to the right of the target", lambda old, value: (old[0], value), 0.0),
-    OFFSET_DOWN,
-    mapped(
-        ALTITUDE,
-        "FOLL_ALT_TYPE",
-        ParamType.INT8,
-        {0: "Target", 1: "Take-off point", 3: "Ground below"},
-        {0: AltitudeMode.TARGET, 1: AltitudeMode.TAKEOFF, 3: AltitudeMode.TERRAIN},
-    ),
 )
