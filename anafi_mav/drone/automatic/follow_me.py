@@ -63,7 +63,7 @@ def _mode_info(state: FollowMeState, m: follow_me.ModeInfo) -> FollowMeState:
 
 def _lacking(bits: int) -> frozenset[Input]:
     """followme.xml mode_info: "Bit is 0 if the input is missing, 1 if the input is ok"."""
-    return frozenset(Input) - members(bits, Input)
+    return members(~bits, Input)
 
 
 def _trajectory(state: FollowMeState, m: follow_me.TargetTrajectory) -> FollowMeState:

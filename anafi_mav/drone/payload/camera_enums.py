@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterable
 from fractions import Fraction
 from functools import lru_cache
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from anafi_mav.arsdk.codec.wire import OpenEnum
 from anafi_mav.errors import LocalProtocolError, NotSupported
@@ -256,7 +256,13 @@ def word(words: type[WordT], value: OpenEnum | None) -> WordT | None:
 
 def words(kind: type[WordT], values: Iterable[OpenEnum]) -> frozenset[WordT]:
     """Ours for Parrot's, without those that we have no word for."""
-    return frozenset(ours for value in values if (ours := word(kind, value)) is not None)
+    return _shared_words(frozenset(ours for value in values if (ours := word(kind, value)) is not None))
+
+
+@lru_cache(maxsize=512)
+def _shared_words(values: frozenset[Any]) -> frozenset[Any]:
+    """Return the first set with these values: drones report the same ones, and share them."""
+    return values
 
 
 def parrot(values: type[ParrotT], wanted: enum.Enum) -> ParrotT:
@@ -286,7 +292,13 @@ def quantity(value: OpenEnum | None) -> float | None:
 
 def quantities(values: Iterable[OpenEnum]) -> tuple[float, ...]:
     """Return the numbers that these values stand for, ascending, each once."""
-    return tuple(sorted({number for value in values if (number := quantity(value))}))
+    return _shared_numbers(tuple(sorted({number for value in values if (number := quantity(value))})))
+
+
+@lru_cache(maxsize=512)
+def _shared_numbers(values: tuple[float, ...]) -> tuple[float, ...]:
+    """Return the first tuple of these numbers: drones report the same ones, and share them."""
+    return values
 
 
 def nearest(values: type[ParrotT], wanted: float) -> ParrotT:

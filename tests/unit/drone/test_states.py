@@ -23,10 +23,12 @@ from anafi_mav.arsdk.messages.ardrone3 import (
     PoiStatus,
 )
 from anafi_mav.arsdk.messages.battery import AlertLevel, BatteryAlert
+from anafi_mav.arsdk.messages.camera import CameraCameraMode, Framerate
 from anafi_mav.arsdk.messages.common import CalibrationAxis, Sensor
 from anafi_mav.arsdk.messages.rth import AutoTriggerReason, RthEndingBehavior, RthHomeType, RthState, StateReason
 from anafi_mav.drone import Position, Range
-from anafi_mav.drone.element import MAX_ITEMS, Element
+from anafi_mav.drone.element import MAX_ITEMS, Element, members
+from anafi_mav.drone.payload.camera_enums import CameraMode, quantities, words
 from anafi_mav.drone.piloting.motors import takeoff_blockers
 from anafi_mav.drone.piloting.piloting import Piloting
 from anafi_mav.drone.piloting.state import Attitude, PilotingState, Velocity
@@ -301,6 +303,19 @@ def test_reducer_leaves_the_previous_state_unchanged() -> None:
     Battery.REDUCERS[battery.Alert](before, battery.Alert(BatteryAlert.TOO_COLD, AlertLevel.WARNING, 0))
     assert before.alerts == {BatteryAlert.TOO_HOT: AlertLevel.WARNING}
     assert BatteryState() == Battery.NOTHING
+
+
+def test_reported_sets_of_values_are_shared_by_drones() -> None:
+    types = {RthHomeType.TAKEOFF, RthHomeType.PILOT}
+    bits = sum(1 << one for one in types)
+    assert members(bits, RthHomeType) == types
+    assert members(bits, RthHomeType) is members(bits, RthHomeType)
+    modes = (CameraCameraMode.PHOTO, CameraCameraMode.RECORDING)
+    assert words(CameraMode, modes) == {CameraMode.PHOTO, CameraMode.RECORDING}
+    assert words(CameraMode, modes) is words(CameraMode, reversed(modes))
+    rates = (Framerate.FPS_30, Framerate.FPS_24)
+    assert quantities(rates) == (24.0, 30.0)
+    assert quantities(rates) is quantities(reversed(rates))
 
 
 def test_a_map_does_not_grow_without_end() -> None:
