@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Awaitable, Callable, Hashable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -500,18 +500,19 @@ class CommandLog:
     def __init__(self) -> None:
         self.results: Counter[int] = Counter()
         """By MAV_RESULT."""
-        self.refusals: deque[CommandRefusal] = deque(maxlen=MAX_REFUSALS)
+        self.refusals: tuple[CommandRefusal, ...] = ()
         """Oldest first."""
-        self.durations: deque[float] = deque(maxlen=MAX_DURATIONS)
+        self.durations: list[float] = []
         """s from the arrival to the acknowledgement of actions that were accepted."""
 
     def refuse(self, refusal: CommandRefusal) -> None:
         """Note a command that was not accepted."""
         self.results[refusal.result] += 1
-        self.refusals.append(refusal)
+        self.refusals = (*self.refusals, refusal)[-MAX_REFUSALS:]
 
     def accept(self, result: int, duration: float | None = None) -> None:
         """Note an accepted command; `duration`: s that its action took, None for a query."""
         self.results[result] += 1
         if duration is not None:
             self.durations.append(duration)
+            del self.durations[:-MAX_DURATIONS]

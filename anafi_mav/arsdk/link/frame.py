@@ -13,7 +13,6 @@ from __future__ import annotations
 import enum
 import math
 import struct
-from collections import deque
 from typing import NamedTuple
 
 from anafi_mav.errors import LocalProtocolError
@@ -210,13 +209,13 @@ class Piece(NamedTuple):
     last: bool
 
 
-def pack(version: int, waiting: deque[Waiting]) -> list[Piece]:
+def pack(version: int, waiting: list[Waiting]) -> list[Piece]:
     """Take from `waiting` what the next frame carries.
 
     Only a command too long for any frame is split.
     """
     if version == 1:
-        first = waiting.popleft()
+        first = waiting.pop(0)
         return [Piece(first, first.command, True)]
     pieces: list[Piece] = []
     room = PACK_LIMIT[version]
@@ -225,7 +224,7 @@ def pack(version: int, waiting: deque[Waiting]) -> list[Piece]:
         data = first.command[first.packed :] if first.packed else with_length(version, first.command)
         if len(data) <= room:
             pieces.append(Piece(first, data, True))
-            waiting.popleft()
+            waiting.pop(0)
             room -= len(data)
         elif pieces:
             break

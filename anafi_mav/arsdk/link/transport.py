@@ -21,7 +21,7 @@ import enum
 import itertools
 import math
 import struct
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Sequence
 from typing import TypeAlias
 
@@ -174,7 +174,7 @@ class _AckQueue:
 
     def __init__(self, id: int) -> None:
         self.id = id
-        self.waiting: deque[Waiting] = deque()
+        self.waiting: list[Waiting] = []
         self.flight: list[Piece] = []
         """The frame that waits for its acknowledgement; empty: none does."""
         self.seq = -1
@@ -236,7 +236,7 @@ class Transport:
         self._type_place = frame_type(version)
         self._longest = (longest_command(version, False), longest_command(version, True))
         """Bytes of a command in the unacknowledged queue, and in an acknowledged one."""
-        self._noack: deque[tuple[int, bytes]] = deque()
+        self._noack: list[tuple[int, bytes]] = []
         self._noack_seq = -1
         self._queues = {id: _AckQueue(id) for id in (_ACK_ID[role], _LOW_PRIO_ID[role])}
         self._ack_seq = -1
@@ -403,7 +403,7 @@ class Transport:
             self.counters["dropped.down" if self._down else "dropped.silent"] += 1
         elif buffer is Buffer.NON_ACK:
             if len(self._noack) >= MAX_QUEUED_NOACK:
-                self._noack.popleft()
+                self._noack.pop(0)
                 self.counters["dropped.noack"] += 1
             self._noack.append((token, data))
         else:
@@ -471,7 +471,7 @@ class Transport:
         Each is (sequence number, bytes).
         """
         queue = self._queues[_ACK_ID[self.role]]
-        waiting = deque(Waiting(0, wire.encode(message)) for message in messages)
+        waiting = [Waiting(0, wire.encode(message)) for message in messages]
         frames = []
         seq = queue.seq
         while waiting:
@@ -497,7 +497,7 @@ class Transport:
             dropped = [piece.source for piece in queue.flight if piece.last] if not begun else []
             dropped += [entry for entry in queue.waiting if not entry.packed]
             self._pending.extend(Undelivered(entry.token, reason) for entry in dropped)
-            queue.waiting = deque(begun)
+            queue.waiting = begun
             if not begun:
                 queue.land()
         queue = self._queues[_ACK_ID[self.role]]
@@ -541,14 +541,14 @@ class Transport:
 
     def _next_noack(self) -> bytes:
         version, queue = self.version, self._noack
-        payload = with_length(version, queue.popleft()[1])
+        payload = with_length(version, queue.pop(0)[1])
         sent, limit = 1, PACK_LIMIT[version]
         while queue and version > 1:
             more = with_length(version, queue[0][1])
             if len(payload) + len(more) > limit:
                 break
             payload += more
-            queue.popleft()
+            queue.pop(0)
             sent += 1
         self.counters["sent"] += sent
         self._noack_seq = (self._noack_seq + 1) & self._seq_mask

@@ -14,7 +14,6 @@ from __future__ import annotations
 import asyncio
 import enum
 import math
-from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -235,22 +234,22 @@ class Moves:
     def __init__(self, home: Home) -> None:
         self._home = home
         self.to: Move | None = None
-        self.by: deque[Move] = deque()
+        self.by: list[Move] = []
         """Oldest first: the drone ends them in this order."""
         self.returning: Move | None = None
         self._older: Move | None = None
         """The moveTo that still runs while `to` waits for its answer: a refused newer one leaves it alone."""
         self._cancelling: Move | None = None
         """The moveTo that we cancelled and whose CANCELED has not come yet."""
-        self._unanswered: deque[Position] = deque(maxlen=MAX_UNANSWERED)
+        self._unanswered: tuple[Position, ...] = ()
         """Targets of moveTos that were aborted or replaced before the drone had reported on them.
 
         It may still do so until it flies a newer one.
         """
-        self._ended: deque[tuple[Position, float]] = deque(maxlen=MAX_UNANSWERED)
+        self._ended: tuple[tuple[Position, float], ...] = ()
         """Targets of moveTos that the drone has ended, and when: it may report that twice."""
         self._stray_until = 0.0
-        self._given_up: deque[tuple[Displacement | None, float]] = deque(maxlen=MAX_UNANSWERED)
+        self._given_up: tuple[tuple[Displacement | None, float], ...] = ()
         """Offsets of moveBys that the drone may have completed, and until when it may report that.
 
         None: of one that is not ours.
@@ -321,14 +320,14 @@ class Moves:
 
     def _note_unanswered(self, move: Move) -> None:
         if move.target is not None:
-            self._unanswered.append(move.target)
+            self._unanswered = (*self._unanswered, move.target)[-MAX_UNANSWERED:]
 
     def cancel_by(self, why: str, now: float) -> list[Move]:
         """The moveBys are about to be cancelled; returns them.
 
         They end here: the drone's event names none of them.
         """
-        moves, self.by = list(self.by), deque()
+        moves, self.by = self.by, []
         for move in moves:
             move.answer.fail(CommandRejected(why))
             move.end(MoveEnd.CANCELED)
@@ -346,7 +345,10 @@ class Moves:
         """Expect the end of a moveBy that is not awaited any longer."""
         self._stray_until = now + STRAY_FOR
         if move.earliest_end(by_rate=True) <= now + _ON_ITS_WAY:
-            self._given_up.append((move.offset, self._stray_until))
+            self._note_stray(move.offset)
+
+    def _note_stray(self, offset: Displacement | None) -> None:
+        self._given_up = (*self._given_up, (offset, self._stray_until))[-MAX_UNANSWERED:]
 
     def end_cancelled(self) -> None:
         """The moveTo that was cancelled is over; the drone may still report its end."""
@@ -366,7 +368,7 @@ class Moves:
         """
         self._stray_until = now + STRAY_FOR
         if self.inherited:
-            self._given_up.append((None, self._stray_until))
+            self._note_stray(None)
         self.inherited = False
 
     def clear(self, how: MoveEnd) -> None:
@@ -376,10 +378,8 @@ class Moves:
                 move.end(how)
                 move.answer.fail(CommandRejected(how.value))
         self.to = self.returning = self._older = self._cancelling = None
-        self.by.clear()
-        self._unanswered.clear()
-        self._ended.clear()
-        self._given_up.clear()
+        self.by = []
+        self._unanswered = self._ended = self._given_up = ()
         self._stray_until = 0.0
         self.aborting = False
         self.inherited = True
@@ -431,7 +431,7 @@ class Moves:
     def _end(self, move: Move, how: MoveEnd, now: float) -> None:
         """The drone has reported the end of a moveTo."""
         if move.target is not None:
-            self._ended.append((move.target, now))
+            self._ended = (*self._ended, (move.target, now))[-MAX_UNANSWERED:]
         move.end(how)
 
     @property
@@ -447,14 +447,14 @@ class Moves:
         if self._cancelling is not None:
             self._cancelling.end(MoveEnd.CANCELED)
             self._cancelling = None
-        self._unanswered.clear()
+        self._unanswered = ()
         move.running = True
         move.answer.succeed(move)
 
     def _on_move_by_end(self, message: ardrone3.MoveByEnd, now: float) -> None:
         if not self.by or self._is_stray(message, now):
             return
-        move = self.by.popleft()
+        move = self.by.pop(0)
         is_doubtful = message.error == MoveByError.INTERRUPTED or _is_short(message, move.offset)
         if not self.by and (is_doubtful or now < self._stray_until):
             # Nothing of ours has interrupted it: it may be the late end of an earlier one, and this one is flown on.

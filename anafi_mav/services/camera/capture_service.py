@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import dataclasses
 import math
-from collections import deque
 from collections.abc import Awaitable, Callable, Mapping
 
 from anafi_mav import texts
@@ -63,7 +62,7 @@ class CaptureService(Service):
         """When the recording under way began (s, monotonic)."""
         self._recording_failure = ""
         """Reason that the drone reported last; the recording may continue nevertheless."""
-        self._recorded: deque[str] = deque(maxlen=REPEATED)
+        self._recorded: tuple[str, ...] = ()
         """Media ids of the last recordings whose end is reported."""
         self._is_formatting = False
         """The drone formats the storage for media, and reports the end by its state alone."""
@@ -79,7 +78,7 @@ class CaptureService(Service):
         self._photos.link_up()
         self._recordings = asyncio.Lock()
         self._recording_since, self._recording_failure = self._found_recording(self.host.clock.monotonic()), ""
-        self._recorded.clear()
+        self._recorded = ()
         if self._sent is None:
             self._sent = self._status()
         self._send_changed()  # without a link the pilot, or the drone itself, may have changed it
@@ -144,7 +143,7 @@ class CaptureService(Service):
         elif update is not None and update.media not in self._recorded:
             # The state decides whether it runs: this may be a late report about the one before.
             if update.media:
-                self._recorded.append(update.media)
+                self._recorded = (*self._recorded, update.media)[-REPEATED:]
             self._recording_failure = update.reason
             if update.media and self._recording_since is None and not self._records:
                 self._end_recording()  # the state was reported first
@@ -187,7 +186,7 @@ class CaptureService(Service):
     def _begin_index(self) -> None:
         """The storage for media is empty: ids of media may be those of before."""
         self._reporter.reset()
-        self._recorded.clear()
+        self._recorded = ()
         self._send_changed()
 
     def tick(self, now: float) -> float:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections import deque
 from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -97,7 +96,7 @@ class ParamExtService(Service):
         """When the value of a changed setting is sent once more, s, monotonic."""
         self._learn_at = math.inf
         """When the definition is made again, s, monotonic."""
-        self._waiting: deque[Write] = deque()
+        self._waiting: list[Write] = []
         self._current: Write | None = None
         """The write that the drone is carrying out."""
         self._worker: asyncio.Task[None] | None = None
@@ -293,7 +292,7 @@ class ParamExtService(Service):
     async def _work(self) -> None:
         try:
             while self._waiting:
-                self._current = self._waiting.popleft()
+                self._current = self._waiting.pop(0)
                 await self._write(self._current)
         finally:
             if self._worker is asyncio.current_task():  # otherwise the link is lost, and another may be at work

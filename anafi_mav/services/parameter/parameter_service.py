@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import math
 import struct
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -217,7 +217,7 @@ class ParameterService(Service):
         self._sender = PacedSender(host)
         self._refused_at: dict[Channel, float] = {}
         """When a text was last sent about a refused write."""
-        self._waiting: deque[ParameterWrite] = deque()
+        self._waiting: list[ParameterWrite] = []
         self._under_way: list[ParameterWrite] = []
         self._writers: set[asyncio.Task[None]] = set()
         self._restored = -1
@@ -446,7 +446,7 @@ class ParameterService(Service):
     async def _work(self) -> None:
         """Carry out writes for as long as there are any."""
         while self._waiting:
-            write = self._waiting.popleft()
+            write = self._waiting.pop(0)
             self._under_way.append(write)
             try:
                 await self._write(*write)

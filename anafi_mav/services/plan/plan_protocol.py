@@ -9,7 +9,6 @@ for the acknowledgement of its upload before it requests the list, and must not 
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Hashable, Iterable
 from typing import Any
 
@@ -52,17 +51,17 @@ class MissionProtocol:
     def __init__(self, kinds: Iterable[PlanKind]) -> None:
         self.transfers = {kind.mission_type: PlanTransfer(kind) for kind in kinds}
         """By MAV_MISSION_TYPE."""
-        self._waiting: deque[tuple[Any, int, Peer]] = deque()
+        self._waiting: list[tuple[Any, int, Peer]] = []
 
     def receive(self, message: Any, peer: Peer, now: float) -> list[Effect]:
         """A message of `MESSAGES` from a client."""
         id = message.get_msgId()
         if id == dialect.MAVLINK_MSG_ID_MISSION_ACK:  # it gives up what it has asked for
-            self._waiting = deque(
+            self._waiting = [
                 (other, its_id, who)
                 for other, its_id, who in self._waiting
                 if (other.mission_type, who.client) != (message.mission_type, peer.client)
-            )
+            ]
         if id not in _WHOLE:
             return self._handle(message, id, peer, now)
         for kind, transfer in self.transfers.items():
@@ -122,7 +121,7 @@ class MissionProtocol:
             identity = transfer.opaque_id if fault is None and transfer is not None else 0
             effects.append(_ack(commit.peer, result, commit.mission_type, identity))
         while self._waiting and not self._storing(self._waiting[0][0].mission_type):
-            effects += self._handle(*self._waiting.popleft(), now)
+            effects += self._handle(*self._waiting.pop(0), now)
         return effects
 
     def deadline(self) -> float | None:
@@ -136,7 +135,7 @@ class MissionProtocol:
 
     def leave(self, gone: Callable[[Hashable], bool]) -> None:
         """Some clients' channel is gone; whatever they transferred ends."""
-        self._waiting = deque(waiting for waiting in self._waiting if not gone(waiting[-1].client))
+        self._waiting = [waiting for waiting in self._waiting if not gone(waiting[-1].client)]
         for transfer in self.transfers.values():
             transfer.leave(gone)
 

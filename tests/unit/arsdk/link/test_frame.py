@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
-
 import pytest
 
 from anafi_mav.arsdk.codec import wire
@@ -117,8 +115,8 @@ def test_our_own_wrong_numbers_raise(version: int, seq: int) -> None:
         encode_frame(version, FrameType.NOACK, 10, seq, b"")
 
 
-def waiting(*sizes: int) -> deque[Waiting]:
-    return deque(Waiting(token, bytes([token]) * size) for token, size in enumerate(sizes, 1))
+def waiting(*sizes: int) -> list[Waiting]:
+    return [Waiting(token, bytes([token]) * size) for token, size in enumerate(sizes, 1)]
 
 
 def test_version_1_carries_one_command_per_frame() -> None:
