@@ -7,7 +7,7 @@ values are updated, and not more often than this.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 from weakref import WeakKeyDictionary
 
 from anafi_mav.errors import LocalProtocolError
@@ -69,18 +69,19 @@ class _Stream:
         return part
 
 
-_OFF = _Stream(None, None)
-"""A message that is not streamed by default: one object for all."""
-
-
 class _Lane(Generic[ChannelT]):
     """One message on the channels that stream it, and when it is due next on one of them."""
 
-    __slots__ = ("streams", "until")
+    __slots__ = ("id", "streams", "until")
 
-    def __init__(self, streams: list[tuple[_Stream, Sequence[ChannelT]]]) -> None:
+    def __init__(self, id: int, streams: tuple[tuple[_Stream, Sequence[ChannelT]], ...]) -> None:
+        self.id = id
         self.streams = streams
         self.until = -_NEVER
+
+
+_NO_LANE: _Lane[Any] = _Lane(0, ())
+"""Of a message that is streamed on none of the channels: one object for all."""
 
 
 class _Group(Generic[ChannelT]):
@@ -88,7 +89,7 @@ class _Group(Generic[ChannelT]):
 
     __slots__ = ("lanes", "until")
 
-    def __init__(self, lanes: list[tuple[int, _Lane[ChannelT]]]) -> None:
+    def __init__(self, lanes: tuple[_Lane[ChannelT], ...]) -> None:
         self.lanes = lanes
         self.until = -_NEVER
         """None of them is due before: this alone answers most questions of a fast drone."""
@@ -143,7 +144,7 @@ class Streams(Generic[ChannelT]):
         streams = self._channels.setdefault(channel, {})
         known = streams.get(id)
         # A client that says again what it has (QGroundControl does 35 times, for ArduPilot) must not get more by it.
-        if known is None or known is _OFF or known.interval != interval:
+        if known is None or known.interval != interval:
             if known is not None:
                 known.users -= 1
             streams[id] = _Stream(interval, self._pace(channel))
@@ -157,7 +158,7 @@ class Streams(Generic[ChannelT]):
         off = [
             channel
             for channel, streams in self._channels.items()
-            if (stream := streams.get(id)) is not None and stream is not _OFF and stream.interval is None
+            if (stream := streams.get(id)) is not None and stream.interval is None
         ]
         return [channel for channel in channels if channel not in off] if off else channels
 
@@ -184,19 +185,19 @@ class Streams(Generic[ChannelT]):
             self._phase = now + TOGETHER / 2
         found: list[tuple[int, Sequence[ChannelT]]] = []
         soonest = _NEVER
-        for id, lane in group.lanes:
+        for lane in group.lanes:
             until = lane.until
             if now >= until:
                 if len(lane.streams) == 1:  # nearly always: channels with the same interval share one
                     ((stream, due),) = lane.streams
                     if now >= stream.next:
                         stream.leave(now, self._phase, is_repeated=is_repeated)
-                        found.append((id, due))
+                        found.append((lane.id, due))
                     until = lane.until = stream.next
                 else:
-                    due = self._leave(audience, id, lane, now, is_repeated=is_repeated)
+                    due = self._leave(audience, lane, now, is_repeated=is_repeated)
                     if due:
-                        found.append((id, due))
+                        found.append((lane.id, due))
                     until = lane.until
             if until < soonest:
                 soonest = until
@@ -204,7 +205,7 @@ class Streams(Generic[ChannelT]):
         return found
 
     def _leave(
-        self, audience: _Audience[ChannelT], id: int, lane: _Lane[ChannelT], now: float, *, is_repeated: bool
+        self, audience: _Audience[ChannelT], lane: _Lane[ChannelT], now: float, *, is_repeated: bool
     ) -> Sequence[ChannelT]:
         """Return the channels on which a message of several streams may leave now.
 
@@ -222,7 +223,7 @@ class Streams(Generic[ChannelT]):
                 until = stream.next
         lane.until = until
         if has_first:
-            self._share(audience, id, lane)
+            self._share(audience, lane)
         return due
 
     def next_on(self, channels: Sequence[ChannelT], ids: tuple[int, ...]) -> float:
@@ -267,17 +268,18 @@ class Streams(Generic[ChannelT]):
     def _new_group(self, audience: _Audience[ChannelT], ids: tuple[int, ...]) -> _Group[ChannelT]:
         if len(audience.groups) >= MAX_GROUPS:
             audience.groups.clear()
-        lanes = ((id, self._lane(audience, id)) for id in ids)
-        group = audience.groups[ids] = _Group([(id, lane) for id, lane in lanes if lane.streams])
+        lanes = [self._lane(audience, id) for id in ids]
+        group = audience.groups[ids] = _Group(tuple([lane for lane in lanes if lane.streams]))
         return group
 
     def _lane(self, audience: _Audience[ChannelT], id: int) -> _Lane[ChannelT]:
         lane = audience.lanes.get(id)
         if lane is None:
-            lane = audience.lanes[id] = _Lane(self._streams(audience, id))
+            streams = self._streams(audience, id)
+            lane = audience.lanes[id] = _Lane(id, streams) if streams else _NO_LANE
         return lane
 
-    def _streams(self, audience: _Audience[ChannelT], id: int) -> list[tuple[_Stream, Sequence[ChannelT]]]:
+    def _streams(self, audience: _Audience[ChannelT], id: int) -> tuple[tuple[_Stream, Sequence[ChannelT]], ...]:
         """Return the streams of a message with their channels.
 
         None is shared with a channel elsewhere.
@@ -285,7 +287,7 @@ class Streams(Generic[ChannelT]):
         found: dict[_Stream, list[ChannelT]] = {}
         for channel in audience.channels:
             stream = self._stream(channel, id)
-            if stream.interval is not None:
+            if stream is not None and stream.interval is not None:
                 found.setdefault(stream, []).append(channel)
         result: list[tuple[_Stream, Sequence[ChannelT]]] = []
         for stream, channels in found.items():
@@ -293,13 +295,14 @@ class Streams(Generic[ChannelT]):
                 self._forget(id)
                 stream = self._adopt(channels, id, stream.part(len(channels)))
             result.append((stream, audience.parts.setdefault(tuple(channels), channels)))
-        return result
+        return tuple(result)
 
-    def _share(self, audience: _Audience[ChannelT], id: int, lane: _Lane[ChannelT]) -> None:
+    def _share(self, audience: _Audience[ChannelT], lane: _Lane[ChannelT]) -> None:
         """Let channels with the same interval share a stream.
 
         The next message comes to all of them when it is due to the first.
         """
+        id = lane.id
         shared: dict[float | None, _Stream] = {}
         for stream, channels in lane.streams:
             if stream.pace is None:
@@ -316,14 +319,16 @@ class Streams(Generic[ChannelT]):
             self._channels[channel][id] = stream
         return stream
 
-    def _stream(self, channel: ChannelT, id: int) -> _Stream:
+    def _stream(self, channel: ChannelT, id: int) -> _Stream | None:
+        """Return the stream of a message on a channel; None for one that is off by default."""
         streams = self._channels.get(channel)
         if streams is None:
             streams = self._channels.setdefault(channel, {})
         stream = streams.get(id)
         if stream is None:
             interval = self._default(channel, id)
-            stream = streams[id] = _OFF if interval is None else _Stream(interval, self._pace(channel))
+            if interval is not None:
+                stream = streams[id] = _Stream(interval, self._pace(channel))
         return stream
 
     def _default(self, channel: ChannelT, id: int) -> float | None:
