@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
 from typing import Any
 
 from anafi_mav.drone.events import Message
@@ -31,7 +32,7 @@ class ValueInterest:
     __slots__ = ("_switched", "is_on", "kinds")
 
     def __init__(self, kinds: Iterable[type[Message]], *, is_on: bool = True) -> None:
-        self.kinds = frozenset(kinds)
+        self.kinds = _shared(frozenset(kinds))
         self.is_on = is_on
         self._switched: Callable[[], None] = lambda: None
 
@@ -46,6 +47,12 @@ class ValueInterest:
         self._switched = call
 
 
+@lru_cache(maxsize=256)
+def _shared(kinds: frozenset[type[Message]]) -> frozenset[type[Message]]:
+    """Return the first set of these kinds: every drone's handlers have the same ones."""
+    return kinds
+
+
 ValueSubscriptions = Mapping[ValueHandler, ValueInterest]
 """The interest of each handler."""
 
@@ -54,12 +61,16 @@ MAX_REMEMBERED = 64
 
 
 def in_order(tables: Iterable[Subscriptions]) -> dict[type[Message], tuple[EventHandler, ...]]:
-    """Join tables into one; handlers of an event are called in the sequence of their tables."""
+    """Join tables into one; handlers of an event are called in the sequence of their tables.
+
+    Events with the same handlers share a tuple: a drone has 150 of them, and a fifth as many tuples.
+    """
     handlers: dict[type[Message], tuple[EventHandler, ...]] = {}
     for table in tables:
         for kind, handler in table.items():
             handlers[kind] = (*handlers.get(kind, ()), handler)
-    return handlers
+    shared: dict[tuple[EventHandler, ...], tuple[EventHandler, ...]] = {}
+    return {kind: shared.setdefault(together, together) for kind, together in handlers.items()}
 
 
 class ValueHandlers:

@@ -36,6 +36,17 @@ def test_handlers_of_several_tables_keep_table_order() -> None:
     assert called == ["vehicle at 2.5", "first at 2.5", "second at 2.5"]
 
 
+def test_events_with_the_same_handlers_share_them() -> None:
+    class Owner:
+        def handle(self, message: Message, now: float) -> None: ...
+
+    owner = Owner()
+    table = {events.SpeedChanged: owner.handle, events.AttitudeChanged: owner.handle}
+    joined = in_order([table])
+    assert joined[events.SpeedChanged] is joined[events.AttitudeChanged]
+    assert ValueInterest(table).kinds is ValueInterest(reversed(table)).kinds
+
+
 @pytest.mark.parametrize(
     ("kind", "owners"),
     [
