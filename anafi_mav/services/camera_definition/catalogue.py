@@ -120,7 +120,7 @@ class Catalogue:
         self._shared = CamerasState()
         self._thermal = ThermalState()
         self.entries: tuple[CatalogueEntry, ...] = ()
-        self.index: dict[str, int] = {}
+        self.index: Mapping[str, int] = {}
         """Place of each setting in the list."""
         self._offers: dict[int, CameraOffers] = {}
 
@@ -133,9 +133,7 @@ class Catalogue:
         if offers == self._offers:
             return False
         self._offers = offers
-        found = (self._entry(place, setting) for place, setting in enumerate(SETTINGS))
-        self.entries = tuple(entry for entry in found if entry is not None)
-        self.index = {entry.setting.name: place for place, entry in enumerate(self.entries)}
+        self.entries, self.index = _entries_of(tuple(offers.values()))
         return True
 
     @property
@@ -198,24 +196,6 @@ class Catalogue:
         view = self._view(camera)
         settings = tuple((setting.options_of(view), setting.limits_of(view)) for setting in SETTINGS)
         return CameraOffers(camera.kind, camera.photos, camera.recordings, settings)
-
-    def _entry(self, place: int, setting: CameraSetting) -> CatalogueEntry | None:
-        """Return a setting with the options of all cameras; None when no camera has it."""
-        offered = [offers.settings[place] for offers in self._offers.values()]
-        options: dict[float, Option] = {}
-        for some, _ in offered:
-            options.update((option.value, option) for option in some)
-        # Choices are in the sequence of the table, numbers in their own.
-        ordered = list(options.values()) if setting.kind.is_choice else sorted(options.values())
-        limits = [found for _, found in offered if found is not None]
-        if not options and not limits:
-            return None
-        widest = None
-        if limits:
-            steps = {one.step for one in limits}
-            step = steps.pop() if len(steps) == 1 else None
-            widest = ValueLimits(min(one.low for one in limits), max(one.high for one in limits), step)
-        return CatalogueEntry(setting, tuple(ordered), widest)
 
     def _view(self, camera: CameraState) -> View:
         return View(camera, self._shared, self._thermal)
@@ -288,6 +268,33 @@ class Catalogue:
         options = tuple(one for one in self[target].options if one.value in values)
         if options and (always or len(options) < len(self[target].options)):
             yield Restriction(name, option.value, target, options, conditions)
+
+
+@lru_cache(maxsize=SHARED)
+def _entries_of(cameras: tuple[CameraOffers, ...]) -> tuple[tuple[CatalogueEntry, ...], Mapping[str, int]]:
+    """Return the settings of these cameras, and the place of each; equal drones share them."""
+    found = (_entry(cameras, place, setting) for place, setting in enumerate(SETTINGS))
+    entries = tuple(entry for entry in found if entry is not None)
+    return entries, {entry.setting.name: place for place, entry in enumerate(entries)}
+
+
+def _entry(cameras: tuple[CameraOffers, ...], place: int, setting: CameraSetting) -> CatalogueEntry | None:
+    """Return a setting with the options of all cameras; None when no camera has it."""
+    offered = [offers.settings[place] for offers in cameras]
+    options: dict[float, Option] = {}
+    for some, _ in offered:
+        options.update((option.value, option) for option in some)
+    # Choices are in the sequence of the table, numbers in their own.
+    ordered = list(options.values()) if setting.kind.is_choice else sorted(options.values())
+    limits = [found for _, found in offered if found is not None]
+    if not options and not limits:
+        return None
+    widest = None
+    if limits:
+        steps = {one.step for one in limits}
+        step = steps.pop() if len(steps) == 1 else None
+        widest = ValueLimits(min(one.low for one in limits), max(one.high for one in limits), step)
+    return CatalogueEntry(setting, tuple(ordered), widest)
 
 
 def grown(known: CameraState | None, now: CameraState) -> CameraState:

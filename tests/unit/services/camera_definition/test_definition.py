@@ -99,6 +99,8 @@ def test_equal_cameras_of_two_drones_share_their_options() -> None:
     catalogues = Catalogue(), Catalogue()
     for one in catalogues:
         one.learn(*states("4k"))
+    assert catalogues[0].entries is catalogues[1].entries
+    assert catalogues[0].index is catalogues[1].index
     mine, others = ([entry.options for entry in one.entries] for one in catalogues)
     assert sum(len(options) for options in mine) > 100
     for options, same in zip(mine, others, strict=True):
