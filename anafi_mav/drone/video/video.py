@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from typing import Any, ClassVar, TypeAlias
@@ -156,8 +156,8 @@ class Video(Element[VideoState]):
         self._frame_callbacks: tuple[FrameCallback, ...] = ()
         self._picture_callbacks: tuple[PictureCallback, ...] = ()
         self._stale: asyncio.TimerHandle | None = None
-        self._arrivals: deque[float] = deque(maxlen=MAX_RATE)
-        self._sizes: deque[tuple[float, int]] = deque(maxlen=MAX_RATE)
+        self._arrivals: list[float] = []
+        self._sizes: list[tuple[float, int]] = []
         """Arrival and bytes of the pictures of the last second."""
         self._clock: tuple[int, float] | None = None
         """The timestamp of RTP of the last picture, and when that was taken."""
@@ -366,8 +366,9 @@ class Video(Element[VideoState]):
             self._stale.cancel()
         self._stale = loop.call_at(now + STALE, self._forget)
         self._sizes.append((now, sum(map(len, picture.units))))
+        del self._sizes[:-MAX_RATE]
         while now - self._sizes[0][0] > RATE_WINDOW:
-            self._sizes.popleft()
+            self._sizes.pop(0)
         taken = self._taken(picture)
         if not self.state.playing:
             shown = None if self._stream is None else self._stream.shown
@@ -378,8 +379,9 @@ class Video(Element[VideoState]):
         metadata = picture.metadata
         if metadata is not None:
             self._arrivals.append(now)
+            del self._arrivals[:-MAX_RATE]
             while now - self._arrivals[0] > RATE_WINDOW:
-                self._arrivals.popleft()
+                self._arrivals.pop(0)
             span = now - self._arrivals[0]
             rate = (len(self._arrivals) - 1) / span if span > 0.0 else None
             frame = VideoFrame(metadata, now, taken, picture.timestamp, *self._shot(picture, now))

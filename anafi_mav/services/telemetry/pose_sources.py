@@ -19,16 +19,19 @@ SILENCE = 0.5
 
 
 class PoseSources(Generic[ChannelT]):
-    """The source of the pose messages of every channel. A closed channel is removed by itself."""
+    """The source of the pose messages of every channel.
+
+    A request that a command makes for a channel after its end is removed with the channel.
+    """
 
     def __init__(self) -> None:
         self.requests: WeakKeyDictionary[ChannelT, set[int]] = WeakKeyDictionary()
         """The messages for which a channel wants pictures."""
         self.is_used = False
         """False: no channel wants pictures, and events are the only source."""
-        self._floors: WeakKeyDictionary[ChannelT, float] = WeakKeyDictionary()
+        self._floors: dict[ChannelT, float] = {}
         """Of each channel with pictures: the time (s) after which a picture is newer than its last event."""
-        self._shots: WeakKeyDictionary[ChannelT, float] = WeakKeyDictionary()
+        self._shots: dict[ChannelT, float] = {}
         """Of each channel: when the newest picture was taken that was sent there."""
         self._arrived = -math.inf
         self._split: tuple[Sequence[ChannelT], list[ChannelT], list[ChannelT]] | None = None
@@ -53,6 +56,8 @@ class PoseSources(Generic[ChannelT]):
     def close(self, channel: ChannelT) -> None:
         """The channel is closed."""
         self.requests.pop(channel, None)
+        self._floors.pop(channel, None)
+        self._shots.pop(channel, None)
         self._changed()
 
     def _changed(self) -> None:

@@ -98,5 +98,7 @@ def test_disconnected_drone_and_closed_channel_end_pictures() -> None:
     assert sources.on_events(channels, 1.0) == [one]
     sources.on_picture(5.0)
     assert sources.on_events(channels, 5.0) == []
+    assert sources.newest(one) == 1.0
     sources.close(one)
     assert sources.on_events(channels, 5.0) is channels
+    assert sources.newest(one) == float("-inf")
