@@ -125,7 +125,7 @@ class Streams(Generic[ChannelT]):
         `has` returns False for a message that a channel does not have by default, `pace` how far it is slowed down.
         """
         self._pace = pace
-        self._defaults = dict(defaults)
+        self._defaults = defaults
         self._has = has
         self._channels: WeakKeyDictionary[ChannelT, dict[int, _Stream]] = WeakKeyDictionary()
         self._phase: float | None = None

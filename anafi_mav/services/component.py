@@ -11,9 +11,9 @@ import asyncio
 import logging
 import math
 from collections.abc import Callable, Coroutine, Hashable, Iterable, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Protocol
-from weakref import WeakKeyDictionary
 
 from anafi_mav import texts
 from anafi_mav.clock import Clock
@@ -182,11 +182,11 @@ class Component:
         """Messages that the next one of their kind replaces: a full channel drops them rather than answers."""
         self._handlers: dict[int, MessageHandler] = {}
         self._denials: dict[int, MessageHandler] = {}
-        self._denied_at: WeakKeyDictionary[Channel, float] = WeakKeyDictionary()
+        self._denied_at: dict[Channel, float] = {}
         """When a channel last got the text about its access."""
         self._clients: dict[Hashable, tuple[float, Channel]] = {}
         """Client -> when its last message arrived, and where."""
-        self._own: frozenset[int] = frozenset()
+        self.own_commands: frozenset[int] = frozenset()
         """The commands of this component's services."""
         self._receiving = [service for service in self.services if type(service).received is not Service.received]
 
@@ -196,11 +196,11 @@ class Component:
         `others`: actions that this component answers for others. Raises `ValueError` when two services claim the same.
         """
         streams = joined(service.streams() for service in self.services)
-        self.telemetry = frozenset({*streams, dialect.MAVLINK_MSG_ID_HEARTBEAT})
+        self.telemetry = _shared(frozenset({*streams, dialect.MAVLINK_MSG_ID_HEARTBEAT}))
         self.messages.take_tables(streams, joined(service.requests() for service in self.services))
         queries = joined(service.queries() for service in self.services)
         actions = joined(service.actions() for service in self.services)
-        self._own = frozenset({*queries, *actions})
+        self.own_commands = _shared(frozenset({*queries, *actions}))
         self.commands.take_tables(queries, joined([actions, others]))
         self._ftp.take_tables(
             joined(service.files() for service in self.services),
@@ -214,7 +214,7 @@ class Component:
         """True for a COMMAND_LONG or COMMAND_INT that is this component's own."""
         if message.command in BY_MESSAGE:
             return self.messages.has(message.param1)
-        return message.command in self._own
+        return message.command in self.own_commands
 
     # Host.
 
@@ -280,6 +280,7 @@ class Component:
     def channel_closed(self, channel: Channel) -> None:
         """Forget the clients of a channel that is gone."""
         self._clients = {client: known for client, known in self._clients.items() if known[1] is not channel}
+        self._denied_at.pop(channel, None)
         for service in self.services:
             service.channel_closed(channel)
 
@@ -382,6 +383,12 @@ class Component:
         if inbound.now - self._denied_at.get(channel, -math.inf) >= DENIED_EVERY:
             self._denied_at[channel] = inbound.now
             self.text(Severity.WARNING, texts.ACCESS_DENIED.fill(access=channel.options.access), channel)
+
+
+@lru_cache(maxsize=64)
+def _shared(numbers: frozenset[int]) -> frozenset[int]:
+    """Return the first set of these ids: components of all drones have the same ones."""
+    return numbers
 
 
 def chained(tables: Iterable[Mapping[int, MessageHandler]]) -> dict[int, MessageHandler]:

@@ -10,6 +10,7 @@ import logging
 import math
 from collections.abc import Hashable, Mapping, Sequence
 from functools import lru_cache
+from typing import NamedTuple
 
 from msgspec.structs import replace
 
@@ -81,14 +82,10 @@ class MessageService(Service):
         self._table: Mapping[int, MessageStream] = {}
         self._requests: Mapping[int, Request] = {}
         self._tracker = UpdateTracker({})
-        self._events: Sequence[type[Message]] = ()
-        """Events that update some message, without those of values."""
-        self._values: Sequence[type[Message]] = ()
-        """Events of values that update some message."""
-        self._repeated: tuple[int, ...] = ()
+        self.index = _index_of(())
+        """What follows from the streams: shared with the components that have the same ones."""
         self._repeat_at = -math.inf
         """When messages may be repeated next (s)."""
-        self._on_change: list[int] = []
         self._linked_at = 0.0
         self._stamped: dict[int, float] = {}
         """The time (s, monotonic) in the last message of each kind: it never goes back."""
@@ -101,10 +98,6 @@ class MessageService(Service):
         self._failed: dict[int, float] = {}
         """When it was last logged that a message cannot be made."""
         self._sources: PoseSources[Channel] = PoseSources()
-        self._poses: tuple[int, ...] = ()
-        """The messages that can be made of pictures."""
-        self._of_video: tuple[int, ...] = ()
-        """The messages whose fields are in the video only."""
         self._picture: VehiclePose | None = None
         """The newest picture's."""
         self._stamped_pictures = -math.inf
@@ -120,16 +113,9 @@ class MessageService(Service):
         The queries follow from them.
         """
         self._table, self._requests = streams, requests
-        defaults = {id: stream.every for id, stream in streams.items() if stream.every is not None}
-        self.intervals = Streams(defaults, has=self._is_streamed, pace=lambda channel: channel.pace)
-        updates, affected = _affected(tuple((id, stream.updates) for id, stream in streams.items()))
-        self._events = [kind for kind in updates if kind not in VALUES]
-        self._values = [kind for kind in updates if kind in VALUES]
-        self._tracker = UpdateTracker(affected)
-        self._on_change = [id for id, stream in streams.items() if stream.on_change]
-        self._repeated = tuple(id for id, stream in streams.items() if stream.is_repeated)
-        self._poses = tuple(id for id, stream in streams.items() if stream.from_pictures)
-        self._of_video = tuple(id for id, stream in streams.items() if stream.needs_video and not stream.from_pictures)
+        self.index = _index_of(tuple(StreamRow.of(id, stream) for id, stream in streams.items()))
+        self.intervals = Streams(self.index.defaults, has=self._is_streamed, pace=lambda channel: channel.pace)
+        self._tracker = UpdateTracker(self.index.affected)
 
     def queries(self) -> Mapping[int, Query]:
         return {
@@ -138,7 +124,7 @@ class MessageService(Service):
             ),
             dialect.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
             dialect.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_interval,
-            **{old: self._legacy(id, indexed) for old, (id, indexed) in LEGACY_REQUESTS.items() if self.has(id)},
+            **dict.fromkeys((old for old, (id, _) in LEGACY_REQUESTS.items() if self.has(id)), self._legacy),
         }
 
     def messages(self) -> Mapping[int, MessageHandler]:
@@ -169,10 +155,10 @@ class MessageService(Service):
         self.intervals.channel_closed(channel)
 
     def subscriptions(self) -> Subscriptions:
-        return dict.fromkeys(self._events, self._on_update)
+        return dict.fromkeys(self.index.events, self._on_update)
 
     def value_subscriptions(self) -> ValueSubscriptions:
-        return {self._on_values: ValueInterest(self._values)}
+        return {self._on_values: ValueInterest(self.index.values)}
 
     def _on_values(self, values: Values, now: float) -> None:
         """Send the messages that they update, soon; without one that is due they are counted."""
@@ -203,7 +189,7 @@ class MessageService(Service):
     def needs_video(self) -> bool:
         """True while a client has a stream whose fields are in the video only."""
         channels = self.host.channels
-        return any(self.intervals.is_streamed(channels, id) for id in self._of_video)
+        return any(self.intervals.is_streamed(channels, id) for id in self.index.of_video)
 
     def show_picture(self, pose: VehiclePose, shot: float, now: float) -> None:
         """Send the pose that a picture reports to the channels that want it.
@@ -214,11 +200,11 @@ class MessageService(Service):
             return  # what is known of the drone's clock has changed: the picture seems no newer than the last
         self._picture, self._stamped_pictures = pose, shot
         self._sources.on_picture(now)
-        newest_event = max((self._stamped.get(id, -math.inf) for id in self._poses), default=-math.inf)
+        newest_event = max((self._stamped.get(id, -math.inf) for id in self.index.poses), default=-math.inf)
         channels = self._sources.on_pictures(self.host.channels, shot, newest_event, now)
         if channels:
             times = self.host.times(shot, pose)
-            for id, due in self.intervals.due_on(channels, self._poses, shot):
+            for id, due in self.intervals.due_on(channels, self.index.poses, shot):
                 self._show(id, due, times, shot)
             self._flush()
 
@@ -240,14 +226,14 @@ class MessageService(Service):
             return self._repeat_at
         self._repeat_at = now + REPEATED
         channels = self.host.channels
-        for id, due in self.intervals.due_on(channels, self._repeated, now, is_repeated=True):
+        for id, due in self.intervals.due_on(channels, self.index.repeated, now, is_repeated=True):
             self._leave(id, due, self._times(id))
         self._flush()
-        return max(self._repeat_at, self.intervals.next_on(channels, self._repeated))
+        return max(self._repeat_at, self.intervals.next_on(channels, self.index.repeated))
 
     def state_changed(self) -> None:
         """They leave at once, except to clients that have switched them off."""
-        for id in self._on_change:
+        for id in self.index.on_change:
             to = [channel for channel in self.host.channels if channel.can_stream(id)]
             self._leave(id, self.intervals.without_off(to, id), self._times(id))
         self._flush()
@@ -399,14 +385,11 @@ class MessageService(Service):
         message = stream.build(self.host.vehicle, times)
         return dialect.MAV_RESULT_TEMPORARILY_REJECTED if message is None else message
 
-    def _legacy(self, id: int, indexed: bool) -> Query:
-        """Return the query that answers as REQUEST_MESSAGE does, with the index in its param2."""
-
-        def answer(inbound: Inbound, command: Command) -> int:
-            index = command.params[0] if indexed else math.nan
-            return self._request(inbound, id, replace(command, params=(float(id), index, math.nan, math.nan)))
-
-        return answer
+    def _legacy(self, inbound: Inbound, command: Command) -> int:
+        """Answer a command of `LEGACY_REQUESTS` as REQUEST_MESSAGE, with the index in its param2."""
+        id, has_index = LEGACY_REQUESTS[command.id]
+        index = command.params[0] if has_index else math.nan
+        return self._request(inbound, id, replace(command, params=(float(id), index, math.nan, math.nan)))
 
     def _set_interval(self, inbound: Inbound, command: Command) -> int:
         id, interval = command.params[0], command.params[1]
@@ -464,18 +447,59 @@ class MessageService(Service):
         return interval or 0.0
 
 
-@lru_cache(maxsize=SHARED)
-def _affected(
-    updates: tuple[tuple[int, tuple[type[Message], ...]], ...],
-) -> tuple[Sequence[type[Message]], Mapping[Hashable, tuple[int, ...]]]:
-    """Return the events that update messages, and the messages that each source affects.
+class StreamRow(NamedTuple):
+    """The part of a message's stream that does not depend on the drone."""
 
-    Sources are these events and the messages themselves. `updates`: each message with the events that update it.
-    """
+    id: int
+    updates: tuple[type[Message], ...]
+    every: float | None
+    on_change: bool
+    is_repeated: bool
+    from_pictures: bool
+    needs_video: bool
+
+    @classmethod
+    def of(cls, id: int, stream: MessageStream) -> StreamRow:
+        """Return the row of a message."""
+        flags = stream.on_change, stream.is_repeated, stream.from_pictures, stream.needs_video
+        return cls(id, stream.updates, stream.every, *flags)
+
+
+class StreamIndex(NamedTuple):
+    """Everything that follows from the rows of a component's streams."""
+
+    events: tuple[type[Message], ...]
+    """Events that update some message, without those of values."""
+    values: tuple[type[Message], ...]
+    """Events of values that update some message."""
+    affected: Mapping[Hashable, tuple[int, ...]]
+    """The messages that each source affects. Sources are these events and the messages themselves."""
+    defaults: Mapping[int, float]
+    """Intervals (s) of the messages that are streamed by default."""
+    on_change: tuple[int, ...]
+    repeated: tuple[int, ...]
+    poses: tuple[int, ...]
+    """The messages that can be made of pictures."""
+    of_video: tuple[int, ...]
+    """The messages whose fields are in the video only."""
+
+
+@lru_cache(maxsize=SHARED)
+def _index_of(rows: tuple[StreamRow, ...]) -> StreamIndex:
+    """Return the index of these streams; drones with the same ones share it."""
     affected: dict[Hashable, tuple[int, ...]] = {}
-    for id, kinds in updates:
-        for kind in dict.fromkeys(kinds):
-            affected[kind] = (*affected.get(kind, ()), id)
-    events = tuple(kind for kind in affected if isinstance(kind, type))
-    affected.update((id, (id,)) for id, _ in updates)
-    return events, affected
+    for row in rows:
+        for kind in dict.fromkeys(row.updates):
+            affected[kind] = (*affected.get(kind, ()), row.id)
+    updates = tuple(kind for kind in affected if isinstance(kind, type))
+    affected.update((row.id, (row.id,)) for row in rows)
+    return StreamIndex(
+        events=tuple(kind for kind in updates if kind not in VALUES),
+        values=tuple(kind for kind in updates if kind in VALUES),
+        affected=affected,
+        defaults={row.id: row.every for row in rows if row.every is not None},
+        on_change=tuple(row.id for row in rows if row.on_change),
+        repeated=tuple(row.id for row in rows if row.is_repeated),
+        poses=tuple(row.id for row in rows if row.from_pictures),
+        of_video=tuple(row.id for row in rows if row.needs_video and not row.from_pictures),
+    )

@@ -68,6 +68,17 @@ async def test_event_reaches_vehicle_then_services_then_change_messages(kind: ty
     assert [call.__qualname__.partition(".")[0] for call in joined.get(kind, ())] == owners.split()
 
 
+async def test_components_of_equal_drones_share_what_follows_from_their_streams() -> None:
+    clock = SystemClock()
+    node = Node(clock=clock)
+    one, other = (System(node, Drone("127.0.42.1"), id, clock, 0.0, allow_kill=False) for id in (1, 2))
+    assert len(one.components) == len(other.components) > 1
+    for ours, theirs in zip(one.components, other.components, strict=True):
+        assert ours.telemetry is theirs.telemetry
+        assert ours.own_commands is theirs.own_commands
+        assert ours.messages.index is theirs.messages.index
+
+
 def test_handler_of_values_is_called_once_for_those_that_arrive_together() -> None:
     called: list[str] = []
 
