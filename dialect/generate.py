@@ -77,6 +77,15 @@ CONSTRUCTOR = re.compile(
 )
 """What mavgen sets in each message although it is the same for all messages of the class."""
 
+FOR_READERS = re.compile(
+    r'(?<=_message\(MAVLink_message\):\n)    """\n(?:.*\n)*?    """\n\n'
+    r"|    (?:fielddisplays|fieldenums|fieldunits)_by_name: Dict\[str, str\] = \{.*\}\n"
+    r"|    native_format = .*\n"
+    r'|# Define name on the class .*\n# Done .*\nsetattr\(MAVLink_\w+, "name", .*\)\n'
+)
+"""Description, units, display hints and older name of each message. They are not used, and take a seventh of the memory
+of the module. The class of all messages has empty ones."""
+
 ENUMS_HEAD = '''"""MAVLink's enums: numbers, names, and the commands that have a location. Generated, do not edit.
 
 A constant for each entry, and `enums`: {name of the enum: {number: entry}}, as in pymavlink.
@@ -136,10 +145,12 @@ def _with_shared_attributes(base: str) -> str:
 
 
 def _lightened(messages: str) -> str:
-    """Return mavgen's part with the messages without what each of them sets, and without the methods that send them."""
+    """Return mavgen's part with the messages without what each of them sets, without descriptions and senders."""
     messages, count = CONSTRUCTOR.subn("", messages)
+    messages, hints = FOR_READERS.subn("", messages)
     begin = SENDERS.search(messages)
-    if begin is None or count != messages.count("_message(MAVLink_message):"):
+    kinds = messages.count("_message(MAVLink_message):")
+    if begin is None or count != kinds or hints != 6 * kinds:
         raise OverlayError("mavgen writes its messages in another way")
     return messages[: begin.start()]
 

@@ -119,6 +119,14 @@ def test_messages_have_the_attributes_of_mavgens_constructor() -> None:
     assert sorted(vars(message)) == sorted(dialect.MAVLink_heartbeat_message.fieldnames)
 
 
+def test_message_classes_lack_descriptions_units_and_older_names() -> None:
+    """They are not used, and take memory for as long as the gateway runs."""
+    unused = {"fielddisplays_by_name", "fieldenums_by_name", "fieldunits_by_name", "native_format", "name"}
+    for kind in dialect.mavlink_map.values():
+        assert not unused & vars(kind).keys()
+        assert kind.__doc__ is None
+
+
 def test_packing_a_message_leaves_others_of_its_class_alone() -> None:
     packed, other = (dialect.MAVLink_heartbeat_message(2, 12, 1, 0, 4, 3) for _ in range(2))
     sender = dialect.MAVLink(None, 7, 8)
