@@ -8,7 +8,7 @@ that a message made of all three is sent once, with all three.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 
 WINDOW = 10.0
 """s. How often something is news is counted over the present window and the one before."""
@@ -46,8 +46,6 @@ class UpdateTracker:
         """The sources that had news in this turn, in their order."""
         self._at = 0.0
         self._bundles: dict[tuple[Hashable, ...], _Bundle] = {}
-        self._of: dict[int, list[_Bundle]] = {}
-        """The bundles that each message is in."""
         self._since = self._window = 0.0
         """When the window before this one began, and this one."""
 
@@ -55,7 +53,6 @@ class UpdateTracker:
         """Forget all updates and intervals."""
         self._updated = {}
         self._bundles.clear()
-        self._of.clear()
         self._since = self._window = now
 
     def mark(self, source: Hashable, at: float) -> bool:
@@ -104,11 +101,11 @@ class UpdateTracker:
 
     def at(self, id: int) -> float | None:
         """When something was new for this message last; None: never."""
-        return max((bundle.at for bundle in self._of.get(id, ())), default=None)
+        return max((bundle.at for bundle in self._with(id)), default=None)
 
     def interval(self, id: int, now: float) -> float | None:
         """Return the mean time (s) between two updates for this message; None before two."""
-        count = sum(bundle.count + bundle.before for bundle in self._of.get(id, ()))
+        count = sum(bundle.count + bundle.before for bundle in self._with(id))
         return (now - self._since) / count if count > 1 and now > self._since else None
 
     def pass_time(self, now: float) -> None:
@@ -124,6 +121,8 @@ class UpdateTracker:
             self.reset(self._at)
         bundle = _Bundle(tuple(dict.fromkeys(id for source in key for id in self._ids.get(source, ()))))
         self._bundles[key] = bundle
-        for id in bundle.ids:
-            self._of.setdefault(id, []).append(bundle)
         return bundle
+
+    def _with(self, id: int) -> Iterator[_Bundle]:
+        """Yield the bundles with this message. There are a dozen in all, and it is seldom asked for."""
+        return (bundle for bundle in self._bundles.values() if id in bundle.ids)
