@@ -138,6 +138,51 @@ class ComponentSystem(Protocol):
 class Component:
     """One component of a system; the `Host` of its services."""
 
+    __slots__ = (
+        "_clients",
+        "_denials",
+        "_denied_at",
+        "_ftp",
+        "_handlers",
+        "_receiving",
+        "_system",
+        "camera_flags",
+        "capabilities",
+        "clock",
+        "commands",
+        "compid",
+        "definition",
+        "download_folder",
+        "drone",
+        "drop_input",
+        "end_others",
+        "failsafe_limits",
+        "has_picture_pose",
+        "look_soon",
+        "mark_updated",
+        "memory",
+        "messages",
+        "notices",
+        "own_commands",
+        "payload_history",
+        "position_of",
+        "run_action",
+        "send_heartbeat",
+        "services",
+        "set_muted",
+        "show_picture",
+        "spawn",
+        "sysid",
+        "telemetry",
+        "text",
+        "times",
+        "uris",
+        "use_input",
+        "vehicle",
+        "warn_throttled",
+    )
+    # Beyond 30 attributes Python gives each object a table of its own, of 1600 bytes.
+
     def __init__(self, system: ComponentSystem, compid: int, services: Iterable[type[Service]]) -> None:
         self.compid = compid
         self.sysid = system.sysid
