@@ -32,8 +32,8 @@ from anafi_mav.cli.paced_calls import PacedCall, PacedCalls
 from anafi_mav.disk_writer import DiskWriter
 from anafi_mav.receive_buffer import OpenSocket
 
-AT_ONCE = 4
-"""Sockets of drones that are read in an event-loop iteration at most: about a millisecond of work."""
+AT_ONCE = 8
+"""Sockets of drones that are read in an event-loop iteration at most: less than a millisecond of work."""
 
 PATIENCE = 0.002
 """s by which clients may be ahead of drones whose datagrams wait: a command takes some event-loop iterations."""

@@ -87,6 +87,8 @@ class FenceService(Service):
         self._located = -math.inf
         """When the drone last reported its position."""
         self._looked = self._mirrored = -math.inf
+        self._speeds = ValueInterest((events.SpeedChanged,), is_on=False)
+        """On unless the drone stands: its speed says how soon it will be at a boundary."""
         self._breach_ms = 0
         self._judgement: _WayJudgement | None = None
         """Of the newest flight by the newest fence."""
@@ -123,7 +125,7 @@ class FenceService(Service):
         }
 
     def value_subscriptions(self) -> ValueSubscriptions:
-        return {self._on_speed: ValueInterest((events.SpeedChanged,))}
+        return {self._on_speed: self._speeds}
 
     def _on_location(self, message: events.GpsLocationChanged, now: float) -> None:
         self._located = self.host.clock.monotonic()
@@ -217,8 +219,10 @@ class FenceService(Service):
     def _look(self, now: float) -> None:
         self._looked = now
         vehicle, watch = self.host.vehicle, self._watch
+        stands = vehicle.on_ground or vehicle.flying_state is None
+        self._speeds.switch(not stands)
         is_announced = self._announced == (False, watch.breaches)
-        if is_announced and watch.rests and (vehicle.on_ground or vehicle.flying_state is None):
+        if is_announced and watch.rests and stands:
             return
         before = watch.state
         blind, breaches = watch.blind, watch.breaches

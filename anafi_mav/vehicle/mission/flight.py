@@ -152,6 +152,8 @@ class MissionFlight(PlainTask):
         self._clock = clock
         self._files = FilesOnDrone(vehicle.drone.flight_plan)
         self._alarm = Alarm(self._on_alarm)
+        self._proof = ValueInterest(PROOF, is_on=False)
+        """Of the values that show whether the drone has reached the last way point: while that is in question."""
         self._outlet: MissionOutlet | None = None
         self._background: asyncio.Task[None] | None = None
         """Runs the machine's work when no command of a client does."""
@@ -424,6 +426,7 @@ class MissionFlight(PlainTask):
             self._alarm.cancel()
         elif deadline != self._alarm.at:
             self._alarm.set(deadline)
+        self._proof.switch(self.machine.state is State.ENDING)
         if self._begun is not None and self._beginning is None:
             self._release_waiting()
         if self._outlet is not None:
@@ -639,7 +642,7 @@ class MissionFlight(PlainTask):
 
     def value_subscriptions(self) -> ValueSubscriptions:
         """Return the handler of the values that prove that the drone is at its last way point."""
-        return {self._on_position: ValueInterest(PROOF)}
+        return {self._on_position: self._proof}
 
     def _on_playing(self, message: events.MavlinkFilePlayingStateChanged, now: float) -> None:
         plan = self._vehicle.drone.flight_plan
@@ -661,8 +664,6 @@ class MissionFlight(PlainTask):
             self._handle(self.machine.skipped(message.item))
 
     def _on_position(self, values: Values, now: float) -> None:
-        if self.machine.state is not State.ENDING:
-            return
         for kind in values.layout.kinds:
             if kind in PROOF and self.machine.state is State.ENDING:
                 self._handle(self.machine.reported(self._report(), self._now, kind))
