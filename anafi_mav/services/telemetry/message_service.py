@@ -164,9 +164,9 @@ class MessageService(Service):
         """Send the messages that they update, soon; without one that is due they are counted."""
         tracker, kinds = self._tracker, values.layout.kinds
         if not (tracker.has_updates or self._sources.is_used):
-            ids = tracker.ids(kinds)
-            if now < self.intervals.next_on(self.host.channels, ids):
-                tracker.count(kinds, now)
+            bundle = tracker.bundle(kinds)
+            if now < self.intervals.next_on(self.host.channels, bundle.ids):
+                bundle.add(now)
                 return
         if tracker.mark_all(kinds, now):
             self.host.drone.after_read(self._send_updated)

@@ -17,7 +17,7 @@ MAX_BUNDLES = 256
 """Different bundles that are remembered; a drone in operation sends a dozen."""
 
 
-class _Bundle:
+class Bundle:
     """Sources that were updated together."""
 
     __slots__ = ("at", "before", "count", "ids")
@@ -32,6 +32,11 @@ class _Bundle:
         self.before = 0
         """And in the one before."""
 
+    def add(self, at: float) -> None:
+        """Count an update of all these sources."""
+        self.count += 1
+        self.at = at
+
 
 class UpdateTracker:
     """Updates of one drone's messages.
@@ -45,7 +50,7 @@ class UpdateTracker:
         self._updated: dict[Hashable, None] = {}
         """The sources that had news in this turn, in their order."""
         self._at = 0.0
-        self._bundles: dict[tuple[Hashable, ...], _Bundle] = {}
+        self._bundles: dict[tuple[Hashable, ...], Bundle] = {}
         self._since = self._window = 0.0
         """When the window before this one began, and this one."""
 
@@ -79,25 +84,19 @@ class UpdateTracker:
         """
         if not self._updated:
             return (), self._at
-        key = tuple(self._updated)
+        bundle = self.bundle(tuple(self._updated))
         self._updated = {}
-        return self.count(key, self._at), self._at
+        bundle.add(self._at)
+        return bundle.ids, self._at
 
     @property
     def has_updates(self) -> bool:
         """True when `take` would return updates."""
         return bool(self._updated)
 
-    def ids(self, sources: tuple[Hashable, ...]) -> tuple[int, ...]:
-        """Return the messages that updates from all these sources affect."""
-        return (self._bundles.get(sources) or self._new_bundle(sources)).ids
-
-    def count(self, sources: tuple[Hashable, ...], at: float) -> tuple[int, ...]:
-        """Count updates from all these sources as taken, and return the messages that they affect."""
-        bundle = self._bundles.get(sources) or self._new_bundle(sources)
-        bundle.count += 1
-        bundle.at = at
-        return bundle.ids
+    def bundle(self, sources: tuple[Hashable, ...]) -> Bundle:
+        """Return what is known of updates from all these sources."""
+        return self._bundles.get(sources) or self._new_bundle(sources)
 
     def at(self, id: int) -> float | None:
         """When something was new for this message last; None: never."""
@@ -116,13 +115,13 @@ class UpdateTracker:
         for bundle in self._bundles.values():
             bundle.before, bundle.count = bundle.count, 0
 
-    def _new_bundle(self, key: tuple[Hashable, ...]) -> _Bundle:
+    def _new_bundle(self, key: tuple[Hashable, ...]) -> Bundle:
         if len(self._bundles) >= MAX_BUNDLES:
             self.reset(self._at)
-        bundle = _Bundle(tuple(dict.fromkeys(id for source in key for id in self._ids.get(source, ()))))
+        bundle = Bundle(tuple(dict.fromkeys(id for source in key for id in self._ids.get(source, ()))))
         self._bundles[key] = bundle
         return bundle
 
-    def _with(self, id: int) -> Iterator[_Bundle]:
+    def _with(self, id: int) -> Iterator[Bundle]:
         """Yield the bundles with this message. There are a dozen in all, and it is seldom asked for."""
         return (bundle for bundle in self._bundles.values() if id in bundle.ids)

@@ -66,9 +66,10 @@ def test_updates_of_one_loop_iteration_are_one_bundle() -> None:
 def test_counted_updates_are_those_of_a_bundle_that_is_taken() -> None:
     taken, counted = registered(), registered()
     for number in range(1, 26):
-        assert bundled(taken, "ab", 0.2 * number) == counted.count(("a", "b"), 0.2 * number)
+        counted.bundle(("a", "b")).add(0.2 * number)
+        assert bundled(taken, "ab", 0.2 * number) == (1, 2, 3)
     assert not counted.has_updates
-    assert counted.ids(("a", "b")) == (1, 2, 3)
+    assert counted.bundle(("a", "b")).ids == (1, 2, 3)
     assert [counted.at(id) for id in (1, 2, 4)] == [taken.at(id) for id in (1, 2, 4)] == [5.0, 5.0, None]
     assert counted.interval(1, 5.0) == taken.interval(1, 5.0) == pytest.approx(0.2)
     assert counted.mark("c", 6.0)
