@@ -11,9 +11,11 @@ from contextlib import asynccontextmanager
 import pytest
 from support.fault_scenarios import ACCEPTED, LAND_CMD, PX4_HOLD, REJECTED, RTL, SET_MODE, goto, heard
 from support.missions import LAND as LAND_ITEM
-from support.missions import put, start, takeoff, way
+from support.missions import MISSION_MODE, PAUSED, mode, put, said, start, state, takeoff, way
+from support.plans import Item
 from support.world import ARMED, World, world
 
+from anafi_mav import mav_enums
 from anafi_mav.gateway import Gateway
 
 RETURN_HOME, TAKEOFF_LAND = range(2)
@@ -141,3 +143,17 @@ async def test_landing_by_button_that_began_unseen_on_the_way_of_a_plan_is_ended
         w.drone.faults.mute = False
         await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.land, since=mark, timeout=20.0)
         assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == REJECTED
+
+
+async def test_plan_without_way_points_that_was_paused_before_its_landing_stays_paused() -> None:
+    """It lands wherever the drone is: a drone that hovers there has not flown its last line."""
+    wait = Item(mav_enums.MAV_CMD_NAV_DELAY, 0.0, 0.0, p1=60.0, frame=2)
+    async with world(speed=1.0, web=True) as first:
+        await first.take_off(12.0)
+        await put(first, [wait, LAND_ITEM])
+        assert (await first.client.command(SET_MODE, 1, 4, 4)).result == ACCEPTED
+        await mode(first, MISSION_MODE["px4"], since=0)
+        assert (await first.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        async with restarted(first) as w:
+            await state(w, PAUSED, since=0)
+            await said(w, "Mission not flying: paused at item 1")

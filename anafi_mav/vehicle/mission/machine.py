@@ -862,6 +862,7 @@ class MissionMachine:
         if progress.leg_done and later is not None:
             progress = self.progress = replace(progress, current=later)
         current = progress.current + texts.FIRST_LABEL
+        lands = landing is not None and self._file_lands_at(progress.leg, landing)
         if plays and uid == progress.uid:
             self.phase = MissionPhase(S.FLYING_FILE, S.FLYING_FILE, plays=uid)
             self._limit(now)
@@ -869,7 +870,7 @@ class MissionMachine:
             yield SendText(Severity.NOTICE, texts.MISSION_FOUND_FLYING.fill(item=current))
         elif progress.leg_done and later is None:
             yield from self._complete()
-        elif later is None and uid in (None, "", progress.uid) and self._file_lands_at(progress.leg, landing):
+        elif lands and later is None and uid in (None, "", progress.uid):
             self._flown_plan = progress.uid  # a plan that has stopped may have no name
             yield from self._complete()
             yield Release(lands=True)
