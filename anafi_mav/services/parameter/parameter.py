@@ -108,7 +108,7 @@ def own(put: Callable[[Host, float], None]) -> Callable[[Host, float], Awaitable
 
 def fact(name: str, value: float, short: str, kind: ParamType = ParamType.INT32, **more: object) -> Parameter:
     """Something that is so and does not change."""
-    return Parameter(name, kind, short, lambda host: value, **more)  # type: ignore[arg-type]
+    return Parameter(name, kind, short, lambda host: value, source="fact", **more)  # type: ignore[arg-type]
 
 
 def alias(

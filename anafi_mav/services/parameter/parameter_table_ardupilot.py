@@ -137,7 +137,7 @@ ALIASES: tuple[Parameter, ...] = (
 
 
 def _fact(name: str, value: float, short: str, kind: ParamType = ParamType.INT8, **more: object) -> Parameter:
-    return fact(name, value, short, kind, group=FACTS, source="fact", **more)
+    return fact(name, value, short, kind, group=FACTS, **more)
 
 
 def _not_reported(name: str, short: str, kind: ParamType = ParamType.REAL32, **more: object) -> Parameter:

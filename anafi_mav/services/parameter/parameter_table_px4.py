@@ -201,7 +201,7 @@ ALIASES: tuple[Parameter, ...] = (
 
 
 def _fact(name: str, value: float, short: str, kind: ParamType = ParamType.INT32, **more: object) -> Parameter:
-    return fact(name, value, short, kind, group=FACTS, source="fact", **more)
+    return fact(name, value, short, kind, group=FACTS, **more)
 
 
 FACTS_PX4: tuple[Parameter, ...] = (

@@ -27,11 +27,11 @@ An ANAFI is turned about each of its three axes (arsdk common.xml 0-14-2), and e
 
 
 def _px4(name: str, value: float, short: str, kind: ParamType = ParamType.INT32, **more: object) -> Parameter:
-    return fact(name, value, short, kind, **{"group": PX4_SETUP, "source": "fact", "long": NOT_AVAILABLE, **more})
+    return fact(name, value, short, kind, **{"group": PX4_SETUP, "long": NOT_AVAILABLE, **more})
 
 
 def _ardupilot(name: str, value: float, short: str, kind: ParamType = ParamType.INT8, **more: object) -> Parameter:
-    return fact(name, value, short, kind, **{"group": ARDUPILOT_SETUP, "source": "fact", "long": NOT_AVAILABLE, **more})
+    return fact(name, value, short, kind, **{"group": ARDUPILOT_SETUP, "long": NOT_AVAILABLE, **more})
 
 
 def _cells(host: Host) -> float:

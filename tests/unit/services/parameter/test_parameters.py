@@ -155,6 +155,7 @@ def test_the_tables_are_sound(flavour: object) -> None:
         assert one.name == one.name.upper()
         assert not one.native or one.native in native
         assert one.kind is not ParamType.UINT32
+        assert one.native or one.source  # docs/parameters.md has it
         if flavour is PX4:
             assert one.kind in (ParamType.INT32, ParamType.REAL32)  # all that PX4 has
         if one.write is not None:  # a choice, a range, or both can be shown to a user
