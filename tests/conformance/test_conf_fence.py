@@ -42,6 +42,7 @@ GEOFENCE = dialect.MAV_SYS_STATUS_GEOFENCE
 HOME_CIRCLE = mav_enums.MAV_CMD_NAV_FENCE_HOME_CIRCLE_INCLUSION
 REPOSITION, ENABLE = dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_FENCE_ENABLE
 BRAKE = 17
+FENCE_OFF = "Fence off: only the drone's own limits hold"
 
 PITCH_STICK = 3
 """Its axis at the Skycontroller (mapper.xml)."""
@@ -566,7 +567,7 @@ async def test_conf_143_kinds_of_a_fence_and_its_switch_are_independent() -> Non
         assert ack.result == DENIED
 
 
-@pytest.mark.parametrize("way", ["command", "parameter"])
+@pytest.mark.parametrize("way", ["command", "ANF_FENCE_ON", "ANF_FENCE_TYPES"])
 async def test_fence_switched_off_by_one_client_is_reported_to_all(way: str) -> None:
     async with world(clients=2) as w:
         first, second = w.clients
@@ -576,9 +577,28 @@ async def test_fence_switched_off_by_one_client_is_reported_to_all(way: str) -> 
             if way == "command":
                 assert (await first.command(ENABLE, 0)).result == ACCEPTED
             else:
-                assert (await put(w, "ANF_FENCE_ON", 0)).param_value == 0
+                assert (await put(w, way, 0)).param_value == 0
         await bits(second, True, False, True)
-        assert [text for text in texts(second, mark) if "Fence" in text] == ["Fence off: no boundary is in force"]
+        assert [text for text in texts(second, mark) if "Fence" in text] == [FENCE_OFF]
+
+
+@both()
+async def test_floor_that_one_client_removes_is_reported_to_all(flavour: str) -> None:
+    async with world(clients=2, flavour=flavour) as w:
+        second = w.clients[1]
+        for floor in (5.0, 0.0):
+            mark = second.mark()
+            assert (await put(w, "ANF_FENCE_FLOOR", floor, 9)).param_value == floor
+        await second.wait("STATUSTEXT", lambda m: m.text == FENCE_OFF, since=mark)
+
+
+async def test_kinds_of_ardupilot_without_the_uploaded_zones_are_reported_to_all() -> None:
+    async with world(clients=2, flavour="ardupilot") as w:
+        second = w.clients[1]
+        assert (await upload(w.client, square(PLACE, 30.0), FENCE)).type == TAKEN
+        mark = second.mark()
+        assert (await put(w, "FENCE_TYPE", 1)).param_value == 1
+        await second.wait("STATUSTEXT", lambda m: m.text == FENCE_OFF, since=mark)
 
 
 async def test_fence_switched_on_without_a_boundary_is_reported() -> None:

@@ -63,10 +63,11 @@ FENCE_ACTION = Parameter(
 
 
 async def _enable(host: Host, value: float) -> None:
-    if value == 1:
-        host.vehicle.fence.enable()
-    else:
-        host.vehicle.disable_fence()
+    with host.vehicle.changing_fence():
+        if value == 1:
+            host.vehicle.fence.enable()
+        else:
+            host.vehicle.fence.disable()
 
 
 FENCE_ENABLED = Parameter(
@@ -88,12 +89,17 @@ def _put_types(host: Host, value: float) -> None:
     host.vehicle.fence.choose(int(value))
 
 
+async def _set_types(host: Host, value: float) -> None:
+    with host.vehicle.changing_fence():
+        _put_types(host, value)
+
+
 FENCE_TYPES = Parameter(
     "ANF_FENCE_TYPES",
     ParamType.INT32,
     "Kinds of boundaries of the fence, in force while it is on",
     read=lambda host: float(host.vehicle.fence.types),
-    write=own(_put_types),
+    write=_set_types,
     put=_put_types,
     limits=lambda host: (0.0, float(EVERYTHING)),
     polled=True,
@@ -129,12 +135,17 @@ def _put_floor(host: Host, value: float) -> None:
     host.vehicle.fence.floor = value
 
 
+async def _set_floor(host: Host, value: float) -> None:
+    with host.vehicle.changing_fence():
+        _put_floor(host, value)
+
+
 FENCE_FLOOR = Parameter(
     "ANF_FENCE_FLOOR",
     ParamType.REAL32,
     "Lowest height of the fence above the take-off point; 0: none",
     read=lambda host: host.vehicle.fence.floor,
-    write=own(_put_floor),
+    write=_set_floor,
     put=_put_floor,
     limits=lambda host: (0.0, HIGHEST_FLOOR),
     polled=True,
@@ -184,12 +195,14 @@ def _types(host: Host) -> float:
     return float(CEILING | geofence | watch.types & (ZONES | FLOOR))
 
 
-async def _set_types(host: Host, value: float) -> None:
+async def _set_ardupilot_types(host: Host, value: float) -> None:
     types = int(value)
     if not types & CEILING:
         raise Refused(texts.FENCE, texts.CEILING_BIT, lasting=True)
     # Circles around home that were uploaded are zones like others; bit 1 is the drone's own circle of FENCE_RADIUS.
-    host.vehicle.fence.choose(CEILING | (ZONES | HOME_CIRCLE if types & ZONES else 0) | types & FLOOR)
+    chosen = CEILING | (ZONES | HOME_CIRCLE if types & ZONES else 0) | types & FLOOR
+    with host.vehicle.changing_fence():
+        host.vehicle.fence.choose(chosen)
     await host.drone.piloting.set_geofence(bool(types & HOME_CIRCLE))
 
 
@@ -200,7 +213,7 @@ FENCE_TYPE = Parameter(
     ParamType.INT8,
     "Kinds of boundaries of the fence, and the drone's own circle",
     read=_types,
-    write=_set_types,
+    write=_set_ardupilot_types,
     values={
         types: ", ".join(word for bit, word in _TYPE_WORDS.items() if types & bit).capitalize()
         for types in range(CEILING, EVERYTHING + 1, 2)

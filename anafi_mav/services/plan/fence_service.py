@@ -337,5 +337,6 @@ class FenceService(Service):
             if not watch.in_force and not own_circle:
                 self.host.text(Severity.WARNING, texts.FENCE_ON_WITHOUT)
         else:
-            self.host.vehicle.disable_fence(int(wanted))
+            with self.host.vehicle.changing_fence():
+                watch.disable(int(wanted))
         self._look(self.host.clock.monotonic())

@@ -11,7 +11,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from abc import abstractmethod
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -33,7 +33,7 @@ from anafi_mav.vehicle.base.requester import By
 from anafi_mav.vehicle.base.right import Extent, Right
 from anafi_mav.vehicle.base.roll_sign import RollCheck, RollSign
 from anafi_mav.vehicle.base.severity import Severity
-from anafi_mav.vehicle.fence.fence_watch import EVERYTHING, FenceWatch, OutsideFence
+from anafi_mav.vehicle.fence.fence_watch import FenceWatch, OutsideFence
 from anafi_mav.vehicle.fence.rally import RallyPoints
 
 ALTITUDE_WAIT = 3.0
@@ -226,10 +226,11 @@ class Aircraft(Conditions):
             return GeoPoint(home.latitude, home.longitude)
         return self.place if self.on_ground else None
 
-    def disable_fence(self, types: int = EVERYTHING) -> None:
-        """Switch kinds of boundaries off; a text reports when none is in force any more."""
+    @contextlib.contextmanager
+    def changing_fence(self) -> Iterator[None]:
+        """Change settings of the fence; a text reports when no boundary of it is in force any more."""
         was_in_force = self.fence.in_force
-        self.fence.disable(types)
+        yield
         if was_in_force and not self.fence.in_force:
             self.text(Severity.WARNING, texts.FENCE_OFF)
 
