@@ -62,15 +62,10 @@ class Initiators:
         """Initiator of the return that ended last; None without one, and if it was stopped."""
         return None if self._returned is None else self._returned[0]
 
-    @property
-    def descending(self) -> Initiator | None:
-        """Initiator of the present landing or return; None without one."""
-        return self.landing or self.returning
-
-    def recall(self, initiator: Initiator, *, lands: bool, returns: bool) -> None:
-        """Note the stored initiator of a landing or return that a new connection has found."""
-        self._landing = _Landing(initiator) if lands else None
-        self.returning = initiator if returns else None
+    def recall(self, landing: Initiator | None, returning: Initiator | None) -> None:
+        """Note the stored initiators of a landing and a return that were found; None: not known."""
+        self._landing = None if landing is None else _Landing(landing)
+        self.returning = returning
 
     def land_commanded(self, now: float) -> None:
         """Note that a Landing is about to be sent."""

@@ -898,11 +898,18 @@ class Vehicle(Aircraft):
             self.flight_facts = replace(self.flight_facts, origin=self._origin_in_flight(kept))
 
     def _recall_initiator(self, kept: TakeoffRecord | None) -> None:
-        """Adopt the stored initiator of a landing or return of this flight that is still under way."""
+        """Adopt the stored initiators of a landing or return of this flight that is still under way.
+
+        A landing that has begun since is that of the return only if the drone has ended it so.
+        """
         if kept is None or kept.flight_id != self.drone.product.state.flight_id:
             return
-        if (initiator := Initiator.__members__.get(kept.initiator or "")) is not None:
-            self._initiators.recall(initiator, lands=self.flying_state in LANDING, returns=self.returning)
+        landing, returning = (Initiator.__members__.get(name or "") for name in (kept.landing, kept.returning))
+        if self.flying_state not in LANDING:
+            landing = None
+        elif landing is None and self._return_lands:
+            landing = returning
+        self._initiators.recall(landing, returning if self.returning else None)
 
     def _origin_in_flight(self, kept: TakeoffRecord | None) -> GeoPoint | None:
         """Return where a drone took off that was found in the air; None when nothing reports it."""
@@ -933,14 +940,15 @@ class Vehicle(Aircraft):
         if self.on_ground or not height.flight_id or height.takeoff_amsl is None:
             return None
         latitude, longitude = (None, None) if origin is None else origin
-        initiator = self._initiators.descending
+        landing, returning = self._initiators.landing, self._initiators.returning
         return TakeoffRecord(
             height.flight_id,
             height.takeoff_amsl,
             height.estimated,
             latitude,
             longitude,
-            None if initiator is None else initiator.name,
+            None if landing is None else landing.name,
+            None if returning is None else returning.name,
         )
 
     def on_return(self) -> None:
@@ -950,11 +958,9 @@ class Vehicle(Aircraft):
         """
         self._note_return()
         home = self.drone.home.state
-        finished = home.rth == RthState.AVAILABLE and home.reason == ReturnReason.FINISHED
-        lands = finished and home.ending == RthEndingBehavior.LANDING
         due = self.control.epoch, self._clock.monotonic() + LANDS_AFTER_RETURN
         own, before = home.reason if home.returning_by_itself else None, self.link_facts.own_return
-        self.link_facts = replace(self.link_facts, lands_next=due if lands else None, own_return=own)
+        self.link_facts = replace(self.link_facts, lands_next=due if self._return_lands else None, own_return=own)
         if before is not None and home.rth == RthState.AVAILABLE and home.reason == ReturnReason.STOPPED:
             self._note_stopped_return(before)
         if self.returning:
@@ -969,6 +975,13 @@ class Vehicle(Aircraft):
         self.return_end.on_return_state()
         self._note_hover()
         self.changed()
+
+    @property
+    def _return_lands(self) -> bool:
+        """True when the drone reports the end of a return, and lands after that."""
+        home = self.drone.home.state
+        finished = home.rth == RthState.AVAILABLE and home.reason == ReturnReason.FINISHED
+        return finished and home.ending == RthEndingBehavior.LANDING
 
     def link_down(self) -> None:
         """The link is lost: nothing that was asked for outlives it."""

@@ -157,3 +157,20 @@ async def test_plan_without_way_points_that_was_paused_before_its_landing_stays_
         async with restarted(first) as w:
             await state(w, PAUSED, since=0)
             await said(w, "Mission not flying: paused at item 1")
+
+
+@pytest.mark.parametrize("restarts", [True, False])
+async def test_landing_by_button_that_stopped_a_clients_return_unseen_is_ended_by_no_client(restarts: bool) -> None:
+    async with world(speed=1.0, web=True, skycontroller=3) as first:
+        await client_returns(first)
+        await first.client.heartbeat(lambda beat: beat.custom_mode == first.modes.returning, since=0)
+        first.drone.faults.mute = True
+        async with restarted(first) if restarts else going_on(first) as w:
+            if not restarts:
+                await w.client.silence("HEARTBEAT", 4.0)
+            press(w, TAKEOFF_LAND)
+            await flies(w, "landing")
+            mark = w.client.mark()
+            w.drone.faults.mute = False
+            await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.land, since=mark, timeout=20.0)
+            assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == REJECTED

@@ -30,7 +30,7 @@ ESTIMATE_FLOOR = 15.0
 
 
 class TakeoffRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Take-off point of a flight and initiator of its descent, for the next connection or run."""
+    """Take-off point of a flight and initiators of its descent, for the next connection or run."""
 
     flight_id: str
     amsl: float
@@ -39,8 +39,10 @@ class TakeoffRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     latitude: float | None = None
     """deg; None without a fix at take-off."""
     longitude: float | None = None
-    initiator: str | None = None
-    """Name of the `Initiator` of the landing or return under way; None without one."""
+    landing: str | None = None
+    """Name of the `Initiator` of the landing under way; None without one."""
+    returning: str | None = None
+    """That of the return under way."""
 
     @classmethod
     def read(cls, kept: Any) -> Self | None:

@@ -133,12 +133,13 @@ def test_landing_of_the_pilot_stays_the_pilots_as_a_plan_ends() -> None:
 @pytest.mark.parametrize("stored", [CLIENT, DRONE, PILOT])
 def test_stored_initiator_counts_for_the_landing_or_return_under_way(stored: Initiator) -> None:
     who = Initiators()
-    who.recall(stored, lands=True, returns=False)
-    assert (who.landing, who.returning, who.descending) == (stored, None, stored)
-    who.recall(stored, lands=False, returns=True)
-    assert (who.landing, who.returning, who.descending) == (None, stored, stored)
-    who.recall(stored, lands=False, returns=False)
-    assert who.descending is None
+    who.recall(stored, None)
+    assert (who.landing, who.returning) == (stored, None)
+    who.recall(None, stored)
+    assert (who.landing, who.returning) == (None, stored)
+    assert lands(who, skycontroller=True) is stored
+    who.recall(None, None)
+    assert (who.landing, who.returning) == (None, None)
 
 
 @pytest.mark.parametrize("stops_first", [True, False])
