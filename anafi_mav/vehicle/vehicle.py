@@ -340,6 +340,10 @@ class Vehicle(Aircraft):
         return initiator not in (None, Initiator.CLIENT)
 
     @property
+    def lands_uncommanded(self) -> bool:
+        return self._initiators.landing in (Initiator.DRONE, Initiator.UNSEEN)
+
+    @property
     def overridable(self) -> Override:
         """Return the active kind of flight, as far as a joystick may override it.
 

@@ -10,8 +10,8 @@ from contextlib import asynccontextmanager
 
 import pytest
 from support.fault_scenarios import ACCEPTED, LAND_CMD, PX4_HOLD, REJECTED, RTL, SET_MODE, goto, heard
+from support.missions import ACTIVE, MISSION_MODE, PAUSED, mode, put, said, start, state, takeoff, way
 from support.missions import LAND as LAND_ITEM
-from support.missions import MISSION_MODE, PAUSED, mode, put, said, start, state, takeoff, way
 from support.plans import Item
 from support.world import ARMED, World, world
 
@@ -174,3 +174,17 @@ async def test_landing_by_button_that_stopped_a_clients_return_unseen_is_ended_b
             w.drone.faults.mute = False
             await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.land, since=mark, timeout=20.0)
             assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == REJECTED
+
+
+async def test_mission_that_was_paused_where_it_lands_stays_paused_in_a_clients_landing() -> None:
+    wait = Item(mav_enums.MAV_CMD_NAV_DELAY, 0.0, 0.0, p1=60.0, frame=2)
+    async with world(speed=1.0, web=True) as first:
+        await put(first, [takeoff(12.0), wait, way(0.0, 0.0, 14.0), LAND_ITEM])
+        await start(first)
+        await state(first, ACTIVE, seq=1)
+        assert (await first.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        assert (await first.client.command(LAND_CMD)).result == ACCEPTED
+        async with restarted(first) as w:
+            await said(w, "Mission not flying: paused at item 2")
+            await flies(w, "landed")
+            await state(w, PAUSED, seq=1, since=0)

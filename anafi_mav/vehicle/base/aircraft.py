@@ -186,6 +186,11 @@ class Aircraft(Conditions):
 
     @property
     @abstractmethod
+    def lands_uncommanded(self) -> bool:
+        """True during a landing that, as far as known, neither a client nor the pilot has commanded."""
+
+    @property
+    @abstractmethod
     def mode(self) -> FlightMode:
         """The present flight mode of the drone."""
 

@@ -735,8 +735,9 @@ class MissionFlight(PlainTask):
     def link_up(self, record: MissionRecord | None) -> None:
         """The drone is connected again, or to a new gateway: look if it flies our mission."""
         vehicle, plan = self._vehicle, self._vehicle.drone.flight_plan.state
-        plays, landing = plan.playing == PlayingState.PLAYING, vehicle.place if self._lands else None
-        effects = self.machine.link_up(record, plan.uid, self._now, plays=plays, in_air=vehicle.in_air, landing=landing)
+        plays, in_air = plan.playing == PlayingState.PLAYING, vehicle.in_air or self._lands
+        landing = vehicle.place if self._lands and vehicle.lands_uncommanded else None
+        effects = self.machine.link_up(record, plan.uid, self._now, plays=plays, in_air=in_air, landing=landing)
         self._handle(effects)
         self.on_vehicle()  # it may have landed meanwhile
 

@@ -846,10 +846,10 @@ class MissionMachine:
     ) -> _Steps:
         """The drone is connected and reports its newest plan, and if it flies that.
 
-        `record` is the stored one, `landing` where the drone lands; None: it does not.
+        `record` is the stored one, `landing` where the drone lands, maybe by the plan; None: it does not.
         """
         if self.progress.leg is None and record is not None and record.mission == self.mission.identity:
-            if uid != record.uid and not in_air and landing is None:
+            if uid != record.uid and not in_air:
                 return
             progress = MissionProgress(self.progress.current).in_file(record.uid, record.leg, record.line)
             course = Course((record.leg,), later=record.next)
