@@ -6,7 +6,7 @@ import math
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from support import plans
+from support import missions, plans
 from support.flavours import both
 from support.mav import NAN, Client
 from support.world import HOME, world
@@ -182,6 +182,17 @@ async def test_conf_108_message_that_is_off_is_not_announced(flavour: str) -> No
             assert (await client.command(dialect.MAV_CMD_REQUEST_MESSAGE, IDS["SYS_STATUS"])).result == ACCEPTED
         assert {name: first.since(marks[0], name) for name in names} == {name: [] for name in names}
         assert all(second.since(marks[1], name) for name in names)
+
+
+@both
+async def test_set_current_is_answered_to_a_client_that_has_switched_mission_current_off(flavour: str) -> None:
+    async with world(flavour=flavour) as w:
+        await missions.put(w, [missions.takeoff(6.0), missions.way(12.0, 0.0, 6.0)])
+        assert (await w.client.command(SET, IDS["MISSION_CURRENT"], -1)).result == ACCEPTED
+        for item in (1, 1, 0):
+            mark = w.client.mark()
+            w.client.send(dialect.MAVLink_mission_set_current_message(1, 1, item + missions.first(w)))
+            await missions.state(w, missions.NOT_STARTED, seq=item, since=mark)
 
 
 async def test_message_of_a_new_row_leaves_at_default_interval(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -212,8 +212,7 @@ class MissionService(Service):
         """Send MISSION_CURRENT to the clients for whom a field has changed.
 
         For a new item a HEARTBEAT follows. QGroundControl takes an item for flown to when a HEARTBEAT in mode Mission
-        follows
-        it (MissionManager::_handleHeartbeat). Without one it offers to resume a mission that is complete.
+        follows it (MissionManager::_handleHeartbeat). Without one it offers to resume a mission that is complete.
         """
         vehicle = self.host.vehicle
         current = vehicle.mission.machine.progress.current
