@@ -42,19 +42,38 @@ class CalibrationState(msgspec.Struct, frozen=True):
     """The axis to turn the drone about now."""
     done: frozenset[CalibrationAxis] | None = None
     """The axes that are calibrated."""
+    turned: frozenset[CalibrationAxis] | None = None
+    """The axes that were reported as calibrated while the last calibration ran; None: it has reported none."""
     sensors: Mapping[Sensor, bool] = {}
     """Sensor -> works."""
 
     @property
     def is_magnetometer_done(self) -> bool:
-        """True when the last calibration has ended and nothing shows that it failed or was aborted."""
+        """True when the last calibration has ended and nothing shows that it failed or was aborted.
+
+        An aborted one may leave the axes of the calibration before, so that all but the last are to be reported before
+        the end.
+        """
         has_axes = self.done is None or self.done == frozenset(_AXES)
-        return not (self.started or self.failed or self.magneto_required) and has_axes
+        has_turned = self.turned is None or len(self.turned) >= len(_AXES) - 1
+        return not (self.started or self.failed or self.magneto_required) and has_axes and has_turned
 
     @property
     def sensors_ok(self) -> bool | None:
         """True when all reported sensors work; None when the drone reported none."""
         return all(self.sensors.values()) if self.sensors else None
+
+
+def _started(state: CalibrationState, message: common.MagnetoCalibrationStartedChanged) -> CalibrationState:
+    begins = message.started != 0 and not state.started
+    return replace(state, started=message.started != 0, turned=None if begins else state.turned)
+
+
+def _axes(state: CalibrationState, message: common.MagnetoCalibrationStateChanged) -> CalibrationState:
+    flags = (message.xAxisCalibration, message.yAxisCalibration, message.zAxisCalibration)
+    done = frozenset(axis for axis, flag in zip(_AXES, flags, strict=True) if flag)
+    turned = done if state.started else state.turned
+    return replace(state, failed=message.calibrationFailed != 0, done=done, turned=turned)
 
 
 class Calibration(Commanding[CalibrationState]):
@@ -67,18 +86,8 @@ class Calibration(Commanding[CalibrationState]):
             magneto_required=message.required == _REQUIRED,
             magneto_recommended=message.required == _RECOMMENDED,
         ),
-        common.MagnetoCalibrationStartedChanged: lambda state, message: replace(state, started=message.started != 0),
-        common.MagnetoCalibrationStateChanged: lambda state, message: replace(
-            state,
-            failed=message.calibrationFailed != 0,
-            done=frozenset(
-                axis
-                for axis, done in zip(
-                    _AXES, (message.xAxisCalibration, message.yAxisCalibration, message.zAxisCalibration), strict=True
-                )
-                if done
-            ),
-        ),
+        common.MagnetoCalibrationStartedChanged: _started,
+        common.MagnetoCalibrationStateChanged: _axes,
         common.MagnetoCalibrationAxisToCalibrateChanged: lambda state, message: replace(state, axis=message.axis),
         common.SensorsStatesListChanged: lambda state, message: replace(
             state, sensors=with_item(state.sensors, message.sensorName, message.sensorState != 0, 0)
@@ -113,7 +122,7 @@ class Calibration(Commanding[CalibrationState]):
         """Wait for the end of a running calibration, at once when none runs.
 
         Raises `CommandRejected` when it failed or was aborted, `CommandTimeout` after so long without progress. The
-        drone reports its end alike in each case, and the axes before or after that: an end without all axes is a
+        drone reports its end alike in each case, and the last axis before or after that: an end without all axes is a
         success only if they are not reported at all, and the drone requires no calibration `ANSWERED_WITHIN` later.
         """
         self._commander.require_feature(self.state.started, "magnetometer calibration")

@@ -11,7 +11,7 @@ import math
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 
 from anafi_mav import texts
-from anafi_mav.drone.events import CalibrationAxis, MagnetoCalibrationStateChanged, Message
+from anafi_mav.drone.events import CalibrationAxis
 from anafi_mav.drone.payload.gimbal import GimbalCalibration
 from anafi_mav.errors import AnafiMavError
 from anafi_mav.mavlink import dialect
@@ -154,25 +154,15 @@ class CalibrationService(Service):
         self._say(texts.CAL_DONE.fill(name="mag"))
 
     async def _watch_axes(self) -> None:
-        """Send the direction to turn, the finished axes and the progress, whenever one changes.
-
-        Axes reported before the first update are ignored: they belong to the last calibration.
-        """
+        """Send the direction to turn, the finished axes and the progress, whenever one changes."""
         done: frozenset[CalibrationAxis] | None = None
         axis: CalibrationAxis | None = None
-        fresh = False
         updated = asyncio.Event()
-
-        def hear(message: Message, now: float) -> None:
-            nonlocal fresh
-            fresh = fresh or isinstance(message, MagnetoCalibrationStateChanged)
-            updated.set()
-
-        undo = self.host.drone.subscribe(hear)
+        undo = self.host.drone.subscribe(lambda message, now: updated.set())
         try:
             while True:
                 state = self.host.drone.calibration.state
-                now = (state.done or frozenset()) if fresh else frozenset()
+                now = state.turned or frozenset()
                 for finished in sorted(now - (done or frozenset())):
                     self._say(texts.CAL_SIDE_DONE.fill(side=_SIDES[finished][0]))
                 if done is None or len(now) != len(done):

@@ -125,7 +125,7 @@ class CompassService(Service):
         try:
             while True:
                 state = self.host.drone.calibration.state
-                now = (state.axis, len(state.done or ()))
+                now = (state.axis, len(state.turned or ()))
                 if now != reported:
                     self._send_progress(now[1])
                     if now[0] in AXES and (reported is None or now[0] != reported[0]):

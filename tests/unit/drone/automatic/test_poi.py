@@ -144,8 +144,8 @@ async def test_magnetometer_calibration_without_turns_fails(device: ScriptedDevi
     assert drone.calibration.state.done == frozenset({CalibrationAxis.X_AXIS})
 
 
-NO_AXIS, ONE_AXIS, ALL_AXES = (
-    common.MagnetoCalibrationStateChanged(*axes, 0) for axes in ((0, 0, 0), (1, 0, 0), (1, 1, 1))
+NO_AXIS, ONE_AXIS, TWO_AXES, ALL_AXES = (
+    common.MagnetoCalibrationStateChanged(*axes, 0) for axes in ((0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1))
 )
 FAILED_AXES = common.MagnetoCalibrationStateChanged(1, 0, 0, 1)
 STOPPED = common.MagnetoCalibrationStartedChanged(0)
@@ -160,6 +160,9 @@ STOPPED = common.MagnetoCalibrationStartedChanged(0)
         ([STOPPED, common.MagnetoCalibrationRequiredState(1)], False),
         ([NO_AXIS, STOPPED], False),
         ([ONE_AXIS, STOPPED], False),
+        ([TWO_AXES, STOPPED, ALL_AXES], True),
+        ([NO_AXIS, STOPPED, ALL_AXES], False),  # aborted: those of the calibration before
+        ([ONE_AXIS, STOPPED, ALL_AXES], False),
         ([STOPPED, FAILED_AXES], False),
     ],
 )
