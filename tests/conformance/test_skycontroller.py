@@ -10,7 +10,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.fault_scenarios import ACCEPTED, ARM, REJECTED, RTL, SET_MODE, goto, heard, watched
 from support.fault_scenarios import TAKEOFF_CMD as TAKEOFF
-from support.missions import CORNERS, put, start
+from support.missions import CORNERS, LAND, put, start, takeoff, way
 from support.params import write
 from support.plans import ACCEPTED as TAKEN
 from support.plans import FENCE, square, upload
@@ -338,6 +338,26 @@ async def test_goto_of_a_killed_gateway_flies_on_until_the_pilots_button(generat
         assert w.drone.pose.vn > 3.0
         pilot.press(1)
         await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landed", 20.0)
+
+
+@generations
+@pytest.mark.parametrize("button", [0, 1], ids=["return home", "land"])
+async def test_mission_of_a_killed_gateway_flies_on_until_the_pilots_button(generation: int, button: int) -> None:
+    """Its setting to return home at a lost link is on: that link is the one to the Skycontroller."""
+    async with world(speed=1.0, skycontroller=generation, web=True) as w:
+        pilot = w.drone.skycontroller
+        assert pilot is not None
+        await put(w, [takeoff(12.0), way(300.0, 0.0, 12.0), LAND])
+        await start(w)
+        await w.client.wait("STATUSTEXT", lambda m: "link loss: return home" in m.text, since=0)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 5.0, 30.0)
+        w.drone.faults.mute = True
+        await w.gateway.close()
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 100.0, 60.0)
+        assert w.drone.pose.vn > 3.0
+        pilot.press(button)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and abs(e.args["vn"]) < 0.1, 20.0)
+        assert w.drone.pose.north < 150.0
 
 
 async def test_pilot_who_flies_as_the_connection_is_closed_is_left_alone() -> None:

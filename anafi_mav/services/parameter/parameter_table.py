@@ -303,7 +303,8 @@ MISSION_RETURN = _switch(
     lambda drone: drone.flight_plan.set_returns_on_disconnect,
     events.ReturnHomeOnDisconnectChanged,
     group=HOME,
-    long="Off: after link loss, or without the gateway, the drone flies its flight-plan file to the end.",
+    long="Off: after link loss, or without the gateway, the drone flies its flight-plan file to the end. Behind a "
+    "Skycontroller it does so without the gateway in any case.",
 )
 PRECISE_HOME = _switch(
     "ANF_RTH_PRECISE",
