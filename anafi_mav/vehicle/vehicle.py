@@ -960,11 +960,15 @@ class Vehicle(Aircraft):
 
         Setpoints and the climb after a take-off end then, so that they never fight the return.
         """
+        has_returned = self._initiators.returning is not None  # else the drone repeats the end of an earlier return
         self._note_return()
-        home = self.drone.home.state
-        due = self.control.epoch, self._clock.monotonic() + LANDS_AFTER_RETURN
+        home, lands_next = self.drone.home.state, self.link_facts.lands_next
+        if not self._return_lands:
+            lands_next = None
+        elif has_returned:
+            lands_next = self.control.epoch, self._clock.monotonic() + LANDS_AFTER_RETURN
         own, before = home.reason if home.returning_by_itself else None, self.link_facts.own_return
-        self.link_facts = replace(self.link_facts, lands_next=due if self._return_lands else None, own_return=own)
+        self.link_facts = replace(self.link_facts, lands_next=lands_next, own_return=own)
         if before is not None and home.rth == RthState.AVAILABLE and home.reason == ReturnReason.STOPPED:
             self._note_stopped_return(before)
         if self.returning:

@@ -130,6 +130,28 @@ async def test_landing_that_the_drone_does_not_hear_is_tried_again() -> None:
         await landed(w, mark)
 
 
+async def test_end_of_a_return_that_is_reported_again_in_a_later_hover_announces_no_landing() -> None:
+    """A drone that is asked for its states repeats the last one, FINISHED, until the next return or flight."""
+    async with world(speed=FAST) as w:
+        await write(w.client, "ANF_RTH_END", 0, INT32)
+        await away(w)
+        await go_home(w)
+        await w.drone.wait_log(lambda e: e.name == "flying" and e.args["to"] == "landing", 30.0)
+        assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == ACCEPTED
+        await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD)
+        finished = rth.State(rth.RthState.AVAILABLE, rth.StateReason.FINISHED)
+        assert w.gateway.systems[0].drone.home.state.reason == finished.reason
+        mark = w.client.mark()
+        w.drone.inject(finished)
+        for _ in range(2):
+            await w.client.heartbeat(lambda beat: True)
+        assert {
+            beat.custom_mode
+            for _, beat in w.client.since(mark, "HEARTBEAT")
+            if beat.autopilot != dialect.MAV_AUTOPILOT_INVALID
+        } == {HOLD}
+
+
 async def test_hold_between_two_landings_cancels_the_second() -> None:
     async with world(speed=1.0) as w:
         await landing_unheard(w)
