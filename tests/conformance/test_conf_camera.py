@@ -192,6 +192,21 @@ async def test_conf_087_shutter_of_a_series_that_is_reported_twice_is_one_pictur
         assert (await request(w.client, "CAMERA_CAPTURE_STATUS")).image_count == 3
 
 
+async def test_shutters_of_a_series_that_arrive_together_after_a_silence_are_pictures_each() -> None:
+    async with world(model="ai", speed=1.0, web=True) as w:
+        await enter(w.client, PHOTO)
+        assert await command(w.client, START_PHOTO, 0, 1.5, 6) == ACCEPTED
+        cameras = w.drone.firmware.payload.cameras
+        await w.drone.wait_log(lambda e: cameras.shots == 2, 10.0)
+        await watched(1.2)
+        w.drone.faults.mute = True  # the shutters of the third and the fourth picture are repeated until it is heard
+        await watched(2.3)
+        w.drone.faults.mute = False
+        await w.drone.wait_log(lambda e: bool(photos(w)) and not cameras.busy, 20.0)
+        (series,) = photos(w)
+        assert len(series.resources) == 6
+
+
 @pytest.mark.parametrize(("mode", "pictures"), [(1.0, 7), (2.0, 14)], ids=["bracketing", "burst"])
 async def test_conf_087_shutter_of_a_burst_that_is_reported_twice_is_one_picture(mode: float, pictures: int) -> None:
     async with world(model="ai", speed=1.0, web=True) as w:

@@ -106,7 +106,8 @@ class PhotoReporter:
         id = drone.camera.active_id
         if drone.camera[id].taking:
             known = max(before.taken, drone.camera[id].photo_count or 0)
-            self._shots.join(id, known, self.host.clock.monotonic())
+            is_same = before.is_open and before.camera == id
+            self._shots.join(id, known, before.since if is_same else self.host.clock.monotonic())
         self._turn = asyncio.Lock()
         self._undo = drone.video.subscribe(lambda frame: add_frame(self._track, frame))
 

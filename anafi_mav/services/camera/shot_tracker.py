@@ -75,6 +75,8 @@ class _Capture:
         self.shots: list[float] = []
         """Shutter times of the pictures that are not reported yet."""
         self.taken = 0
+        self.overdue = 0
+        """Pictures of a time-lapse that were due before the last one: their reports may follow it at once."""
         self.reported: int | None = 0
         """Pictures that are reported; None: not known yet, of a capture that was under way at the connection."""
         self.ended: float | None = None
@@ -109,7 +111,15 @@ class _Capture:
             return True
         if interval is None or not self.taken or self.reported is None:
             return False
-        return now - self.since < interval - LATE or self.taken > (now - self.begun + LATE) / interval
+        follows = now - self.since < interval - LATE and not self.overdue
+        return follows or self.taken > (now - self.begun + LATE) / interval
+
+    def _overdue_after(self, now: float, interval: float) -> int:
+        """Return `overdue` after a picture that is reported now."""
+        since = now - self.since
+        due = int(since / interval) - (1 if self.taken else 0)
+        left = self.overdue - 1 if since < interval - LATE else 0
+        return max(due, left, 0)
 
     def continues(self, update: CaptureUpdate) -> bool:
         """Return True for the shutter of a picture of this capture, whose end was reported before."""
@@ -123,8 +133,10 @@ class _Capture:
             self.shots, self.taken, self.since = [], 0, now
         self.is_announced = True
 
-    def take(self, pictures: int, now: float) -> None:
-        """Add pictures, spread over the time since the last report."""
+    def take(self, pictures: int, now: float, interval: float | None = None) -> None:
+        """Add pictures, spread over the time since the last report; `interval` as in `has_reported`."""
+        if pictures and interval is not None:
+            self.overdue = self._overdue_after(now, interval)
         if self.reported is None and pictures:
             self.reported = self.taken
         step = (now - self.since) / max(pictures, 1)
@@ -175,19 +187,24 @@ class ShotTracker:
         self._captures: dict[str, int] = {}
         """Numbers of the captures of the last media ids, each of which may be reported again."""
 
-    def join(self, camera: int, taken: int, now: float) -> None:
+    def join(self, camera: int, taken: int, since: float) -> None:
         """Follow a photo that is under way when a connection begins.
 
         `taken`: its pictures so far, or fewer; a report may count on. They were taken on an earlier connection, or
-        without one.
+        without one. `since`: when the last of them was reported, or now.
         """
-        self._now = _Capture(self.capture + 1, now, camera, is_open=True)
+        self._now = _Capture(self.capture + 1, since, camera, is_open=True)
         self._now.taken, self._now.reported, self._now.begun = taken, None, -math.inf
 
     @property
     def is_open(self) -> bool:
         """True while a photo, burst or series is under way."""
         return self._now.is_open
+
+    @property
+    def since(self) -> float:
+        """Time of the last picture of that capture that was reported, or of its begin."""
+        return self._now.since
 
     @property
     def capture(self) -> int:
@@ -239,6 +256,8 @@ class ShotTracker:
         For events without a count: `most` pictures of the capture under way, and the `interval` (s) of a time-lapse;
         None: not known.
         """
+        if interval is not None and interval <= 0.0:
+            interval = None
         match update.progress:
             case CaptureProgress.STARTED:
                 return self._open(update, now)
@@ -248,7 +267,7 @@ class ShotTracker:
                 lost = [] if self._now.continues(update) else self._open(update, now)
                 is_repeated = update.count is None and self._now.has_reported(now, most, interval)
                 more = 1 if update.count is None else self._now.more(update.count)
-                self._now.take(0 if is_repeated else more, now)
+                self._now.take(0 if is_repeated else more, now, interval)
                 return lost
             case CaptureProgress.SAVED:
                 return self._save(update, now)

@@ -59,6 +59,24 @@ def test_shutter_of_a_time_lapse_that_is_reported_twice_is_one_picture() -> None
     assert (tracker.pending, tracker.taken) == (pytest.approx((0.1, 3.1, 7.2, 9.1)), 4)
 
 
+def test_shutters_of_a_time_lapse_that_are_reported_together_after_a_gap_are_pictures_each() -> None:
+    """The link was bad for some seconds. What follows later is repeated again."""
+    tracker = ShotTracker()
+    for at, progress in ((0.0, STARTED), (0.1, TAKEN), *((6.5 + 0.1 * n, TAKEN) for n in range(3)), (9.1, TAKEN)):
+        tracker.receive(CaptureUpdate(0, progress), at, interval=3.0)
+    assert tracker.taken == 4
+    tracker.receive(CaptureUpdate(0, TAKEN), 9.3, interval=3.0)
+    assert tracker.taken == 4
+
+
+@pytest.mark.parametrize("interval", [0.0, -1.0])
+def test_time_lapse_without_an_interval_counts_each_shutter(interval: float) -> None:
+    tracker = ShotTracker()
+    for at, progress in ((0.0, STARTED), (0.1, TAKEN), (0.2, TAKEN)):
+        tracker.receive(CaptureUpdate(0, progress), at, interval=interval)
+    assert tracker.taken == 2
+
+
 def test_time_lapse_has_no_more_pictures_than_its_time_allows() -> None:
     """Pictures every second look like repeated reports, but no more than 3 are taken in 1.1 s."""
     tracker = ShotTracker()
