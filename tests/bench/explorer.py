@@ -79,8 +79,11 @@ SAME_AS_BEFORE = 5.0
 BRAKES_WITHIN = 3.0
 """s after an accepted Hold."""
 
-OUTSIDE = 1.5
-"""m beyond the fence that count as left."""
+OUTSIDE = 1.5 * soak.SPEED
+"""m beyond the fence that count as left: the drone flies `soak.SPEED` times as far while its reports are under way."""
+
+FEWEST_EVERY = 0.5
+"""s between positions that are a stream, at most (docs/setpoints.md)."""
 
 SETTINGS: dict[str, tuple[float, float, int]] = {
     "ANF_RTH_ALT": (20.0, 60.0, 9),
@@ -246,8 +249,10 @@ class Explored(Flight):
             task.cancel()
             self._tasks.discard(task)
         for stream in self.streams:
-            if stream.client == index:
-                stream.ended = min(stream.ended, now())
+            if stream.client == index and now() < stream.ended:
+                stream.ended = now()
+                if self.drawn.flavours[index] == "ardupilot" and now() - stream.begun < FEWEST_EVERY:
+                    stream.place = None  # a single position in Guided is a goto, which is flown to its end
         assert client._writer is not None
         client._writer.transport.abort()
         entry = (index, now(), now() + seconds)
@@ -498,10 +503,12 @@ async def explored(drawn: Draw) -> AsyncIterator[tuple[World, Replaceable]]:
 def judge_fence(flight: Explored) -> None:
     """Setpoints and sticks do not fly out of an accepted fence; the Skycontroller's pilot may.
 
-    Not judged with late events: the drone flies `soak.SPEED` times as fast as the link, so they count that much more.
+    Not judged with late or lost events and commands: the drone flies `soak.SPEED` times as fast as the link, so they
+    count that much more.
     """
-    late = flight.drawn.down.delay > 0.0 or any("scramble" in quirk for quirk in quirks_of(flight.drawn.seed))
-    if late or flight.drawn.skycontroller is not None:
+    up, down = flight.drawn.up, flight.drawn.down
+    late = down.delay > 0.0 or any("scramble" in quirk for quirk in quirks_of(flight.drawn.seed))
+    if late or up.loss or down.loss or flight.drawn.skycontroller is not None:
         return
     for (at, half), (until, _) in itertools.pairwise([*flight.fences, (math.inf, 0.0)]):
         inside, tilted = False, -math.inf
