@@ -105,9 +105,8 @@ class MissionProtocol:
                 _ack(peer, dialect.MAV_MISSION_DENIED, ALL),
                 Say(Severity.WARNING, texts.PLANS_NOT_CLEARED),
             ]
-        for transfer in self.transfers.values():
-            transfer.begin_clear(peer, now)
-        return [Commit(dict.fromkeys(self.transfers, ()), peer, ALL)]
+        cancelled = [effect for transfer in self.transfers.values() for effect in transfer.begin_clear(peer, now)]
+        return [*cancelled, Commit(dict.fromkeys(self.transfers, ()), peer, ALL)]
 
     def stored(self, commit: Commit, now: float, fault: PlanFault | None = None) -> list[Effect]:
         """Finish a `Commit`; with a fault the new plan is invalid and the old one stays."""

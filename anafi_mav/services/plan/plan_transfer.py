@@ -364,17 +364,17 @@ class PlanTransfer:
         items = tuple(self.kind.taken(sent, peer.flavour))
         if (fault := self.kind.check_plan(items, peer.flavour)) is not None:
             return fault
-        self._begin_commit(peer, now)
+        cancelled = self._begin_commit(peer, now, acknowledged=False)
         remarks = [Say(Severity.WARNING, text) for text in self.kind.remarks(sent)]
         commit = Commit({self.kind.mission_type: items}, peer, self.kind.mission_type, acknowledged=False)
-        return [*remarks, commit]
+        return [*cancelled, *remarks, commit]
 
     def clear(self, peer: Peer, now: float) -> list[Effect]:
         """Handle MISSION_CLEAR_ALL, or MISSION_COUNT of 0; an empty list is acknowledged, too."""
         if not self.may_clear(peer, now):
             return self._occupied(peer)
-        self.begin_clear(peer, now)
-        return [Commit({self.kind.mission_type: ()}, peer, self.kind.mission_type)]
+        cancelled = self.begin_clear(peer, now)
+        return [*cancelled, Commit({self.kind.mission_type: ()}, peer, self.kind.mission_type)]
 
     def may_clear(self, peer: Peer, now: float) -> bool:
         """Return True if no other client transfers this list, and the request is no late copy."""
@@ -391,19 +391,25 @@ class PlanTransfer:
         by, at = self._cleared
         return peer.is_copy_of(by) and now - at < PATIENCE
 
-    def begin_clear(self, peer: Peer, now: float) -> None:
-        """The list becomes empty with the commit that the caller makes."""
+    def begin_clear(self, peer: Peer, now: float) -> list[Effect]:
+        """The list becomes empty with the commit that the caller makes; see `_begin_commit`."""
         if not self._may_be_late_copy(peer, now):
             self._cleared = peer, now
-        self._begin_commit(peer, now)
+        return self._begin_commit(peer, now, acknowledged=True)
 
-    def _begin_commit(self, peer: Peer, now: float) -> None:
-        """Store a whole list that was not received item by item."""
-        self._upload = None
+    def _begin_commit(self, peer: Peer, now: float, *, acknowledged: bool) -> list[Effect]:
+        """Store a whole list at once, and return the end of the upload that it replaces.
+
+        A client whose new list is `acknowledged` would take that end for the acknowledgement.
+        """
+        upload, self._upload = self._upload, None
         self._downloads.pop(peer.client, None)
         self._forget_done(peer)
         self.state = TRANSITIONS[self.state][Event.CLEAR]
         self._committing = _Done(peer, now, -1)
+        if upload is None or (acknowledged and upload.peer.client == peer.client):
+            return []
+        return [self._ack(upload.peer, dialect.MAV_MISSION_OPERATION_CANCELLED)]
 
     def stored(self, items: tuple[PlanItem, ...], now: float, fault: PlanFault | None = None) -> list[Effect]:
         """Finish a `Commit`: it is stored, or has a fault.

@@ -391,6 +391,24 @@ def test_list_that_replaces_another_as_a_file_is_no_clearing() -> None:
     assert commit_of(plans.receive(clear(), peer(channel="b"), 0.1)).plans[FENCE] == ()
 
 
+def test_upload_is_cancelled_by_a_file_of_its_client() -> None:
+    """The file has no MISSION_ACK, and the upload had none either: its client waited for the next request."""
+    plans = mission_protocol()
+    plans.receive(count(2), ME, 0.0)
+    effects = plans.transfers[FENCE].replace(items(2), ME, 0.1)
+    assert isinstance(effects, list)
+    assert [message.type for message in replies(effects)] == [CANCELLED]
+    assert replies(plans.stored(commit_of(effects), 0.1)) == []
+
+
+@pytest.mark.parametrize("kind", [FENCE, ALL])
+def test_upload_of_a_silent_client_is_cancelled_by_the_clearing_of_another(kind: int) -> None:
+    plans = mission_protocol()
+    plans.receive(count(2), ME, 0.0)
+    effects = plans.receive(clear(kind), OTHER, PATIENCE)
+    assert [(reply.peer, reply.message.type) for reply in effects if isinstance(reply, Reply)] == [(ME, CANCELLED)]
+
+
 def test_a_silent_client_gives_way_to_another() -> None:
     plans = mission_protocol()
     plans.receive(count(2), ME, 0.0)
