@@ -79,8 +79,11 @@ SAME_AS_BEFORE = 5.0
 BRAKES_WITHIN = 3.0
 """s after an accepted Hold."""
 
-OUTSIDE = 1.5 * soak.SPEED
+OUTSIDE = 2.0 * soak.SPEED
 """m beyond the fence that count as left: the drone flies `soak.SPEED` times as far while its reports are under way."""
+
+CONNECTED_WITHIN = 20.0
+"""s after a restart of the gateway: the drone may refuse its handshake for 8 s."""
 
 FEWEST_EVERY = 0.5
 """s between positions that are a stream, at most (docs/setpoints.md)."""
@@ -373,6 +376,8 @@ class Explored(Flight):
     async def read_back(self) -> None:
         """All clients read the same lists and values, and the values are the drone's."""
         w = self.w
+        for index in range(len(self.drawn.flavours)):
+            await self.client(index).heartbeat(lambda beat: True, timeout=CONNECTED_WITHIN)
         for kind in (MISSION, FENCE, RALLY):
             found = []
             for index, flavour in enumerate(self.drawn.flavours):
