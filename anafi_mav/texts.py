@@ -346,6 +346,8 @@ TAKEOFF_CANCELLED = Template("Takeoff cancelled: not armed within {seconds:g} s"
 TASK_ENDED = Template("{what} ended: {reason}", what="Offboard", reason="r" * REASON_BYTES)
 TAKEOFF_FAILED = Template("Takeoff failed: {error}", error=BELOW)
 TAKEOFF_PLACE = Template("Takeoff straight up: place {metres:.0f} m away ignored", metres=20_004_000)
+LANDING_ELSEWHERE = Template("Landing here: place {metres:.0f} m away ignored", metres=20_004_000)
+LOITER_ELSEWHERE = Template("Loiter here: place {metres:.0f} m away ignored", metres=20_004_000)
 TAKEOFF_LATE = OperatorText("Takeoff begun late, or by another controller")
 TAKEOFF_UNFINISHED = ReasonTemplate("takeoff not over after {seconds:.0f} s", seconds=99)
 TAKEOFF_TOO_LOW = Reason("takeoff ended below its height")

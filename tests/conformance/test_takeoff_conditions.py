@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from support.fault_scenarios import ACCEPTED, ARM, REJECTED, TAKEOFF_CMD, goto, heard, watched
 from support.mav import NAN
@@ -87,6 +88,28 @@ async def test_takeoff_with_the_place_of_the_drone_reports_nothing() -> None:
         assert ack.result == ACCEPTED
         await w.at_height(6.0)
         assert [m.text for _, m in w.client.since(mark, "STATUSTEXT") if "straight up" in m.text] == []
+
+
+@pytest.mark.parametrize(
+    ("flavour", "command", "words"),
+    [
+        ("px4", dialect.MAV_CMD_NAV_LAND, "Landing"),
+        ("ardupilot", dialect.MAV_CMD_NAV_LAND, "Landing"),
+        ("ardupilot", dialect.MAV_CMD_NAV_LOITER_UNLIM, "Loiter"),
+    ],
+)
+async def test_landing_or_loiter_with_a_place_elsewhere_reports_that_it_is_ignored(
+    flavour: str, command: int, words: str
+) -> None:
+    async with world(flavour=flavour) as w:
+        await w.take_off(6.0)
+        near, far = geo.destination(*HOME[:2], 3.0, 4.0), geo.destination(*HOME[:2], 30.0, 40.0)
+        mark = w.client.mark()
+        for place in (near, far):
+            assert (await w.client.command(command, frame=6, x=place[0], y=place[1], z=0.0)).result == ACCEPTED
+        ignored = f"{words} here: place 50 m away ignored"
+        await w.client.wait("STATUSTEXT", lambda m: m.text == ignored, since=mark)
+        assert [m.text for _, m in w.client.since(mark, "STATUSTEXT") if "ignored" in m.text] == [ignored]
 
 
 async def test_mode_during_the_climb_is_takeoff() -> None:

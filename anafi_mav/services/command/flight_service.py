@@ -22,6 +22,7 @@ from anafi_mav.services.commands import (
 )
 from anafi_mav.services.flavours import flavour_of
 from anafi_mav.services.service import MessageHandler, Service
+from anafi_mav.texts import Template
 from anafi_mav.vehicle.base.bounds import FASTEST, SLOWEST
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, Unsupported
@@ -52,7 +53,7 @@ class FlightService(Service):
                 self._take_off, location=True, altitude=Altitude.BY_FRAME, effect=Effect.IRREVOCABLE
             ),
             dialect.MAV_CMD_NAV_LAND: Action(
-                lambda command: self.host.vehicle.land(command.right),  # its position is ignored
+                self._land,
                 location=True,
                 altitude=Altitude.UNUSED,
                 effect=Effect.LAND,
@@ -80,7 +81,7 @@ class FlightService(Service):
                 progress=ProgressPolicy.LATE,
             ),
             dialect.MAV_CMD_NAV_LOITER_UNLIM: Action(
-                lambda command: change_mode(self.host.vehicle, command.mode, command.right),  # its position is ignored
+                self._loiter,
                 location=True,
                 altitude=Altitude.UNUSED,
                 effect=effect_of_mode,
@@ -119,16 +120,27 @@ class FlightService(Service):
             await vehicle.take_off(command.z, command.right)
         else:
             await vehicle.take_off(command.height(vehicle), command.right)
-        self._report_place(command)
+        self._report_place(command, texts.TAKEOFF_PLACE)
 
-    def _report_place(self, command: Command) -> None:
-        """Report that the position of a take-off command is not used, when it is elsewhere."""
+    async def _land(self, command: Command) -> None:
+        """Run MAV_CMD_NAV_LAND; the position is not used, and a text reports one elsewhere."""
+        await self.host.vehicle.land(command.right)
+        if not self.host.vehicle.on_ground:
+            self._report_place(command, texts.LANDING_ELSEWHERE)
+
+    async def _loiter(self, command: Command) -> None:
+        """Run MAV_CMD_NAV_LOITER_UNLIM; the position is not used, and a text reports one elsewhere."""
+        await change_mode(self.host.vehicle, command.mode, command.right)
+        self._report_place(command, texts.LOITER_ELSEWHERE)
+
+    def _report_place(self, command: Command, text: Template) -> None:
+        """Report that the position of a command is not used, when it is elsewhere."""
         here = self.host.vehicle.place
         if here is None or not (abs(command.x) <= 90.0 and abs(command.y) <= 180.0) or command.x == command.y == 0.0:
             return  # unset; QGroundControl and MAVSDK send NaN, the others 0
         metres = geo.distance(here.latitude, here.longitude, command.x, command.y)
         if metres > AWAY:
-            self.host.text(Severity.WARNING, texts.TAKEOFF_PLACE.fill(metres=metres))
+            self.host.text(Severity.WARNING, text.fill(metres=metres))
 
     async def _reposition(self, command: Command) -> None:
         """Run MAV_CMD_DO_REPOSITION: go to a place, height and heading.
