@@ -20,7 +20,11 @@ SLICE, PACE = 32, 0.001
 player's socket holds 200 kB by default, and what a new viewer gets at once is more than that."""
 
 SEND_BUFFER = 1 << 20
-"""Bytes that the system may keep for one viewer."""
+"""Bytes of datagrams that the system may keep for one viewer."""
+
+CONNECTION_BUFFER = 1 << 18
+"""Bytes that the system may keep inside a connection, which Linux doubles for its own use: some 0.5 s of 5 Mbit/s. By
+itself it keeps up to 4 MB for a viewer that reads slowly, whose pictures are then seconds old, and none is dropped."""
 
 OnReport = Callable[[bytes], None]
 
@@ -50,6 +54,7 @@ class TcpOutlet:
 
     def __init__(self, connection: asyncio.WriteTransport, channels: tuple[int, int], ssrc: int | None = None) -> None:
         self.transport = RtspTransport(lower="TCP", channels=channels, ssrc=ssrc)
+        _limit_buffer(connection, CONNECTION_BUFFER)
         self._connection = connection
         self._channels = channels
 
@@ -144,9 +149,14 @@ async def _bind(
     transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
         protocol, local_addr=(local, 0), remote_addr=(peer, port)
     )
-    with contextlib.suppress(OSError):
-        transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
+    _limit_buffer(transport, SEND_BUFFER)
     return transport
+
+
+def _limit_buffer(transport: asyncio.BaseTransport, size: int) -> None:
+    """Have the system keep `size` bytes at most that have not left."""
+    with contextlib.suppress(OSError):
+        transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, size)
 
 
 def _unsent(transport: asyncio.DatagramTransport) -> int:

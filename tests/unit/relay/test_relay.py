@@ -8,6 +8,7 @@ import resource
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
+from socket import SO_RCVBUF, SOL_SOCKET
 
 import pytest
 from support.own_address import own_address
@@ -54,6 +55,10 @@ async def studio(
         await relay.start()
         stack.push_async_callback(relay.close)
         yield Studio(relay, server, drone)
+
+
+def port_of(client: Viewer) -> str:
+    return f":{client.writer.get_extra_info('sockname')[1]}"
 
 
 async def setup(client: Viewer, transport: str) -> object:
@@ -174,6 +179,24 @@ async def test_slow_viewer_does_not_delay_others(monkeypatch: pytest.MonkeyPatch
         (one,) = [c for c in held.relay._connections.values() if c._watch and c._watch.counts["dropped pictures"]]
         assert one._outlet is not None
         assert one._outlet.waiting < server_module.MAX_UNREAD + (2 << 20)
+
+
+async def test_slow_viewer_inside_its_connection_gets_no_old_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At 5 Mbit/s its newest picture is 3 s old at most, whatever the system would keep for a connection."""
+    monkeypatch.setattr("support.video_server.SLICE", SLICE[:1] + bytes(60_000))
+    async with studio() as held, viewer(held.relay.port) as slow, viewer(held.relay.port) as quick:
+        socket = slow.writer.get_extra_info("socket")
+        socket.setsockopt(SOL_SOCKET, SO_RCVBUF, 1 << 14)
+        await slow.describe(LIVE)
+        response = await slow.ask("SETUP", f"{LIVE}/video", Transport="RTP/AVP/TCP;interleaved=0-1")
+        session = (response.header("Session") or "").partition(";")[0]
+        slow.writer.transport.pause_reading()  # it reads nothing any more
+        slow.writer.write(f"PLAY {slow.base}{LIVE} RTSP/1.0\r\nCSeq: 9\r\nSession: {session}\r\n\r\n".encode())
+        eye = await quick.setup_inside(f"{LIVE}/video")
+        await quick.play(LIVE)
+        await eye.first(150)  # 9 MB
+        (watch,) = [c._watch for c in held.relay._connections.values() if c._watch and c._name.endswith(port_of(slow))]
+        assert watch.octets < 3.0 * 5e6 / 8
 
 
 async def test_video_that_does_not_start_is_refused_with_the_reason() -> None:
