@@ -593,8 +593,8 @@ pictures. While the link is lost the drone takes more; the series is ended, and 
 link is back.
 
 PANORAMA_CREATE takes one of Parrot's panoramas: from 360 deg the spherical one, from 180 deg the horizontal or
-vertical one, below it the super wide one where the drone has it. It turns the drone, so the drone must hover; any
-flight command, Hold among them, ends it.
+vertical one, below it the super wide one where the drone has it. It turns the drone, so the drone must hover. Any
+flight command, Hold among them, ends it; so does IMAGE_STOP_CAPTURE, and the drone hovers.
 
 ## Recordings
 

@@ -322,6 +322,18 @@ async def test_panorama_turns_the_hovering_drone_and_hold_ends_it() -> None:
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 15.0, 30.0)
 
 
+async def test_stop_of_photos_ends_a_panorama() -> None:
+    async with world(web=True, model="ai") as w:
+        await w.take_off(10.0)
+        mark = w.client.mark()
+        assert await command(w.client, PANORAMA, 360, 180) == ACCEPTED
+        await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 1, since=mark)
+        mark = w.client.mark()
+        assert await command(w.client, dialect.MAV_CMD_IMAGE_STOP_CAPTURE) == ACCEPTED
+        assert not w.drone.firmware.payload.cameras.busy
+        await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 0, since=mark)
+
+
 async def test_panorama_overtakes_no_newer_flight_command() -> None:
     """Both are sent at once while the camera has to change its mode first."""
     async with world(web=True, clients=2) as w:

@@ -73,6 +73,11 @@ class AnimationsState(msgspec.Struct, frozen=True):
         """True while an animation is flown, from the first of the two events that report its begin."""
         return self.running not in (None, Type.NONE) or self.phase == AnimationState.RUNNING
 
+    @property
+    def is_panorama(self) -> bool:
+        """True while a photo panorama is flown."""
+        return self.running in _PANORAMAS
+
 
 def _figure(state: AnimationsState, m: Any) -> AnimationsState:
     canceled = m.state == AnimationState.CANCELING or (state.canceled and m.state != AnimationState.RUNNING)

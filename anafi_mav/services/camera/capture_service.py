@@ -307,9 +307,9 @@ class CaptureService(Service):
         await self._start_capture(command)
 
     async def _stop_capture(self, command: Command) -> None:
-        """MAV_CMD_IMAGE_STOP_CAPTURE: end a series; accepted without one."""
+        """MAV_CMD_IMAGE_STOP_CAPTURE: end a series or a panorama; accepted without one."""
         require_camera(texts.PHOTO, command.params[0])
-        await self._photos.stop_series()
+        await self._photos.stop()
 
     async def _digicam(self, command: Command) -> None:
         """MAV_CMD_DO_DIGICAM_CONTROL: param2 zoom (%), param3 steps of zoom, param5 1 takes a photo."""
@@ -334,7 +334,7 @@ class CaptureService(Service):
         if distance < 0.0 or not math.isfinite(distance):
             raise Refused(texts.PHOTO, texts.NEGATIVE, lasting=True)
         if distance == 0.0:
-            await self._photos.stop_series()
+            await self._photos.stop()
         else:
             await self._photos.follow_distance(distance)
 

@@ -152,6 +152,16 @@ class PhotoControl:
         await enter_mode(self.host, CameraMode.PHOTO, texts.PHOTO)
         await self.begin_series(PhotoMode.GPS_LAPSE, distance, None)
 
+    async def stop(self) -> None:
+        """End a series, or a panorama with its flight; does nothing without one."""
+        drone = self.host.drone
+        if not drone.animations.state.is_panorama:
+            await self.stop_series()
+            return
+        if drone.controller.pilot_acquired_control:
+            raise Refused(texts.PANORAMA, texts.PILOT)
+        await drone.animations.cancel()
+
     async def stop_series(self) -> None:
         """End a series; does nothing without one."""
         async with self._commands:
