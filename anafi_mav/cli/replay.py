@@ -36,7 +36,8 @@ LONGEST_LINE = 1_000_000
 """Bytes of a line of a trace."""
 
 LONGEST_PAUSE = 5.0
-"""s: a longer gap, as between two flights, is shortened to this."""
+"""s: a longer gap, as between two flights, is shortened to this. A time that is earlier by more is that of a clock
+which was set back."""
 
 FROM_START = "a number of seconds, 0 or more"
 
@@ -132,6 +133,24 @@ class VehicleFrames:
         return frame if frame.sysid in self._vehicles else None
 
 
+class RecordedClock:
+    """Counts the seconds of a recording, whose clock may have been set meanwhile."""
+
+    def __init__(self) -> None:
+        self.elapsed = 0.0
+        """s since the first entry; never less than before."""
+        self._newest: float | None = None
+        """Time of the newest entry, s since 1970."""
+
+    def advance(self, at: float) -> float:
+        """Return the seconds from the first entry to one of this time."""
+        step = 0.0 if self._newest is None else at - self._newest
+        if self._newest is None or step > 0.0 or step < -LONGEST_PAUSE:
+            self._newest = at
+        self.elapsed += max(step, 0.0)
+        return self.elapsed
+
+
 async def play(
     tlogs: Sequence[Path], traces: Sequence[Path], endpoints: Sequence[str], speed: float, start: float
 ) -> int:
@@ -156,24 +175,23 @@ async def _send(node: Node, tlogs: Sequence[Path], traces: Sequence[Path], speed
     frames: Iterator[_Timed] = ((entry.time, 0, entry) for entry in read_tlogs(tlogs))
     messages: Iterator[_Timed] = ((entry.t, 1, entry) for entry in read_traces(traces))
     merged: Iterator[_Timed] = iter(heapq.merge(frames, messages, key=lambda one: one[:2]))
-    first: float | None = None
-    before, due = 0.0, loop.time()
+    clock = RecordedClock()
+    played, due = start, loop.time()
     # A file that is long, or none of ours, is searched for minutes: in a thread, so that Ctrl-C ends that.
     reader = DiskWriter("anafi-mav-replay")
     try:
         while batch := await loop.run_in_executor(reader, _read_ahead, merged):
             for at, _, entry in batch:
-                first = at if first is None else first
+                elapsed = clock.advance(at)
                 frame = vehicles.choose(entry.frame) if isinstance(entry, TlogEntry) else None
-                if at - first < start:
-                    before = at
+                if elapsed < start:
                     continue
-                due += min(max(0.0, at - max(before, first + start)), LONGEST_PAUSE) / speed
-                before = max(before, at)
+                due += min(elapsed - played, LONGEST_PAUSE) / speed
+                played = elapsed
                 if due > loop.time():
                     await asyncio.sleep(due - loop.time())
                 if isinstance(entry, TraceEntry):
-                    say(f"{at - first:.3f} {entry.drone} {entry.kind} {entry.name} {json.dumps(entry.args)}")
+                    say(f"{elapsed:.3f} {entry.drone} {entry.kind} {entry.name} {json.dumps(entry.args)}")
                 elif frame is not None:
                     raw = frame.version_2()
                     for channel in node.channels:
@@ -184,8 +202,8 @@ async def _send(node: Node, tlogs: Sequence[Path], traces: Sequence[Path], speed
         reader.shutdown()
     if not vehicles.seen:
         raise AnafiMavError(f"{tlogs[0]}: no MAVLink frame: expected a tlog")
-    if first is not None and start > before - first:
-        raise ConfigError("--start", f"expected at most the {before - first:.0f} s of the recording, got {start:g}")
+    if start > clock.elapsed:
+        raise ConfigError("--start", f"expected at most the {clock.elapsed:.0f} s of the recording, got {start:g}")
     return count
 
 

@@ -164,6 +164,22 @@ def test_replay_from_outside_the_recording_is_refused(
     assert capsys.readouterr().err == f"anafi-mav: --start: {error}\n"
 
 
+@pytest.mark.parametrize("times", [(4000000000, 100, 101, 102), (100, 4000000000, 101, 102), (3800, 3801, 200, 201)])
+async def test_replay_goes_on_where_the_recorded_clock_was_set_back(times: tuple[int, ...], tmp_path: Path) -> None:
+    sender = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
+    beat = dialect.MAVLink_heartbeat_message(2, dialect.MAV_AUTOPILOT_PX4, 0, 0, 3, 3).pack(sender)
+    path = tmp_path / "flight.tlog"
+    path.write_bytes(b"".join(struct.pack(">Q", second * 1_000_000) + beat for second in times))
+    assert await replay.play([path], [], ["udpout://127.0.0.1:9"], 20.0, 0.0) == 4
+
+
+def test_recorded_clock_counts_on_after_it_was_set_back() -> None:
+    """Entries of two sources may be in another order by a fraction of a second."""
+    clock = replay.RecordedClock()
+    times = (1000.0, 1001.0, 1000.9, 1001.5, 400.0, 401.0)
+    assert [clock.advance(at) for at in times] == [0.0, 1.0, 1.0, 1.5, 1.5, 2.5]
+
+
 def test_replay_names_the_option_of_a_wrong_endpoint(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "gateway.0001.tlog").write_bytes(b"")
     assert main(["replay", str(tmp_path), "--endpoint", "udpout://127.0.0.1"]) == 2
