@@ -18,8 +18,8 @@ import re
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from io import FileIO
 from pathlib import Path
-from typing import BinaryIO
 
 from anafi_mav.disk_writer import HANGS, DiskWriter
 
@@ -67,7 +67,7 @@ class SessionFolder:
         self._part_bytes = min(PART_BYTES, self._session_bytes // SESSION_PARTS)
         self._waiting: dict[str, list[bytes]] = {MAVLINK: [], ARSDK: []}
         self._waiting_bytes = 0
-        self._parts: dict[str, tuple[BinaryIO, int]] = {}
+        self._parts: dict[str, tuple[FileIO, int]] = {}
         """Open part of each file, and its bytes."""
         self._numbers: Counter[str] = Counter()
         self.writer = DiskWriter("anafi-mav-recording")
@@ -126,11 +126,13 @@ class SessionFolder:
         for waiting in self._waiting.values():
             waiting.clear()
         self._waiting_bytes = 0
+        before = self.counters["written_bytes"]
         try:
             await asyncio.get_running_loop().run_in_executor(self.writer, self._write, batch)
         except Exception as error:  # the recording goes on as soon as it can
             reason = error.strerror if isinstance(error, OSError) else None
-            self._drop(sum(map(len, batch.values())), reason or str(error))
+            written = self.counters["written_bytes"] - before
+            self._drop(sum(map(len, batch.values())) - written, reason or str(error))
 
     def _drop(self, size: int, reason: str) -> None:
         self.counters["dropped_bytes"] += size
@@ -153,15 +155,18 @@ class SessionFolder:
             file, size = self._parts.get(name, (None, 0))
             if file is None or size + len(data) > self._part_bytes:
                 if file is not None:
-                    del self._parts[name]  # also if the disk is full: a closed file takes nothing more
+                    del self._parts[name]  # also if that fails: a closed file takes nothing more
                     file.close()
                 self._make_room(len(data))
                 self._numbers[name] += 1
-                file, size = (self.path / name.format(self._numbers[name])).open("xb"), 0
-            self._parts[name] = (file, size + len(data))
-            file.write(data)
-            file.flush()
-            self.counters["written_bytes"] += len(data)
+                file, size = (self.path / name.format(self._numbers[name])).open("xb", buffering=0), 0
+                self._parts[name] = file, size
+            rest = memoryview(data)
+            while rest:  # what a full disk does not take any more is no part of the file's size
+                count = file.write(rest)
+                size, rest = size + count, rest[count:]
+                self._parts[name] = file, size
+                self.counters["written_bytes"] += count
 
     def _make_room(self, size: int) -> None:
         """Delete the oldest parts of this session, then of others: a new part may become full."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import resource
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -124,6 +125,25 @@ async def test_full_disk_is_a_problem_and_no_error(tmp_path: Path) -> None:
     await session.close()
     assert session.problem == "File exists"
     assert session.counters["dropped_bytes"] == 110
+
+
+async def test_full_disk_leaves_no_empty_parts_and_recording_goes_on(tmp_path: Path) -> None:
+    session = SessionFolder(tmp_path, 1_000_000)
+    session.start()
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200, limits[1]))  # as a full disk: files can be made and take no more
+    try:
+        for _ in range(5):
+            session.append(MAVLINK, b"x" * 600)
+            await session.flush()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert sizes(session) == {"gateway.0001.tlog": 200}
+    assert session.counters == {"written_bytes": 200, "dropped_bytes": 2800}
+    assert session.problem == "File too large"
+    session.append(MAVLINK, b"y" * 600)
+    await session.close()
+    assert sizes(session) == {"gateway.0001.tlog": 800}
 
 
 async def test_bytes_beyond_what_may_wait_are_dropped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
