@@ -322,6 +322,21 @@ async def test_panorama_turns_the_hovering_drone_and_hold_ends_it() -> None:
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 15.0, 30.0)
 
 
+@pytest.mark.parametrize(
+    ("amount", "reason"), [(math.inf, "value is not a number"), (-1.0, "value is negative")], ids=["inf", "-1"]
+)
+async def test_impossible_interval_or_distance_of_photos_is_named(amount: float, reason: str) -> None:
+    async with world() as w:
+        for id, component, params in (
+            (dialect.MAV_CMD_IMAGE_START_CAPTURE, CAMERA, (0, amount, 2)),
+            (dialect.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 1, (amount,)),
+        ):
+            mark = w.client.mark()
+            ack = await w.client.command(id, *params, target=(1, component))
+            assert ack.result == dialect.MAV_RESULT_DENIED
+            assert f"Photo refused: {reason}" in texts(w.client, mark)
+
+
 async def test_stop_of_photos_ends_a_panorama() -> None:
     async with world(web=True, model="ai") as w:
         await w.take_off(10.0)

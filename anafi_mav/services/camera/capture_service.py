@@ -289,8 +289,7 @@ class CaptureService(Service):
         interval, count = _number(command.params[1]), command.params[2]
         if math.isnan(count):
             count = 0.0 if interval > 0.0 else 1.0
-        if interval < 0.0 or not math.isfinite(interval):
-            raise Refused(texts.PHOTO, texts.NEGATIVE, lasting=True)
+        _require_amount(interval)
         if count < 0.0 or not count.is_integer():  # infinity is none
             raise Refused(texts.PHOTO, texts.NO_COUNT, lasting=True)
         if count == 1.0:
@@ -331,8 +330,7 @@ class CaptureService(Service):
         """MAV_CMD_DO_SET_CAM_TRIGG_DIST: param1 m between two photos, 0 ends it."""
         distance = _number(command.params[0])
         require_camera(texts.PHOTO, command.params[3])
-        if distance < 0.0 or not math.isfinite(distance):
-            raise Refused(texts.PHOTO, texts.NEGATIVE, lasting=True)
+        _require_amount(distance)
         if distance == 0.0:
             await self._photos.stop()
         else:
@@ -410,6 +408,14 @@ def _action(
 def _number(value: float) -> float:
     """Return a parameter; 0 when it is unset."""
     return 0.0 if math.isnan(value) else value
+
+
+def _require_amount(value: float) -> None:
+    """Refuse an interval or a distance that is infinite or negative."""
+    if not math.isfinite(value):
+        raise Refused(texts.PHOTO, texts.NUMBER_MISSING, lasting=True)
+    if value < 0.0:
+        raise Refused(texts.PHOTO, texts.NEGATIVE, lasting=True)
 
 
 def _effect_of_capture(command: Command) -> Effect:
