@@ -640,8 +640,8 @@ MAVSDK repeats every 0.5 s with `confirmation` 0, and numbers its photos. QGroun
 
 ## Missions
 
-While items to come of the flown mission need the camera, stopping a recording or series, mode, zoom, source and
-reset are TEMPORARILY_REJECTED. A single photo is taken whenever the drone can. A paused mission frees the camera.
+While items to come of the flown mission need the camera, stopping a recording, series or panorama, mode, zoom, source
+and reset are TEMPORARILY_REJECTED. A single photo is taken whenever the drone can. A paused mission frees the camera.
 
 ## Commands
 

@@ -32,6 +32,7 @@ REJECTED, DENIED, UNSUPPORTED = (
     dialect.MAV_RESULT_DENIED,
     dialect.MAV_RESULT_UNSUPPORTED,
 )
+PANORAMA = dialect.MAV_CMD_PANORAMA_CREATE
 SOURCE, RESET = dialect.MAV_CMD_SET_CAMERA_SOURCE, dialect.MAV_CMD_RESET_CAMERA_SETTINGS
 THERMAL_RANGE = dialect.MAVLINK_MSG_ID_CAMERA_THERMAL_RANGE
 NAN = math.nan
@@ -60,6 +61,18 @@ async def test_mission_keeps_its_camera_while_items_need_it(flavour: str) -> Non
         assert (await w.client.command(dialect.MAV_CMD_DO_PAUSE_CONTINUE, 0.0)).result == ACCEPTED
         await state(w, PAUSED, since=mark)
         assert await command(w.client, dialect.MAV_CMD_SET_CAMERA_ZOOM, dialect.ZOOM_TYPE_RANGE, 60) == ACCEPTED
+
+
+async def test_panorama_of_a_mission_is_stopped_by_no_client() -> None:
+    panorama = Item(PANORAMA, 0.0, 0.0, p1=360.0, p2=0.0, p3=10.0, p4=10.0, frame=2)
+    async with world(web=True) as w:
+        await put(w, [takeoff(6.0), panorama, way(20.0, 0.0, 6.0)])
+        mark = w.client.mark()
+        await start(w)
+        await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 1, since=mark, timeout=30.0)
+        assert await command(w.client, dialect.MAV_CMD_IMAGE_STOP_CAPTURE, 0) == REJECTED
+        assert "Photo refused: mission uses camera" in texts(w.client, mark)
+        assert w.drone.firmware.payload.cameras.busy
 
 
 async def test_photo_during_a_mission_is_taken_and_its_items_go_on() -> None:
@@ -288,9 +301,6 @@ async def test_stop_overtakes_no_start_of_another_client() -> None:
         ]
         assert len(videos(w)) == 1
         assert not w.drone.firmware.payload.cameras.busy
-
-
-PANORAMA = dialect.MAV_CMD_PANORAMA_CREATE
 
 
 async def test_panorama_turns_the_hovering_drone_and_hold_ends_it() -> None:

@@ -165,12 +165,14 @@ class PhotoControl:
     async def stop_series(self) -> None:
         """End a series; does nothing without one."""
         async with self._commands:
-            photo = self.camera.photo
-            if not self.camera.taking or (photo is not None and photo.mode is PhotoMode.SINGLE):
+            if not self.camera.taking:
                 return
+            require_free(self.host.vehicle, texts.PHOTO)
+            photo = self.camera.photo
+            if photo is not None and photo.mode is PhotoMode.SINGLE:
+                return  # it ends by itself, at once
             if not self.is_series:
                 raise Refused(texts.PHOTO, texts.NO_SERIES)
-            require_free(self.host.vehicle, texts.PHOTO)
             await self.host.drone.camera.stop_photo(self.host.drone.camera.active_id)
 
     async def _restored(self) -> None:
