@@ -24,7 +24,7 @@ from anafi_mav.services.commands import Action, Altitude, Command, Effect
 from anafi_mav.services.plan.fence_mirror import FenceMirror
 from anafi_mav.services.service import Host, Service
 from anafi_mav.services.stream import MessageStream, Times
-from anafi_mav.vehicle.base.flying import TAKING_OFF
+from anafi_mav.vehicle.base.flying import ON_GROUND, TAKING_OFF
 from anafi_mav.vehicle.base.geo_point import GeoPoint
 from anafi_mav.vehicle.base.modes import FlightMode
 from anafi_mav.vehicle.base.refusal import Refused, reason_of
@@ -112,6 +112,7 @@ class FenceService(Service):
 
     def link_up(self) -> None:
         self._located = -math.inf if self.host.vehicle.place is None else self.host.clock.monotonic()
+        self._speeds.switch(not (self.host.vehicle.on_ground or self.host.vehicle.flying_state is None))
 
     def link_down(self) -> None:
         self._watch.link_down()
@@ -121,7 +122,7 @@ class FenceService(Service):
     def subscriptions(self) -> Subscriptions:
         return {
             events.GpsLocationChanged: self._on_location,
-            events.FlyingStateChanged: lambda message, now: self._look(self.host.clock.monotonic()),
+            events.FlyingStateChanged: self._on_flying_state,
         }
 
     def value_subscriptions(self) -> ValueSubscriptions:
@@ -130,6 +131,10 @@ class FenceService(Service):
     def _on_location(self, message: events.GpsLocationChanged, now: float) -> None:
         self._located = self.host.clock.monotonic()
         self._look(self._located)
+
+    def _on_flying_state(self, message: events.FlyingStateChanged, now: float) -> None:
+        self._speeds.switch(message.state not in ON_GROUND)
+        self._look(self.host.clock.monotonic())
 
     def _on_speed(self, values: Values, now: float) -> None:
         if now - self._looked >= LOOK_SOONEST:
@@ -219,10 +224,8 @@ class FenceService(Service):
     def _look(self, now: float) -> None:
         self._looked = now
         vehicle, watch = self.host.vehicle, self._watch
-        stands = vehicle.on_ground or vehicle.flying_state is None
-        self._speeds.switch(not stands)
         is_announced = self._announced == (False, watch.breaches)
-        if is_announced and watch.rests and stands:
+        if is_announced and watch.rests and (vehicle.on_ground or vehicle.flying_state is None):
             return
         before = watch.state
         blind, breaches = watch.blind, watch.breaches

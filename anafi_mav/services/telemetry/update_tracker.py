@@ -84,7 +84,8 @@ class UpdateTracker:
         """
         if not self._updated:
             return (), self._at
-        bundle = self.bundle(tuple(self._updated))
+        key = tuple(self._updated)
+        bundle = self._bundles.get(key) or self._new_bundle(key)
         self._updated = {}
         bundle.add(self._at)
         return bundle.ids, self._at

@@ -426,7 +426,8 @@ class MissionFlight(PlainTask):
             self._alarm.cancel()
         elif deadline != self._alarm.at:
             self._alarm.set(deadline)
-        self._proof.switch(self.machine.state is State.ENDING)
+        if (ends := self.machine.phase.state is State.ENDING) != self._proof.is_on:
+            self._proof.switch(ends)
         if self._begun is not None and self._beginning is None:
             self._release_waiting()
         if self._outlet is not None:
