@@ -485,7 +485,6 @@ TURNS_TOO_FAST = ReasonTemplate("{rate:.0f} rad/s is too fast", rate=99999999)
 ORBIT_DONE = Reason("angle flown, hovering")
 MAX_TILT = Reason("MaxTilt")
 UNVERIFIED_ROLL = Reason("unverified roll")
-ORBIT_ABORTED = Template("Orbit aborted: approach {end}", end="canceled")
 ORBIT_SLOWED = Template(
     "Orbit {speed:.1f} m/s, not {asked:.1f}: {limit}, {tilt:.0f} deg",
     speed=9.9, asked=99.9, limit="unverified roll", tilt=40,

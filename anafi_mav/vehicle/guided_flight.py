@@ -11,13 +11,13 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar, NamedTuple
 
 from anafi_mav import texts, units
-from anafi_mav.drone import MoveEnd, Position
+from anafi_mav.drone import Drone, MoveEnd, Position
 from anafi_mav.drone.events import AttitudeChanged
 from anafi_mav.drone.expectation import loop_time
 from anafi_mav.drone.piloting.moves import Move
 from anafi_mav.drone.piloting.piloting import Piloting
 from anafi_mav.errors import CommandRejected
-from anafi_mav.texts import Subject
+from anafi_mav.texts import OperatorText, Subject
 from anafi_mav.vehicle.base.aircraft import Aircraft
 from anafi_mav.vehicle.base.bounds import check_height, check_place
 from anafi_mav.vehicle.base.flight_task import Hover, Needs, PlainTask, Preparation, TaskRules
@@ -43,8 +43,18 @@ SHORT_CLIMB, SHORT_TURN = 1.0, 0.2
 REST_WAIT = 2.0
 """s until a turn counts from the newest heading, whether or not the drone turns. MaxRotationSpeed ends within one."""
 
-_SHORT = {MoveEnd.ERROR: texts.MOVE_FAILED, MoveEnd.CANCELED: texts.MOVE_CANCELLED}
-"""Ends of a move short of its target, with the reason for the text."""
+_SHORT = (MoveEnd.ERROR, MoveEnd.CANCELED)
+"""Ends of a move short of its target."""
+
+_REASONS = {MoveEnd.ERROR: texts.MOVE_FAILED, MoveEnd.LINK_LOST: texts.LINK_LOST}
+
+
+def early_end_reason(how: MoveEnd, drone: Drone) -> OperatorText:
+    """Return why a move has ended short of its target, without a newer command."""
+    if how is not MoveEnd.LINK_LOST and drone.controller.pilot_acquired_control:
+        return texts.PILOT
+    return _REASONS.get(how, texts.MOVE_CANCELLED)
+
 
 GOTO = TaskRules(texts.GOTO, needs=Needs.NO_DESCENT | Needs.IN_AIR, follows=True)
 
@@ -353,5 +363,5 @@ class GuidedFlight:
             control.release(goto)
             self._newest = _Ended(goto, is_short, vehicle.drone.gps.state.location, control.epoch)
         if is_short:
-            reason = texts.PILOT if vehicle.drone.controller.pilot_acquired_control else _SHORT[how]
+            reason = early_end_reason(how, vehicle.drone)
             vehicle.text(Severity.WARNING, texts.TASK_ENDED.fill(what=texts.GOTO, reason=reason))

@@ -186,6 +186,46 @@ async def test_goto_right_after_pilots_stick_is_refused() -> None:
 
 
 @generations
+@pytest.mark.parametrize("is_orbit", [False, True])
+async def test_flight_while_pilot_holds_a_stick_is_refused_with_the_reason(generation: int, is_orbit: bool) -> None:
+    """The gateway learns of the stick when it has grabbed the axes."""
+    what = "Orbit" if is_orbit else "Goto"
+    async with world(speed=1.0, skycontroller=generation) as w:
+        pilot = w.drone.skycontroller
+        assert pilot is not None
+        await to_the_pilot(w)
+        pilot.stick(PITCH_STICK, 40)
+        await w.drone.wait_log(lambda e: e.name.endswith("PCMD") and e.args["pitch"] == 40, 10.0)
+        for north in (60.0, 70.0):  # a moment later, and while the pilot is known to have control
+            mark = w.client.mark()
+            if is_orbit:
+                result = (await w.client.command(dialect.MAV_CMD_DO_ORBIT, north, 2.0)).result
+            else:
+                result = await goto(w, north, 10.0)
+            assert result == REJECTED
+            await said(w.client, f"{what} refused: Skycontroller pilot in control", mark)
+
+
+@pytest.mark.parametrize("ends", ["stick", "link"])
+async def test_orbit_that_ends_on_the_way_to_its_circle_is_reported_with_the_reason(ends: str) -> None:
+    async with world(speed=1.0, skycontroller=3) as w:
+        pilot, session = w.drone.skycontroller, w.drone.session
+        assert pilot is not None
+        assert session is not None
+        await to_the_pilot(w)
+        assert (await w.client.command(dialect.MAV_CMD_DO_ORBIT, 30.0, 2.0)).result == ACCEPTED
+        await source_is(w, Source.CONTROLLER)
+        await w.drone.wait_log(lambda e: pilot.grabbed_axes != 0, 10.0)
+        mark = w.client.mark()
+        if ends == "stick":
+            pilot.stick(PITCH_STICK, 40)
+            await said(w.client, "Orbit ended: Skycontroller pilot in control", mark)
+        else:
+            session.end("closed")
+            await said(w.client, "Orbit ended: link lost", mark)
+
+
+@generations
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 async def test_joystick_that_is_held_does_not_take_the_drone_from_the_pilot(flavour: str, generation: int) -> None:
     """The pilot stops the drone and centres his sticks. The joystick flies again after a rest of two seconds."""

@@ -43,7 +43,7 @@ from anafi_mav.vehicle.circle import (
     heading_at,
     outline,
 )
-from anafi_mav.vehicle.guided_flight import Goto
+from anafi_mav.vehicle.guided_flight import Goto, early_end_reason
 from anafi_mav.vehicle.vehicle import Vehicle
 
 AS_IT_IS = 5.0
@@ -238,7 +238,8 @@ class OrbitService(Service, PlainTask):
         if end is MoveEnd.DONE:
             self._begin(orbit)
         else:
-            self.host.text(Severity.WARNING, texts.ORBIT_ABORTED.fill(end=end.value))
+            reason = early_end_reason(end, self.host.drone)
+            self.host.text(Severity.WARNING, texts.TASK_ENDED.fill(what=texts.ORBIT, reason=reason))
             self.host.vehicle.control.release(self)
 
     def _begin(self, orbit: _Orbit) -> None:

@@ -314,8 +314,10 @@ class Control:
             elif isinstance(error, CommandTimeout) and not rules.is_flight and not rules.keeps_below and self.is_free:
                 self.adopt(Hover())  # the drone may have obeyed: no older stream flies it on
             if isinstance(error, CommandRejected):
-                reason = self._aircraft.lacking(rules.needs) or texts.from_below(error.reason)
-                raise Refused(rules.what, reason) from error
+                # A stick that the pilot holds is known once the axes are grabbed: it ends what has just begun.
+                is_pilots = rules.is_flight and self._aircraft.drone.controller.pilot_acquired_control
+                reason = texts.PILOT if is_pilots else self._aircraft.lacking(rules.needs)
+                raise Refused(rules.what, reason or texts.from_below(error.reason)) from error
             raise
 
     def check(self, task: FlightTask, by: By, rules: TaskRules | None = None) -> None:
