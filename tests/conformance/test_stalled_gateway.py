@@ -31,6 +31,8 @@ from support.plans import around
 from support.process import gateway_process
 from support.world import HOLD, HOME, WEB_PORT, World, loopback
 
+from anafi_mav import texts
+from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.ardrone3 import FlyingState
 from anafi_mav.arsdk.messages.rth import StateReason
 from anafi_mav.arsdk.messages.skyctrl import Source
@@ -39,6 +41,7 @@ from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, Simulator
 from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.units import quaternion_from_euler
+from anafi_mav.vehicle.vehicle import POSITION_OLD
 
 PITCH_STICK = 3
 """Its axis at the Skycontroller (mapper.xml)."""
@@ -243,6 +246,24 @@ async def test_mode_sent_to_a_stalled_gateway_stops_the_drone(tmp_path: Path) ->
         await asyncio.sleep(1.5)
         gateway.send_signal(signal.SIGCONT)
         await w.drone.wait_log(lambda e: e.kind == "command" and e.name.endswith("CancelMoveTo"), 10.0)
+
+
+async def test_locations_that_a_stalled_gateway_has_not_received_are_not_missing(tmp_path: Path) -> None:
+    """The text blames the drone's GPS receiver. Locations that stop after the stall are reported."""
+    async with apart(tmp_path, None) as (w, gateway):
+        await w.take_off()
+        gateway.send_signal(signal.SIGSTOP)
+        await asyncio.sleep(POSITION_OLD + 1.0)
+        mark = w.client.mark()
+        gateway.send_signal(signal.SIGCONT)
+        await w.client.wait("GLOBAL_POSITION_INT", since=mark, timeout=10.0)
+        w.drone.faults.unreported = frozenset({ardrone3.GpsLocationChanged.NAME})
+        stopped = w.client.mark()
+        lost = texts.POSITION_LOST.fill(seconds=POSITION_OLD)
+        await w.client.wait("STATUSTEXT", lambda m: m.text == lost, since=stopped, timeout=20.0)
+        said = [m.text for _, m in w.client.since(mark, "STATUSTEXT")]
+        assert said.count(lost) == 1
+        assert texts.POSITION_FOUND not in said
 
 
 @pytest.mark.parametrize("way", ["goto", "mission", "offboard", "orbit"])

@@ -48,6 +48,8 @@ class TelemetryService(Service):
         super().__init__(host)
         self._is_lost = False
         """The clients have the text that the position is unknown, and not yet that it is known again."""
+        self._lost_from = 0.0
+        """Before this time (s) no text is due: the host stalled, and could receive no location."""
 
     def messages(self) -> Mapping[int, MessageHandler]:
         return {dialect.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN: self._keep_origin}
@@ -66,6 +68,9 @@ class TelemetryService(Service):
     def link_down(self) -> None:
         self._is_lost = False
 
+    def host_stalled(self, seconds: float) -> None:
+        self._lost_from = self.host.clock.monotonic() + POSITION_OLD
+
     def subscriptions(self) -> Subscriptions:
         return {events.GpsLocationChanged: self._on_location}
 
@@ -83,6 +88,8 @@ class TelemetryService(Service):
         if is_old or self._is_lost:
             # No event reports that the fix of GPS_RAW_INT is gone; repeated for clients that connect later.
             self.host.mark_updated(dialect.MAVLINK_MSG_ID_GPS_RAW_INT, now)
+        if is_old and not self._is_lost and now < self._lost_from:
+            return self._lost_from
         if is_old and not self._is_lost:
             self._is_lost = True
             self.host.text(Severity.WARNING, texts.POSITION_LOST.fill(seconds=POSITION_OLD))
