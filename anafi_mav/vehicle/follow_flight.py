@@ -142,6 +142,9 @@ class FollowFlight(PlainTask):
         following = self._following
         if following is None or following.leader is None:
             return
+        if self._silence.at is not None and now >= self._silence.at:
+            self._expired()  # after a stall of the host the drone's events are read before timers are called
+            return
         if (reason := self._fly(following, now)) is not None:
             self.drop(following.leader, reason)
 

@@ -25,10 +25,11 @@ from support.fault_scenarios import (
     results,
     until,
 )
-from support.mav import Client
+from support.mav import NAN, Client
 from support.missions import CORNERS, put, start
 from support.plans import around
 from support.process import gateway_process
+from support.setpoints import said, streaming
 from support.world import HOLD, HOME, WEB_PORT, World, loopback
 
 from anafi_mav import texts
@@ -41,6 +42,7 @@ from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, Simulator
 from anafi_mav.sim.world.faults import Impairment
 from anafi_mav.units import quaternion_from_euler
+from anafi_mav.vehicle.follow import SILENCE
 from anafi_mav.vehicle.vehicle import POSITION_OLD
 
 PITCH_STICK = 3
@@ -48,6 +50,8 @@ PITCH_STICK = 3
 
 LIMIT = 2.5
 """s that the gateway's event loop may stall: more than this machine makes it wait."""
+
+PX4_FOLLOW = (1, 4, 8)
 
 TOO_OLD = "Command refused: too old on arrival"
 
@@ -214,6 +218,29 @@ async def test_commands_sent_to_a_stalled_gateway_are_dropped(tmp_path: Path) ->
         assert results(w.client, mark) == [(GOTO, REJECTED)]
         texts = [m.text for _, m in w.client.since(mark, "STATUSTEXT")]
         assert TOO_OLD in texts
+
+
+@pytest.mark.parametrize("generation", [None, 3])
+async def test_target_from_before_a_stall_is_followed_no_further(tmp_path: Path, generation: int | None) -> None:
+    """Nor are the sticks taken from the pilot, who has them since."""
+    async with apart(tmp_path, generation) as (w, gateway):
+        await w.take_off(8.0)
+        assert (await w.client.command(SET_MODE, *PX4_FOLLOW)).result == ACCEPTED
+        place = around((HOME[0], HOME[1]), (200.0, 0.0))[0]
+        target = dialect.MAVLink_follow_target_message(
+            0, 1, *(round(degrees * 1e7) for degrees in place), HOME[2], *([[NAN] * 3] * 2), [NAN] * 4,
+            *([[NAN] * 3] * 2), 0
+        )  # fmt: skip
+        async with streaming(w.client, lambda: target, 0.5):
+            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 1.0, 20.0)
+            gateway.send_signal(signal.SIGSTOP)
+            await asyncio.sleep(SILENCE + 1.0)
+        back, mark = asyncio.get_running_loop().time(), w.client.mark()
+        gateway.send_signal(signal.SIGCONT)
+        await said(w.client, "Follow ended: target lost", mark)
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > back + 1.0, 10.0)
+        assert deflected(w, back) == []
+        assert [e for e in w.drone.log if e.t > back and e.name.endswith("grab") and e.args["axes"]] == []
 
 
 @pytest.mark.parametrize(
