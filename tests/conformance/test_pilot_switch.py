@@ -17,7 +17,7 @@ from support.world import HOLD, World, world
 
 from anafi_mav.arsdk.messages import ardrone3
 from anafi_mav.arsdk.messages.skyctrl import Source
-from anafi_mav.drone.controller.controller import PILOT_KEEPS, QUIET
+from anafi_mav.drone.controller.controller import LOOK_EVERY, PILOT_KEEPS, QUIET_LOOKS
 
 SWITCH = "ANF_SC_OFFBOARD"
 PILOT, PROGRAM, AUTOMATIC = range(3)
@@ -430,7 +430,7 @@ async def test_program_keeps_the_aircraft_until_the_pilots_stick(generation: int
         await switch(w, PROGRAM)
         assert pilot.source is Source.CONTROLLER
         await said(other, "Aircraft: programs")
-        await asyncio.sleep(5 * QUIET)
+        await asyncio.sleep(5 * QUIET_LOOKS * LOOK_EVERY)
         assert pilot.source is Source.CONTROLLER
         assert await goto(w, 5.0, 8.0) == ACCEPTED
         marks = w.client.mark(), other.mark()

@@ -220,19 +220,34 @@ async def test_commands_sent_to_a_stalled_gateway_are_dropped(tmp_path: Path) ->
         assert TOO_OLD in texts
 
 
+def far_target() -> Any:
+    """FOLLOW_TARGET, 200 m north of home."""
+    place = around((HOME[0], HOME[1]), (200.0, 0.0))[0]
+    unknown = [NAN] * 3
+    latitude, longitude = (round(degrees * 1e7) for degrees in place)
+    return dialect.MAVLink_follow_target_message(
+        0, 1, latitude, longitude, HOME[2], unknown, unknown, [NAN] * 4, unknown, unknown, 0
+    )
+
+
+async def follow_northwards(w: World) -> None:
+    """Choose mode Follow, until the drone flies after its target."""
+    await w.take_off(8.0)
+    assert (await w.client.command(SET_MODE, *PX4_FOLLOW)).result == ACCEPTED
+    await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 1.0, 20.0)
+
+
+def grabs(w: World, since: float) -> list[Any]:
+    """Grabs of axes that the Skycontroller received after a moment."""
+    return [e for e in w.drone.log if e.t > since and e.name.endswith("grab") and e.args["axes"]]
+
+
 @pytest.mark.parametrize("generation", [None, 3])
 async def test_target_from_before_a_stall_is_followed_no_further(tmp_path: Path, generation: int | None) -> None:
     """Nor are the sticks taken from the pilot, who has them since."""
     async with apart(tmp_path, generation) as (w, gateway):
-        await w.take_off(8.0)
-        assert (await w.client.command(SET_MODE, *PX4_FOLLOW)).result == ACCEPTED
-        place = around((HOME[0], HOME[1]), (200.0, 0.0))[0]
-        target = dialect.MAVLink_follow_target_message(
-            0, 1, *(round(degrees * 1e7) for degrees in place), HOME[2], *([[NAN] * 3] * 2), [NAN] * 4,
-            *([[NAN] * 3] * 2), 0
-        )  # fmt: skip
-        async with streaming(w.client, lambda: target, 0.5):
-            await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 1.0, 20.0)
+        async with streaming(w.client, far_target, 0.5):
+            await follow_northwards(w)
             gateway.send_signal(signal.SIGSTOP)
             await asyncio.sleep(SILENCE + 1.0)
         back, mark = asyncio.get_running_loop().time(), w.client.mark()
@@ -240,7 +255,7 @@ async def test_target_from_before_a_stall_is_followed_no_further(tmp_path: Path,
         await said(w.client, "Follow ended: target lost", mark)
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > back + 1.0, 10.0)
         assert deflected(w, back) == []
-        assert [e for e in w.drone.log if e.t > back and e.name.endswith("grab") and e.args["axes"]] == []
+        assert grabs(w, back) == []
 
 
 @pytest.mark.parametrize(

@@ -68,9 +68,9 @@ DEFLECTION = 10
 LOOK_EVERY = 0.1
 """s between looks whether something of ours still flies."""
 
-QUIET = 0.4
-"""s without a command of motion, and without a move under way, after which sticks and source go back: within half a
-second of the end."""
+QUIET_LOOKS = 5
+"""Looks in a row that find no command of motion and no move under way, after which sticks and source go back: within
+half a second of the end. No time, for a host that stalled sends no command either, and its task flies on."""
 
 CLAIM_EVERY = 1.0
 """s between two attempts to give back a source, or sticks, that are ours by the Skycontroller's report only."""
@@ -123,7 +123,7 @@ class Controller(Element[ControllerState]):
         self._take_over = take_over
         self._stand_by = stand_by
         self._gave_back = -math.inf
-        self._last_motion = -math.inf
+        self._quiet_looks = 0
         self._pilot_keeps_until = -math.inf
         self._extra_axes = 0
         self._extra_buttons = 0
@@ -211,7 +211,7 @@ class Controller(Element[ControllerState]):
 
     def _begin_motion(self) -> None:
         """Take sticks and source, if they are not ours, until the motion is over."""
-        self._last_motion = loop_time()
+        self._quiet_looks = 0
         if not self.taken:
             self._take()
         if self._watching.at is None:
@@ -329,10 +329,8 @@ class Controller(Element[ControllerState]):
         if not self.taken:  # the Skycontroller has not received that
             self._send_back()
             return
-        now = loop_time()
-        if self._moving():
-            self._last_motion = now
-        if now - self._last_motion < QUIET:
+        self._quiet_looks = 0 if self._moving() else self._quiet_looks + 1
+        if self._quiet_looks < QUIET_LOOKS:
             self._watching.set_in(LOOK_EVERY)
         else:
             self.give_back()

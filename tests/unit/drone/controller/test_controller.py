@@ -5,10 +5,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+import time
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 
 import pytest
+from support.clock import everybodys
 from support.scripted_device import STATES, ScriptedDevice
 from support.world import loopback
 
@@ -30,7 +32,7 @@ from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState a
 from anafi_mav.arsdk.messages.proto import controller_network, device_manager, network
 from anafi_mav.arsdk.messages.skyctrl import Source
 from anafi_mav.drone import Drone, PilotingCommand
-from anafi_mav.drone.controller.controller import PILOT_KEEPS, STICKS, TILT, is_motion
+from anafi_mav.drone.controller.controller import LOOK_EVERY, PILOT_KEEPS, STICKS, TILT, is_motion
 from anafi_mav.drone.piloting.moves import Move, MoveEnd
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
 from anafi_mav.sim import DroneSpec, LogEntry, SimulatedDrone, Simulator
@@ -662,6 +664,20 @@ async def test_host_stall_ends_the_active_flight_task() -> None:
         await device.until(ardrone3.CancelMoveTo)
         assert drone.controller.pilot_acquired_control
         assert not drone.controller.taken
+
+
+async def test_sticks_stay_grabbed_when_the_host_stalled_during_a_flight() -> None:
+    """Given back for it, they were taken again from the pilot, who has them since, by the task that flies."""
+    async with behind() as (drone, device):
+        drone.piloting.pilot(FORWARD)
+        await device.until(mapper.Grab)
+        with everybodys():
+            await asyncio.sleep(0)  # the next callbacks run on the clock of everybody
+            time.sleep(1.5)  # noqa: ASYNC251
+            await asyncio.sleep(LOOK_EVERY)
+            drone.piloting.pilot(FORWARD)
+            await asyncio.sleep(LOOK_EVERY)
+        assert [m.axes for m in device.got(mapper.Grab)] == [STICKS]
 
 
 async def test_grab_without_confirmation_leaves_the_former_masks() -> None:
