@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Generic, Protocol, TypeVar
@@ -28,6 +29,12 @@ class Clock(Protocol):
     def time(self) -> float:
         """Seconds since 1970-01-01 UTC; may step when the system clock is set."""
 
+    def suspended(self) -> float:
+        """Seconds for which the computer was suspended, from an arbitrary start.
+
+        `monotonic` stood still meanwhile.
+        """
+
 
 class SystemClock:
     """The machine's clocks."""
@@ -35,6 +42,24 @@ class SystemClock:
     def __init__(self) -> None:
         self.monotonic = time.monotonic
         self.time = time.time
+
+    def suspended(self) -> float:
+        """See `Clock`; always 0 where no clock of the system counts it.
+
+        Linux has one (clock_gettime(2), CLOCK_BOOTTIME).
+        """
+        return _suspended()
+
+
+if sys.platform == "linux":
+
+    def _suspended() -> float:
+        return time.clock_gettime(time.CLOCK_BOOTTIME) - time.clock_gettime(time.CLOCK_MONOTONIC)
+
+else:
+
+    def _suspended() -> float:
+        return 0.0
 
 
 class Alarm:

@@ -91,7 +91,7 @@ class FabricGround:
         except ConfigError as error:
             raise ConfigError("--endpoint", error.problem) from error
         self._open: list[Endpoint] = []
-        self._stalls = StallWatch(self._stalled)
+        self._stalls = StallWatch(self._stalled, clock)
         self._stations: dict[Channel, _FabricStation] = {}
         self._by_name: dict[str, _FabricStation] = {}
         self._count = 0

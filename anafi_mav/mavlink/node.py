@@ -140,7 +140,7 @@ class Node:
 
         Raises `ConfigError` with key path "endpoints[i]"; nothing is left open.
         """
-        self._stalls = StallWatch(self._stalled)
+        self._stalls = StallWatch(self._stalled, self._clock)
         self._stalls.start()
         parsed = []
         for index, entry in enumerate(entries):
@@ -310,7 +310,12 @@ class Node:
         reached = channel.system_ids if reached is None else reached
         now = self._clock.monotonic()
         stalls = self._stalls
-        old = stalls is not None and now >= stalls.punctual_until and not channel.has_ages and stalls.waited > 0.0
+        old = (
+            stalls is not None
+            and now + self._clock.suspended() >= stalls.punctual_until
+            and not channel.has_ages
+            and stalls.waited > 0.0
+        )
         if frames:
             channel.hear(frames, now)
         for received in frames:

@@ -16,6 +16,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as stock
 from support import clock
 from support.fault_scenarios import watched
+from support.laptop import LaptopClock
 from support.lines import SerialClient, UdpClient, pseudo_terminal
 from support.mav import Client
 from support.world import loopback
@@ -43,7 +44,8 @@ class Bench:
     def __init__(self) -> None:
         self.inbound: list[Inbound] = []
         self.changes: list[tuple[str, bool]] = []
-        self.node = Node(on_channel=self._channel)
+        self.clock = LaptopClock()
+        self.node = Node(on_channel=self._channel, clock=self.clock)
         self.node.add_host(LISTENER, EVERY_COMPONENT, self.inbound.append)
 
     def _channel(self, channel: Channel, opened: bool) -> None:
@@ -209,6 +211,25 @@ def newest(frames: list[ReceivedFrame]) -> int:
     """The time of the last frame."""
     time: int = frames[-1].message.time_boot_ms
     return time
+
+
+async def test_what_waited_for_a_suspended_computer_is_late() -> None:
+    """A goto of the evening before, which TCP repeats when the computer wakes, is not carried out."""
+    host = loopback()
+    async with bench(f"tcpin://{host}:5760") as d:
+        client = await Client(10).connect(5760, host)
+        client.send(BEAT)
+        await d.until(lambda: d.got("HEARTBEAT", 10) != [])
+        client.send_command(stock.MAV_CMD_DO_REPOSITION, target=(0, 0))
+        client.send(ping(0, 0, 1))
+        d.clock.slept += 3600.0  # nothing is read before the next iteration
+        await d.until(lambda: d.got("COMMAND_LONG", 10) != [])
+        await client.silence("PING", 0.5)  # the sockets are drained
+        client.send_command(stock.MAV_CMD_DO_REPOSITION, target=(0, 0))
+        await d.until(lambda: len(d.got("COMMAND_LONG", 10)) == 2)
+        assert [i.is_late for i in d.inbound if i.message.get_type() == "COMMAND_LONG"] == [True, False]
+        assert d.got("PING", 10) == []
+        await client.close()
 
 
 async def test_stalled_reader_does_not_delay_other_clients() -> None:
