@@ -49,6 +49,7 @@ class FollowFlight(PlainTask):
         texts.FOLLOW,
         needs=Needs.NO_DESCENT | Needs.IN_AIR | Needs.FIX | Needs.LIMITS | STEERING,
         start=Preparation.HOVER,
+        needs_link=True,
     )
     mode = FlightMode.FOLLOW
 

@@ -46,17 +46,15 @@ REST_WAIT = 2.0
 _SHORT = (MoveEnd.ERROR, MoveEnd.CANCELED)
 """Ends of a move short of its target."""
 
-_REASONS = {MoveEnd.ERROR: texts.MOVE_FAILED, MoveEnd.LINK_LOST: texts.LINK_LOST}
-
 
 def early_end_reason(how: MoveEnd, drone: Drone) -> OperatorText:
     """Return why a move has ended short of its target, without a newer command."""
-    if how is not MoveEnd.LINK_LOST and drone.controller.pilot_acquired_control:
+    if drone.controller.pilot_acquired_control:
         return texts.PILOT
-    return _REASONS.get(how, texts.MOVE_CANCELLED)
+    return texts.MOVE_FAILED if how is MoveEnd.ERROR else texts.MOVE_CANCELLED
 
 
-GOTO = TaskRules(texts.GOTO, needs=Needs.NO_DESCENT | Needs.IN_AIR, follows=True)
+GOTO = TaskRules(texts.GOTO, needs=Needs.NO_DESCENT | Needs.IN_AIR, follows=True, needs_link=True)
 
 
 def _rules_of_offset(what: Subject) -> TaskRules:

@@ -11,9 +11,11 @@ from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from support.fault_scenarios import ACCEPTED, PX4_OFFBOARD, SET_MODE, goto
 from support.mav import Client
 from support.params import write
 from support.process import simulator_process
+from support.setpoints import VELOCITY_ONLY, local, streaming
 from support.world import ARMED, HOLD, OFFBOARD, TAKEOFF, loopback, world
 
 from anafi_mav import geo, mav_enums
@@ -199,3 +201,26 @@ async def test_the_ground_station_falls_silent_during_the_loss() -> None:
         done = await w.drone.wait_log(lambda e: e.name == "rth.return_to_home", 2.0 * after)
         assert done.t - back > after - 1.0
         await client.wait("STATUSTEXT", lambda m: "No ground station for 4 s: return" in m.text, since=0)
+
+
+@pytest.mark.parametrize("what", ["Goto", "Orbit", "Follow", "Offboard", ""])
+async def test_flight_that_the_link_loss_ends_is_reported(what: str) -> None:
+    """The connection may be back before a station misses it: without a text the drone just stopped."""
+    async with world(speed=1.0) as w:
+        await w.take_off(8.0)
+        async with streaming(w.client, local(VELOCITY_ONLY, v=(2.0, 0.0, 0.0))):
+            if what == "Goto":
+                assert await goto(w, 200.0, 10.0) == ACCEPTED
+            elif what == "Orbit":
+                assert (await w.client.command(mav_enums.MAV_CMD_DO_ORBIT, 3.0, 2.0)).result == ACCEPTED
+                await w.drone.wait_log(lambda e: e.name.endswith("PCMD") and e.args["roll"] != 0, 20.0)
+            elif what == "Follow":
+                assert (await w.client.command(SET_MODE, 1, 4, 8)).result == ACCEPTED
+            elif what == "Offboard":
+                assert (await w.client.command(SET_MODE, *PX4_OFFBOARD)).result == ACCEPTED
+            mark = w.client.mark()
+            assert w.drone.session is not None
+            w.drone.session.end("closed")
+            await w.client.heartbeat(lambda beat: beat.custom_mode == HOLD, since=mark, timeout=15.0)
+        ended = [m.text for _, m in w.client.since(mark, "STATUSTEXT") if "ended" in m.text]
+        assert ended == ([f"{what} ended: link lost"] if what else [])

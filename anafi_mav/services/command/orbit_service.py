@@ -76,7 +76,10 @@ class OrbitService(Service, PlainTask):
     """Flies circles; the vehicle's flight task while it does."""
 
     rules = TaskRules(
-        texts.ORBIT, needs=Needs.NO_DESCENT | Needs.IN_AIR | Needs.FIX | Needs.LIMITS | STEERING, follows=True
+        texts.ORBIT,
+        needs=Needs.NO_DESCENT | Needs.IN_AIR | Needs.FIX | Needs.LIMITS | STEERING,
+        follows=True,
+        needs_link=True,
     )
     mode = FlightMode.ORBIT
 
@@ -232,7 +235,7 @@ class OrbitService(Service, PlainTask):
     async def _approach(self, move: Move, orbit: _Orbit) -> None:
         """Circle when the move there has ended well."""
         end = await move.result()
-        if self._orbit is not orbit:
+        if self._orbit is not orbit or end is MoveEnd.LINK_LOST:
             return
         orbit.approach = None
         if end is MoveEnd.DONE:

@@ -467,7 +467,11 @@ class Control:
     def link_down(self) -> list[asyncio.Task[None]]:
         """The link is lost: nothing that was requested outlives it."""
         self.actions.link_down()
-        return self.handle(Event.LINK_DOWN)
+        task = self._situation.task
+        ending = self.handle(Event.LINK_DOWN)
+        if task is not None and task.rules.needs_link:
+            self._aircraft.text(Severity.WARNING, texts.TASK_ENDED.fill(what=task.rules.what, reason=texts.LINK_LOST))
+        return ending
 
     @property
     def _owns_descent(self) -> bool:

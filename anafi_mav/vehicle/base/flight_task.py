@@ -139,6 +139,8 @@ class TaskRules:
     """Returns that it ends, likewise."""
     follows: bool = False
     """During a take-off, or at the end of a mission, it follows the active task instead of ending it."""
+    needs_link: bool = False
+    """The gateway keeps it going, or stops it when the link is back. The drone goes on with others by itself."""
     is_flight: bool = True
     """A policy may refuse it; False: it stops the drone, lands it, leads it home, or nothing flies meanwhile."""
 

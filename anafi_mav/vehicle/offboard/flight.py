@@ -78,6 +78,7 @@ _RULES = {
         ends_return=Extent.COMMANDED,
         follows=True,
         needs_operator=True,
+        needs_link=True,
     )
     for stands in (False, True)
     for needs_roll in (False, True)
