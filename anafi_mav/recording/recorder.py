@@ -38,7 +38,7 @@ class Recorder:
         self.files = SessionFolder(folder, max_bytes)
         self._node = node
         self._clock = clock
-        self._since_1970 = clock.time() - clock.monotonic()
+        self._since_1970 = clock.time() - self._elapsed
         """The session's clock does not step when the computer's clock is set."""
         self._channel = RecordingChannel("recording", self._write)
 
@@ -74,8 +74,13 @@ class Recorder:
         if frame.id not in WITH_SECRETS:
             self._write(frame.raw if frame.raw[0] == MAGIC_1 else with_flags(frame.raw, 0))
 
+    @property
+    def _elapsed(self) -> float:
+        """Time since an arbitrary moment, s; goes on while the computer is suspended."""
+        return self._clock.monotonic() + self._clock.suspended()
+
     def _now(self) -> float:
-        return self._since_1970 + self._clock.monotonic()
+        return self._since_1970 + self._elapsed
 
     def _write(self, raw: bytes) -> None:
         self.files.append(MAVLINK, encode(TlogEntry(self._now(), raw)))
