@@ -387,9 +387,11 @@ class Drone:
     def _note_hover_due(self) -> None:
         """Note that motion is to be stopped once the drone is connected again.
 
-        Where the pilot at a Skycontroller has control, nothing of ours flies, and a hover would be against him.
+        Where the pilot at a Skycontroller has control, nothing of ours flies, and a hover would be against him. What
+        the drone has not reported as ended goes on all the same: the stop that his stick caused may not have arrived.
         """
-        self._hover_due = None if self.controller.pilot_has_source else self.identity.serial
+        is_pilots = self.controller.pilot_has_source and not self.piloting.stopping()
+        self._hover_due = None if is_pilots else self.identity.serial
 
     def _hover_after_loss(self) -> None:
         """Stop motion that continues from before a silence, or before the end of a connection.
