@@ -393,6 +393,7 @@ class SimulatedDrone:
             for message in self._telemetry.due(now):
                 if message.NAME not in unreported:
                     self._report(message, session.send)
+            session.flush()  # each drone's own, and not those of a fleet together when all have been computed
         if now >= self._next_pose:
             self._next_pose = max(self._next_pose + POSE_PERIOD, now)
             if self.log.used:

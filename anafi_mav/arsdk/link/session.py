@@ -180,6 +180,11 @@ class Session(asyncio.DatagramProtocol):
             self._flush_soon()
         return token
 
+    def flush(self) -> None:
+        """Send all that waits: now, or when the messages that are read together are handled."""
+        if not self._is_reading:
+            self._flush()
+
     def cancel(self, token: int) -> None:
         """See `Transport.cancel`: the message is not sent (again)."""
         self._transport.cancel(token)
