@@ -12,6 +12,7 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import Any, Generic, Protocol, TypeVar
 
 KeyT = TypeVar("KeyT")
@@ -29,10 +30,10 @@ class Clock(Protocol):
     def time(self) -> float:
         """Seconds since 1970-01-01 UTC; may step when the system clock is set."""
 
-    def suspended(self) -> float:
-        """Seconds for which the computer was suspended, from an arbitrary start.
+    def boottime(self) -> float:
+        """Seconds since an arbitrary moment, with those for which the computer was suspended.
 
-        `monotonic` stood still meanwhile.
+        `monotonic` stands still meanwhile. Without such a clock it is `monotonic`.
         """
 
 
@@ -42,24 +43,9 @@ class SystemClock:
     def __init__(self) -> None:
         self.monotonic = time.monotonic
         self.time = time.time
-
-    def suspended(self) -> float:
-        """See `Clock`; always 0 where no clock of the system counts it.
-
-        Linux has one (clock_gettime(2), CLOCK_BOOTTIME).
-        """
-        return _suspended()
-
-
-if sys.platform == "linux":
-
-    def _suspended() -> float:
-        return time.clock_gettime(time.CLOCK_BOOTTIME) - time.clock_gettime(time.CLOCK_MONOTONIC)
-
-else:
-
-    def _suspended() -> float:
-        return 0.0
+        self.boottime = (
+            partial(time.clock_gettime, time.CLOCK_BOOTTIME) if sys.platform == "linux" else time.monotonic
+        )  # clock_gettime(2)
 
 
 class Alarm:

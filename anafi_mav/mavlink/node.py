@@ -312,7 +312,7 @@ class Node:
         stalls = self._stalls
         old = (
             stalls is not None
-            and now + self._clock.suspended() >= stalls.punctual_until
+            and self._clock.boottime() >= stalls.punctual_until
             and not channel.has_ages
             and stalls.waited > 0.0
         )

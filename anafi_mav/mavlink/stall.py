@@ -33,6 +33,10 @@ LATE = 0.2
 """s without a beat, soon after a stall, in which a busy host has not let the loop empty its sockets."""
 
 
+APART = 0.05
+"""s by which readings of two clocks one after the other may differ: the process may wait in between."""
+
+
 class StallWatch:
     """Watches one event loop between `start` and `stop`."""
 
@@ -42,11 +46,11 @@ class StallWatch:
         self._on_stall = on_stall
         self._clock = clock
         self._beaten = self._loop.time()
-        self._suspended = clock.suspended()
-        """`Clock.suspended` at the last beat."""
+        self._booted = clock.boottime()
+        """`Clock.boottime` at the last beat."""
         self._drained = self._beaten
         self.punctual_until = math.inf
-        """Time (loop clock and `Clock.suspended`) before which nothing that is read can have waited for a stall."""
+        """Time (`Clock.boottime`) before which nothing that is read can have waited for a stall to end."""
         self._stalled_since = self._beaten
         """Time of the last beat before the newest stall; earlier by a suspension since."""
         self._stalled = 0.0
@@ -57,8 +61,8 @@ class StallWatch:
 
     def start(self) -> None:
         """Begin to watch."""
-        self._beaten, self._suspended = self._loop.time(), self._clock.suspended()
-        self.punctual_until = self._beaten + self._suspended + STALL
+        self._beaten, self._booted = self._loop.time(), self._clock.boottime()
+        self.punctual_until = self._booted + STALL
         self._timer = self._loop.call_later(BEAT, self._beat)
 
     def stop(self) -> None:
@@ -79,7 +83,7 @@ class StallWatch:
         now = self._loop.time()
         if self._timer is None:
             return 0.0
-        gap = now - self._beaten + self._clock.suspended() - self._suspended
+        gap = self._clock.boottime() - self._booted
         if gap >= STALL:
             return gap
         is_draining = now < self._drained or (self._beaten < self._drained and now - self._beaten >= LATE)
@@ -97,8 +101,9 @@ class StallWatch:
     def _beat(self) -> None:
         now = self._loop.time()
         before, late = self._beaten, now - self._beaten
-        before_suspension, self._suspended = self._suspended, self._clock.suspended()
-        lost = late + self._suspended - before_suspension
+        booted, self._booted = self._booted, self._clock.boottime()
+        asleep = self._booted - booted - late
+        lost = late + asleep if asleep > APART else late
         self.delays.append(max(0.0, late - BEAT))
         self._beaten = now
         self._timer = self._loop.call_later(BEAT, self._beat)
@@ -108,4 +113,4 @@ class StallWatch:
             self._on_stall(lost)
         elif before < self._drained and late >= LATE:
             self._drained = now + DRAIN
-        self.punctual_until = now + self._suspended + STALL if now >= self._drained else -math.inf
+        self.punctual_until = self._booted + STALL if now >= self._drained else -math.inf

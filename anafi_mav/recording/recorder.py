@@ -77,7 +77,7 @@ class Recorder:
     @property
     def _elapsed(self) -> float:
         """Time since an arbitrary moment, s; goes on while the computer is suspended."""
-        return self._clock.monotonic() + self._clock.suspended()
+        return self._clock.boottime()
 
     def _now(self) -> float:
         return self._since_1970 + self._elapsed

@@ -66,7 +66,7 @@ class _Clock:
     def __init__(self, loop: _Loop) -> None:
         self.monotonic = loop.time
         self.time = lambda: 1.7e9 + loop.time()
-        self.suspended = lambda: 0.0
+        self.boottime = loop.time
 
 
 @dataclass

@@ -26,10 +26,12 @@ import os
 import selectors
 import socket
 import subprocess
+import sys
 import time
 from asyncio import _get_running_loop
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
+from functools import partial
 from threading import get_ident
 from typing import Any
 
@@ -56,6 +58,11 @@ def now() -> float:
     else:
         _newest = max(_newest, _real() + _ahead)
     return _newest
+
+
+def _reading(real: Callable[[int], float], clock: int) -> float:
+    """What `time.clock_gettime` is in tests: the computer is not suspended."""
+    return now() if clock == time.CLOCK_BOOTTIME else real(clock)
 
 
 def childless() -> bool:
@@ -292,6 +299,8 @@ def turns() -> Iterator[Turns]:
 def install() -> None:
     """From here on `time.monotonic`, which event loops read, is this clock."""
     time.monotonic = now
+    if sys.platform == "linux":  # elsewhere `SystemClock` has no such clock
+        time.clock_gettime = partial(_reading, time.clock_gettime)
     os.register_at_fork(after_in_parent=note_child)
     start = subprocess.Popen.__init__
 

@@ -11,6 +11,4 @@ class LaptopClock(SystemClock):
     def __init__(self) -> None:
         super().__init__()
         self.slept = 0.0
-
-    def suspended(self) -> float:
-        return self.slept
+        self.boottime = lambda: self.monotonic() + self.slept

@@ -18,8 +18,10 @@ import os
 import random
 import selectors
 import socket
+import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from anafi_mav.sim import Simulator
@@ -47,6 +49,11 @@ def is_worlds(callback: Callable[..., object]) -> bool:
 def now() -> float:
     """The time, in place of `time.monotonic`."""
     return _now
+
+
+def _reading(real: Callable[[int], float], clock: int) -> float:
+    """What `time.clock_gettime` is in tests: the computer is not suspended."""
+    return _now if clock == time.CLOCK_BOOTTIME else real(clock)
 
 
 def now_of_day() -> float:
@@ -123,6 +130,8 @@ def install(seed: int) -> None:
     global _now
     _now = START
     time.monotonic = now
+    if sys.platform == "linux":  # elsewhere `SystemClock` has no such clock
+        time.clock_gettime = partial(_reading, time.clock_gettime)
     time.time = now_of_day
     os.environ["TZ"] = "UTC"
     time.tzset()
