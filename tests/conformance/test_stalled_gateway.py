@@ -299,6 +299,21 @@ async def test_stop_sent_to_a_stalled_gateway_is_carried_out(
         assert len(heard(w, heard_as)) == 1
 
 
+async def test_land_sent_to_a_stalled_gateway_behind_a_skycontroller_4_is_not_delayed(tmp_path: Path) -> None:
+    """The watchdog's process still sends when the gateway goes on, and has to end before the gateway may send."""
+    async with apart(tmp_path, 4) as (w, gateway):
+        w.simulator.speed = 1.0
+        await set_out(w, "goto")
+        await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["vn"] > 5.0, 20.0)
+        gateway.send_signal(signal.SIGSTOP)
+        await sees(w, lambda: given_back(w))
+        w.client.send_command(LAND_CMD)
+        back = asyncio.get_running_loop().time()
+        gateway.send_signal(signal.SIGCONT)
+        change = await w.drone.wait_log(lambda e: e.name == "flying" and e.t > back, 15.0)
+        assert change.args["to"] == "landing"  # and not hovering, after which the verb repeats its Landing
+
+
 async def test_mode_sent_to_a_stalled_gateway_stops_the_drone(tmp_path: Path) -> None:
     """As dronekit sends it: SET_MODE, which has no answer."""
     async with apart(tmp_path, None) as (w, gateway):

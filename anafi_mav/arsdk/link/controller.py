@@ -130,9 +130,12 @@ class ControllerSession(Session):
             self._renew()
 
     def _stalled(self) -> None:
-        """The watchdog has sent what stood by: of our own, nothing of before is sent any more."""
+        """The watchdog has sent what stood by: of our own, nothing of before is sent any more.
+
+        A landing or a stop that a client commanded while the watchdog's process still sent is.
+        """
         used, self._standby = len(self._transport.encode_ahead(self._standby)), ()
-        self._transport.abandon("the host stalled", used)
+        self._transport.abandon("the host stalled", used, keeps_stops=True)
         self._loop.call_soon(self.on_stall)
 
 

@@ -189,15 +189,19 @@ class Waiting:
     `packed` counts the bytes that already are.
     """
 
-    __slots__ = ("command", "packed", "sendings", "token", "yields")
+    __slots__ = ("command", "is_stop", "packed", "sendings", "token", "yields")
 
-    def __init__(self, token: int, command: bytes, sendings: float = math.inf, *, yields: bool = False) -> None:
+    def __init__(
+        self, token: int, command: bytes, sendings: float = math.inf, *, yields: bool = False, is_stop: bool = False
+    ) -> None:
         self.token = token
         self.command = command
         self.sendings = sendings
         """How often its frame is sent without an acknowledgement; infinite: until the link is down."""
         self.yields = yields
         """True when an urgent command that is sent later goes before it."""
+        self.is_stop = is_stop
+        """True for a command that stops something: it is sent also after a stall of the host."""
         self.packed = 0
 
 

@@ -424,7 +424,8 @@ class Transport:
             sendings = min(1.0 + MAX_RETRIES_V1, max(1.0, unheard // ACK_TIMEOUT))
         elif self._gives_up and MessageId(*wire.HEADER.unpack_from(data)) not in RETRIED_FOR_EVER:
             sendings = 1.0 + MAX_RETRIES_V1
-        entry = Waiting(token, data, sendings, yields=rank is Rank.SETTING)
+        is_stop = rank is Rank.URGENT or buffer is Buffer.HIGH_PRIO
+        entry = Waiting(token, data, sendings, yields=rank is Rank.SETTING, is_stop=is_stop)
         if buffer is not Buffer.HIGH_PRIO:
             place = len(queue.waiting)
             while (
@@ -485,19 +486,20 @@ class Transport:
         """Sequence number of the next frame that carries acknowledged commands."""
         return (self._queues[_ACK_ID[self.role]].seq + 1) & self._seq_mask
 
-    def abandon(self, reason: str, skip: int = 0) -> None:
+    def abandon(self, reason: str, skip: int = 0, *, keeps_stops: bool = False) -> None:
         """Drop everything that was not delivered; skip `skip` sequence numbers.
 
-        Those are the numbers that another process used.
+        Those are the numbers that another process used. `keeps_stops`: urgent commands that no frame has yet stay.
         """
         self._noack.clear()
         for queue in self._queues.values():
             # Of a split command that was begun the peer would take whatever follows for the rest: it is completed.
             begun = [entry for entry in queue.waiting if entry.packed]
             dropped = [piece.source for piece in queue.flight if piece.last] if not begun else []
-            dropped += [entry for entry in queue.waiting if not entry.packed]
+            unsent = [entry for entry in queue.waiting if not entry.packed]
+            dropped += [entry for entry in unsent if not (keeps_stops and entry.is_stop)]
             self._pending.extend(Undelivered(entry.token, reason) for entry in dropped)
-            queue.waiting = begun
+            queue.waiting = begun + [entry for entry in unsent if keeps_stops and entry.is_stop]
             if not begun:
                 queue.land()
         queue = self._queues[_ACK_ID[self.role]]
