@@ -115,6 +115,20 @@ async def test_repeated_calibration_of_the_compass_goes_on() -> None:
         assert "[cal] calibration cancelled" not in texts(w, mark)
 
 
+@pytest.mark.parametrize(("magnetometer", "horizon"), [(1, 0.0), (0, 2.0)])
+async def test_link_lost_in_an_accepted_calibration_is_reported_once(magnetometer: int, horizon: float) -> None:
+    async with world(speed=1.0) as w:
+        mark = w.client.mark()
+        ack = await w.client.command(CALIBRATE, 0, magnetometer, 0, 0, x=horizon, y=0.0, z=0.0)
+        assert ack.result == ACCEPTED
+        assert w.drone.session is not None
+        w.drone.session.end("closed")
+        await w.client.wait("STATUSTEXT", lambda m: m.text == "[cal] calibration failed: link lost", since=mark)
+        await w.client.heartbeat(lambda beat: True, since=w.client.mark())
+        said = [m.text for _, m in w.client.since(mark, "STATUSTEXT")]
+        assert [text for text in said if "failed" in text] == ["[cal] calibration failed: link lost"]
+
+
 @pytest.mark.parametrize("way", ["COMMAND_CANCEL", "zeros"])
 async def test_conf_129_calibration_of_the_gimbal_is_cancelled(way: str) -> None:
     async with world(flavour="ardupilot") as w:

@@ -149,6 +149,8 @@ class CalibrationService(Service):
         try:
             async with self._reported(element.abort_magnetometer):
                 await element.magnetometer_done()
+        except AnafiMavError:
+            return  # its text was sent, and the command was acknowledged before
         finally:
             watching.cancel()
         self._say(texts.CAL_DONE.fill(name="mag"))
@@ -188,7 +190,12 @@ class CalibrationService(Service):
             return
         await self._acquire(command, maintenance(texts.CALIBRATION))
         calibration = await self._begin_gimbal()
-        self.host.run_action(command.client, self._end_gimbal(calibration))
+        self.host.run_action(command.client, self._watch_gimbal(calibration))
+
+    async def _watch_gimbal(self, calibration: GimbalCalibration) -> None:
+        """Report the calibration of the gimbal, whose command was acknowledged before, to its end."""
+        with contextlib.suppress(AnafiMavError):  # its text was sent
+            await self._end_gimbal(calibration)
 
     async def _gimbal(self) -> None:
         await self._end_gimbal(await self._begin_gimbal())
