@@ -446,15 +446,18 @@ class SentCommands:
         The events have the number of the line alone. Lines of a plan are reported in their order, maybe after
         the next plan has begun. One that repeats or follows the newest line of the plan before, and does not follow
         that of the plan that plays, is therefore one of the plan before. One that neither repeats nor follows it, and
-        that the newest start begins with, precedes the report that the plan of that start plays.
+        that the newest start begins with, precedes the report that the plan of that start plays. So does one that the
+        newest start begins with after the end of a plan of which no line was reported.
         """
         plans, foreign = self._slots[Slot.PLAN], self._foreign
         started = [one for one in plans if one.begun_at > -math.inf]
         begun = sorted([*started, *([foreign] if foreign is not None else [])], key=attrgetter("begun_at"))
         before, sent = [None, None, *begun][-2:]
         unbegun = plans[-1] if plans and plans[-1].begun_at == -math.inf else None
-        if unbegun is not None and line == unbegun.line + 1 and (sent is None or not sent.continues(line, now)):
-            return unbegun, False
+        if unbegun is not None and line == unbegun.line + 1:
+            has_lineless_end = sent is not None and sent.line == UNKNOWN_LINE and sent.ended_at < math.inf
+            if sent is None or has_lineless_end or not sent.continues(line, now):
+                return unbegun, False
         if sent is None or before is None or sent.line == UNKNOWN_LINE or line == sent.line + 1:
             return sent, False
         return (before, True) if before.continues(line, now) else (sent, False)

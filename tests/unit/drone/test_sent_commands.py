@@ -417,6 +417,25 @@ def test_line_before_the_report_of_its_plan_continues_no_plan_that_ended_long_ag
     assert (new.line, third.line) == (-1, 0)
 
 
+def test_line_before_the_report_of_its_plan_is_not_of_a_foreign_plan_that_has_ended(sent: SentCommands) -> None:
+    """The foreign plan took it, and the next line was late, as it did not follow the newest one of its plan."""
+    sent.attribute(playing(PLAYING, "a"), 1.0)
+    new = plan("b", before="a")
+    sent.attribute(playing(STOPPED, "a"), 10.0)
+    sent.place(new, 10.0)
+    assert sent.attribute_line(0, 10.4) == (new, False)
+    sent.attribute(playing(PLAYING, "b"), 10.5)
+    assert [sent.attribute_line(line, 10.6) for line in (1, 2)] == [(new, False), (new, False)]
+
+
+def test_line_before_the_report_of_its_plan_is_of_a_foreign_plan_that_plays(sent: SentCommands) -> None:
+    sent.attribute(playing(PLAYING, "a"), 1.0)
+    new = plan("b", before="a")
+    sent.place(new, 10.0)
+    sent.attribute_line(0, 10.4)
+    assert new.line == -1
+
+
 @pytest.mark.parametrize("is_ended", [False, True])
 def test_line_of_a_plan_from_before_the_session_is_late_for_two_seconds(sent: SentCommands, is_ended: bool) -> None:
     """The drone reports at the connection that it plays a plan, and not how far it is."""
