@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import re
 from collections.abc import AsyncGenerator, AsyncIterator, Callable, Mapping
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
@@ -160,7 +161,8 @@ class MediaClient:
         md5 = resource.md5
         if not md5:
             place = f"{API}/md5/{file_name(resource.resource_id)}"
-            answer = await self._rest.json("GET", place, work=min(resource.size / MD5_RATE, MD5_LIMIT))
+            work = min(math.ceil(resource.size / MD5_RATE), MD5_LIMIT)  # whole: the text of a timeout names the sum
+            answer = await self._rest.json("GET", place, work=work)
             md5 = answer.get("md5") if isinstance(answer, dict) else None
         if not isinstance(md5, str) or not _MD5.fullmatch(md5.lower()):  # it becomes part of a file name of ours
             raise RemoteProtocolError(f"the MD5 of {resource.resource_id} is not readable")

@@ -277,6 +277,14 @@ async def test_md5_of_a_large_file_is_waited_for(
                 await drone.media.known_md5(Resource("video", size=size))
 
 
+async def test_md5_that_is_not_answered_names_a_limit_in_whole_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """That of a file of 14 kB was "within 10.0014 s"."""
+    monkeypatch.setattr("anafi_mav.drone.rest.ANSWER_TIMEOUT", 0.0)
+    async with serving(work=2.0, video=json_answer({"md5": "a" * 32})) as (drone, _):
+        with pytest.raises(CommandTimeout, match=r" within 1 s$"):
+            await drone.media.known_md5(Resource("video", size=14_000))
+
+
 @pytest.mark.parametrize("body", [b"{", b"\xff\xfe", b"[" * 100_000, b'"text"', b"null"])
 async def test_answers_that_are_no_list(body: bytes) -> None:
     async with serving(medias=web.Response(body=body)) as (drone, _):
