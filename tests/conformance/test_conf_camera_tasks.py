@@ -359,6 +359,22 @@ async def test_stop_of_photos_ends_a_panorama() -> None:
         await w.client.wait("CAMERA_CAPTURE_STATUS", lambda s: s.image_status == 0, since=mark)
 
 
+async def test_stop_of_photos_ends_a_panorama_that_waits_for_photo_mode() -> None:
+    """It found no panorama, was accepted, and the panorama began."""
+    async with world(web=True, clients=2) as w:
+        first, second = w.clients
+        await w.take_off(10.0)
+        await enter(first, VIDEO)
+        w.drone.faults.late = {camera_messages.CameraMode.NAME: 0.8}
+        mark, changes = first.mark(), len(w.commands(camera_messages.SetCameraMode.NAME))
+        first.send_command(PANORAMA, 180, 0, target=(1, CAMERA))
+        await w.drone.wait_log(lambda e: len(w.commands(camera_messages.SetCameraMode.NAME)) > changes)
+        assert await command(second, dialect.MAV_CMD_IMAGE_STOP_CAPTURE) == ACCEPTED
+        await first.wait("COMMAND_ACK", lambda ack: ack.command == PANORAMA and ack.result != 5, since=mark)
+        started = len([entry for entry in w.drone.log if entry.name.startswith("animation.start")])
+        assert len(w.commands("animation.cancel")) == started
+
+
 async def test_panorama_overtakes_no_newer_flight_command() -> None:
     """Both are sent at once while the camera has to change its mode first."""
     async with world(web=True, clients=2) as w:

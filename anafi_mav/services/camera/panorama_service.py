@@ -89,9 +89,10 @@ class PanoramaService(Service, PlainTask):
         if not (math.isfinite(wide) and math.isfinite(high)):
             raise Refused(texts.PANORAMA, texts.NUMBER_MISSING, lasting=True)
         self._require_hovering()
-        await enter_mode(self.host, CameraMode.PHOTO, texts.PANORAMA)
-        async with vehicle.control.acquire(self, by=command.right, condition=self._require_hovering):
-            await drone.animations.photo_panorama(panorama_type(wide, high, drone.animations.state.available or ()))
+        async with self.host.payload_history.turn(ActionGroup.PHOTO):  # an IMAGE_STOP_CAPTURE of now has to find it
+            await enter_mode(self.host, CameraMode.PHOTO, texts.PANORAMA)
+            async with vehicle.control.acquire(self, by=command.right, condition=self._require_hovering):
+                await drone.animations.photo_panorama(panorama_type(wide, high, drone.animations.state.available or ()))
 
     def _require_hovering(self) -> None:
         """Refuse a panorama while something else uses the aircraft or the camera.
