@@ -16,12 +16,14 @@ import contextlib
 import errno
 import logging
 import os
+import re
 import sys
 import tempfile
 import threading
 import time
 from collections import deque
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -50,6 +52,9 @@ take a second."""
 
 NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
 """Errors of locking on a file system without locks, like some network drives."""
+
+_UNFINISHED = re.compile(r"\.[A-Za-z0-9_-]{1,64}\.json\.[a-z0-9_]{8}")
+"""Name of a file of a drone before it is complete: see `replace_file`; `mkstemp` appends the last eight characters."""
 
 _HELD = (errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK)
 """Errors of locking when another process holds the lock: flock, fcntl on some systems, msvcrt."""
@@ -142,6 +147,7 @@ class StateLock:
                 if try_lock(file) and self._lock_folder():
                     self._file, file = file, -1
                     self.write(())
+                    STATE_WRITER.post(partial(_delete_unfinished, self._folder))  # behind what is being written
                     return None
                 if attempt + 1 < TRIES:
                     time.sleep(TRY_EVERY)
@@ -320,6 +326,18 @@ def _exists(path: Path) -> bool:
     except (FileNotFoundError, NotADirectoryError):
         return False
     return True
+
+
+def _delete_unfinished(folder: Path) -> None:
+    """Delete the files of drones that a gateway has begun to write when it was killed.
+
+    For the holder of the folder, which alone writes files of drones. Keys, in a folder below, have other writers, too.
+    """
+    with contextlib.suppress(OSError):
+        for path in folder.iterdir():
+            if _UNFINISHED.fullmatch(path.name):
+                with contextlib.suppress(OSError):
+                    path.unlink()
 
 
 def replace_file(path: Path, data: bytes) -> None:

@@ -6,6 +6,7 @@ import errno
 import importlib
 import json
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -285,6 +286,27 @@ def test_holder_finds_a_drone_by_address_interface_or_serial() -> None:
 def test_state_folder_that_is_none_is_named_with_its_key(folder: str) -> None:
     with pytest.raises(ConfigError, match=r"^state: expected the path of a folder, got "):
         state_folder(folder)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Windows has no SIGKILL")
+def test_file_that_a_killed_gateway_did_not_complete_is_deleted_by_the_next(tmp_path: Path) -> None:
+    kept = [tmp_path / name for name in ("alpha.json", ".alpha.json", "alpha.json.unreadable", ".other.partfile")]
+    for path in kept:
+        path.write_bytes(b"{}")
+    # Killed in the sync to the disk, which is between the making of the file and its renaming.
+    code = (
+        "import os, signal, sys; from pathlib import Path; from anafi_mav.state_lock import replace_file\n"
+        "os.fsync = lambda file: os.kill(os.getpid(), signal.SIGKILL)\n"
+        "replace_file(Path(sys.argv[1]), b'new')\n"
+    )
+    killed = subprocess.run([sys.executable, "-c", code, str(tmp_path / "alpha.json")], check=False)
+    assert killed.returncode == -signal.SIGKILL
+    assert len(list(tmp_path.iterdir())) == len(kept) + 1
+    lock = StateLock(tmp_path)
+    assert lock.acquire() is None
+    assert STATE_WRITER.wait(PATIENCE)
+    lock.release()
+    assert sorted(tmp_path.iterdir()) == sorted([*kept, tmp_path / FILE])
 
 
 def test_state_file_that_root_may_not_give_away_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
