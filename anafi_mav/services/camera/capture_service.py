@@ -32,7 +32,7 @@ from anafi_mav.services.camera.photo_control import PhotoControl
 from anafi_mav.services.camera.photo_reporter import PhotoReporter
 from anafi_mav.services.camera.shot_tracker import REPEATED
 from anafi_mav.services.commands import Action, ActionGroup, Altitude, Command, Effect, require_camera
-from anafi_mav.services.service import LOOK_EVERY, Host, Request, Service
+from anafi_mav.services.service import LOOK_EVERY, Host, Request, Service, channel_of
 from anafi_mav.services.stream import MessageStream, Times
 from anafi_mav.vehicle.base.refusal import Refused
 from anafi_mav.vehicle.base.severity import Severity
@@ -366,8 +366,8 @@ class CaptureService(Service):
 
     def _report_at(self, command: Command, rate: float) -> None:
         """Send the status at this rate (Hz) while the recording runs, to the channel of the command."""
-        if rate > 0.0 and math.isfinite(rate) and isinstance(command.client, tuple):
-            channel = command.client[0]
+        channel = channel_of(command.client)
+        if rate > 0.0 and math.isfinite(rate) and channel is not None and channel.is_open:
             interval = 1.0 / min(rate, FASTEST_STATUS)
             self._rates[channel] = interval, self.host.clock.monotonic() + interval
 

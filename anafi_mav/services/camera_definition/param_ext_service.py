@@ -345,7 +345,7 @@ class ParamExtService(Service):
         channel = write.inbound.channel
         self.host.send(self._message(self._catalogue.index[write.name]), channel)
         now = self.host.clock.monotonic()
-        if now - self._refused_at.get(channel, -math.inf) >= REFUSAL_EVERY:
+        if channel.is_open and now - self._refused_at.get(channel, -math.inf) >= REFUSAL_EVERY:
             self._refused_at[channel] = now
             text = texts.PARAMETER_NOT_SET.fill(name=write.name, reason=reason)
             self.host.text(Severity.WARNING, text, channel)

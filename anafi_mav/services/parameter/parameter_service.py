@@ -518,14 +518,11 @@ class ParameterService(Service):
         """
         self._error(inbound, error)
         self._answer(inbound)
-        now = self.host.clock.monotonic()
-        if now - self._refused_at.get(inbound.channel, -math.inf) >= REFUSAL_EVERY:
-            self._refused_at[inbound.channel] = now
-            self.host.text(
-                Severity.WARNING,
-                texts.PARAMETER_NOT_SET.fill(name=name_of(inbound.message.param_id), reason=why),
-                inbound.channel,
-            )
+        now, channel = self.host.clock.monotonic(), inbound.channel
+        if channel.is_open and now - self._refused_at.get(channel, -math.inf) >= REFUSAL_EVERY:
+            self._refused_at[channel] = now
+            text = texts.PARAMETER_NOT_SET.fill(name=name_of(inbound.message.param_id), reason=why)
+            self.host.text(Severity.WARNING, text, channel)
 
     def _deny(self, inbound: Inbound) -> None:
         """Send the error and the value in effect: the endpoint does not permit the write."""
