@@ -12,12 +12,14 @@ from support import ext_params
 from support.fault_scenarios import ARM, LAND_CMD, PX4_HOLD, SET_MODE
 from support.mav import CAMERA, Client
 from support.params import send_set
-from support.world import World, world
+from support.world import OPTIONS_PORT, World, world
 
 from anafi_mav.arsdk.messages import ardrone3, camera
 from anafi_mav.mavlink.channel import Channel
 
 COMMANDS = ((ARM, (0.0,), 1), (SET_MODE, PX4_HOLD, 1), (LAND_CMD, (), 1))
+PICTURES = 30
+"""A second."""
 RADIUS = "GF_MAX_HOR_DIST"
 
 
@@ -99,5 +101,37 @@ async def test_parameter_refused_after_its_channel_closed_does_not_keep_it() -> 
         await w.drone.wait_log(lambda entry: entry.name == ardrone3.MaxDistance.NAME)
         client = await w.connect(201)
         send_set(client, RADIUS, 1.0, dialect.MAV_PARAM_TYPE_REAL32)  # too small, which is judged after the first one
+        await leave(w, client)
+        await all_forgotten(before)
+
+
+def is_of_pictures(times: list[float]) -> bool:
+    """Return True when ten messages arrived within a second: events are five."""
+    return len(times) >= 10 and times[-1] - times[-10] < 1.0
+
+
+async def test_pictures_requested_on_a_channel_do_not_keep_it() -> None:
+    async with world() as w:
+        before = len(channels())
+        client = await w.connect(201)
+        interval = await client.command(
+            dialect.MAV_CMD_SET_MESSAGE_INTERVAL, dialect.MAVLINK_MSG_ID_ATTITUDE, 1e6 / PICTURES
+        )
+        assert interval.result == dialect.MAV_RESULT_ACCEPTED
+        end = asyncio.get_running_loop().time() + 10.0
+        while not is_of_pictures([at for at, _ in client.since(0, "ATTITUDE")]):
+            assert asyncio.get_running_loop().time() < end
+            await client.wait("ATTITUDE")
+        await leave(w, client)
+        await all_forgotten(before)
+
+
+async def test_text_about_denied_access_does_not_keep_its_channel() -> None:
+    async with world(options=["access=observe"]) as w:
+        before = len(channels())
+        client = await w.connect(201, port=OPTIONS_PORT)
+        mark = client.mark()
+        assert (await client.command(ARM, 0.0)).result == dialect.MAV_RESULT_DENIED
+        await client.wait("STATUSTEXT", since=mark)
         await leave(w, client)
         await all_forgotten(before)

@@ -9,9 +9,11 @@ from support.values import arrived
 
 from anafi_mav.clock import SystemClock
 from anafi_mav.drone import Drone, events
-from anafi_mav.drone.events import Message
+from anafi_mav.drone.events import FlyingState, Message
+from anafi_mav.drone.piloting.state import PilotingState
 from anafi_mav.drone.values import Values
 from anafi_mav.mavlink.node import Node
+from anafi_mav.services.plan.fence_service import FenceService
 from anafi_mav.services.system import System
 from anafi_mav.vehicle.base.subscriptions import ValueHandlers, ValueInterest, in_order
 
@@ -138,3 +140,31 @@ async def test_values_are_handled_in_the_sequence_of_services() -> None:
     ]
     expected = "MessageService OrbitService FenceService RollSignService OffboardFlight FollowFlight HighLatencyService"
     assert owners == [*expected.split(), "EventSamples"]
+
+
+ON_GROUND = (None, FlyingState.LANDED, FlyingState.EMERGENCY)
+
+
+def fence_with_speeds() -> tuple[FenceService, ValueInterest]:
+    clock = SystemClock()
+    system = System(Node(clock=clock), Drone("127.0.42.1"), 1, clock, 0.0, allow_kill=False)
+    fence = next(service for service in system.services if isinstance(service, FenceService))
+    (interest,) = fence.value_subscriptions().values()
+    return fence, interest
+
+
+async def test_fence_of_a_drone_found_flying_looks_at_speeds() -> None:
+    fence, speeds = fence_with_speeds()
+    for state in (None, *FlyingState, None):
+        fence.host.drone.piloting.set_state(PilotingState(flying=state))
+        fence.link_up()
+        assert speeds.is_on is (state not in ON_GROUND)
+
+
+async def test_fence_looks_at_speeds_after_each_flying_state_but_those_on_the_ground() -> None:
+    fence, speeds = fence_with_speeds()
+    report = fence.subscriptions()[events.FlyingStateChanged]
+    for state in (*FlyingState, *FlyingState):
+        for _ in range(2):  # a drone may report it twice
+            report(events.FlyingStateChanged(state), 1.0)
+            assert speeds.is_on is (state not in ON_GROUND)
