@@ -83,6 +83,14 @@ def test_table_lists_every_phase_and_each_is_reached() -> None:
     assert {Q, *(phase for row in TRANSITIONS.values() for phase in row.values())} == {*Phase}
 
 
+@pytest.mark.parametrize("slot", [Slot.LAUNCH, Slot.PLAN, Slot.POI])
+def test_newest_commands_of_a_slot_are_kept(sent: SentCommands, slot: Slot) -> None:
+    placed = [SentCommand(slot) for _ in range(2 * KEPT)]
+    for command in placed:
+        sent.place(command, 0.0)
+    assert sent.awaited(slot) == placed[-KEPT:]
+
+
 # -- take-off
 
 

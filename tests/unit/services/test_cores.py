@@ -450,3 +450,14 @@ def test_silence_before_a_watch_restart_does_not_count() -> None:
     assert [watch.expire(now, 10.0) for now in (159.9, 160.0)] == [False, True]
     watch.restart(170.0)
     assert not watch.heard(171.0)
+
+
+def test_refusals_and_durations_of_commands_are_bounded() -> None:
+    log = commands.CommandLog()
+    for number in range(3 * commands.MAX_DURATIONS):
+        log.accept(dialect.MAV_RESULT_ACCEPTED, float(number))
+        log.refuse(commands.CommandRefusal(float(number), 255, 190, "", 0, dialect.MAV_RESULT_DENIED, ""))
+    last = 3 * commands.MAX_DURATIONS
+    assert log.durations == [float(number) for number in range(last - commands.MAX_DURATIONS, last)]
+    assert [refusal.at for refusal in log.refusals] == [*range(last - commands.MAX_REFUSALS, last)]
+    assert log.results == {dialect.MAV_RESULT_ACCEPTED: last, dialect.MAV_RESULT_DENIED: last}
