@@ -32,7 +32,7 @@ from anafi_mav.cli.paced_calls import PacedCall, PacedCalls
 from anafi_mav.disk_writer import DiskWriter
 from anafi_mav.receive_buffer import OpenSocket
 
-AT_ONCE = 8
+AT_ONCE = 6
 """Sockets of drones that are read in an event-loop iteration at most: less than a millisecond of work."""
 
 PATIENCE = 0.002
