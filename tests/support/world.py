@@ -14,6 +14,7 @@ from typing import Any, Literal
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 import anafi_mav.web.webrtc  # noqa: F401 - else a gateway loads it in a thread, and the clock of tests runs meanwhile
+from anafi_mav.arsdk.link.handshake import DISCOVERY_PORT, HANDSHAKE_PORT
 from anafi_mav.config import Config, DroneConfig, HttpConfig, MediaConfig, RecordingConfig, VideoConfig
 from anafi_mav.gateway import Gateway
 from anafi_mav.sim import DroneSpec, SimulatedDrone, Simulator
@@ -72,12 +73,19 @@ def loopback() -> str:
     network, host = divmod(os.getpid() % (63 * 254), 254)
     while True:
         address = f"127.{64 + network}.{1 + host}.{1 + next(_hosts) % 254}"
-        with socket.socket() as probe:
-            try:
-                probe.bind((address, 44445))
-            except OSError:
-                continue
+        if all(_is_free(address, port) for port in (DISCOVERY_PORT, HANDSHAKE_PORT)):
             return address
+
+
+def _is_free(address: str, port: int) -> bool:
+    """Whether a server could listen there: not while another one does, or a socket got this port by chance."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as asyncio's servers: ended connections are none
+        try:
+            probe.bind((address, port))
+        except OSError:
+            return False
+        return True
 
 
 @dataclass
