@@ -132,10 +132,11 @@ class ControllerSession(Session):
     def _stalled(self) -> None:
         """The watchdog has sent what stood by: of our own, nothing of before is sent any more.
 
-        A landing or a stop that a client commanded while the watchdog's process still sent is.
+        A landing or a stop is that was commanded after the stall, while the watchdog's process still sent.
         """
+        assert self._watchdog is not None, "it calls this"
         used, self._standby = len(self._transport.encode_ahead(self._standby)), ()
-        self._transport.abandon("the host stalled", used, keeps_stops=True)
+        self._transport.abandon("the host stalled", used, stops_since=self._watchdog.in_stall)
         self._loop.call_soon(self.on_stall)
 
 

@@ -189,10 +189,16 @@ class Waiting:
     `packed` counts the bytes that already are.
     """
 
-    __slots__ = ("command", "is_stop", "packed", "sendings", "token", "yields")
+    __slots__ = ("command", "packed", "sendings", "stops_from", "token", "yields")
 
     def __init__(
-        self, token: int, command: bytes, sendings: float = math.inf, *, yields: bool = False, is_stop: bool = False
+        self,
+        token: int,
+        command: bytes,
+        sendings: float = math.inf,
+        *,
+        yields: bool = False,
+        stops_from: float = -math.inf,
     ) -> None:
         self.token = token
         self.command = command
@@ -200,8 +206,8 @@ class Waiting:
         """How often its frame is sent without an acknowledgement; infinite: until the link is down."""
         self.yields = yields
         """True when an urgent command that is sent later goes before it."""
-        self.is_stop = is_stop
-        """True for a command that stops something: it is sent also after a stall of the host."""
+        self.stops_from = stops_from
+        """When it was given (s), of a command that stops something; -inf: it stops nothing."""
         self.packed = 0
 
 

@@ -407,10 +407,10 @@ class Transport:
                 self.counters["dropped.noack"] += 1
             self._noack.append((token, data))
         else:
-            self._enqueue(buffer, token, data, rank, unheard)
+            self._enqueue(buffer, token, data, now, rank, unheard)
         return token
 
-    def _enqueue(self, buffer: Buffer, token: int, data: bytes, rank: Rank, unheard: float) -> None:
+    def _enqueue(self, buffer: Buffer, token: int, data: bytes, now: float, rank: Rank, unheard: float) -> None:
         if buffer is Buffer.HIGH_PRIO:
             # Nothing of before may follow it, nor may it wait for the acknowledgement of what is in flight.
             self.abandon("overtaken")
@@ -424,8 +424,8 @@ class Transport:
             sendings = min(1.0 + MAX_RETRIES_V1, max(1.0, unheard // ACK_TIMEOUT))
         elif self._gives_up and MessageId(*wire.HEADER.unpack_from(data)) not in RETRIED_FOR_EVER:
             sendings = 1.0 + MAX_RETRIES_V1
-        is_stop = rank is Rank.URGENT or buffer is Buffer.HIGH_PRIO
-        entry = Waiting(token, data, sendings, yields=rank is Rank.SETTING, is_stop=is_stop)
+        stops_from = now if rank is Rank.URGENT or buffer is Buffer.HIGH_PRIO else -math.inf
+        entry = Waiting(token, data, sendings, yields=rank is Rank.SETTING, stops_from=stops_from)
         if buffer is not Buffer.HIGH_PRIO:
             place = len(queue.waiting)
             while (
@@ -486,10 +486,11 @@ class Transport:
         """Sequence number of the next frame that carries acknowledged commands."""
         return (self._queues[_ACK_ID[self.role]].seq + 1) & self._seq_mask
 
-    def abandon(self, reason: str, skip: int = 0, *, keeps_stops: bool = False) -> None:
+    def abandon(self, reason: str, skip: int = 0, *, stops_since: float = math.inf) -> None:
         """Drop everything that was not delivered; skip `skip` sequence numbers.
 
-        Those are the numbers that another process used. `keeps_stops`: urgent commands that no frame has yet stay.
+        Those are the numbers that another process used. Urgent commands that were given at `stops_since` (s) or later
+        stay, if no frame has them yet.
         """
         self._noack.clear()
         for queue in self._queues.values():
@@ -497,9 +498,9 @@ class Transport:
             begun = [entry for entry in queue.waiting if entry.packed]
             dropped = [piece.source for piece in queue.flight if piece.last] if not begun else []
             unsent = [entry for entry in queue.waiting if not entry.packed]
-            dropped += [entry for entry in unsent if not (keeps_stops and entry.is_stop)]
+            dropped += [entry for entry in unsent if entry.stops_from < stops_since]
             self._pending.extend(Undelivered(entry.token, reason) for entry in dropped)
-            queue.waiting = begun + [entry for entry in unsent if keeps_stops and entry.is_stop]
+            queue.waiting = begun + [entry for entry in unsent if entry.stops_from >= stops_since]
             if not begun:
                 queue.land()
         queue = self._queues[_ACK_ID[self.role]]

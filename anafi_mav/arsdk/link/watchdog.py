@@ -99,6 +99,11 @@ class Watchdog:
         """Frames are with the child, or will be when it has started."""
         return bool(self._frames)
 
+    @property
+    def in_stall(self) -> float:
+        """A moment (loop time, s) at which the loop stood still, in the stall of `on_stall`."""
+        return self._kicked + self._limit * STALL
+
     def stand_by(self, frames: Sequence[tuple[int, bytes]]) -> None:
         """Set the standby frames of the child, (sequence number, bytes).
 

@@ -749,25 +749,27 @@ def test_abandoned_commands_are_undelivered_and_their_numbers_unused(version: in
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_stops_that_no_frame_has_yet_can_be_kept_of_abandoned_commands(version: int) -> None:
+def test_stops_of_after_a_stall_are_kept_of_abandoned_commands(version: int) -> None:
+    """One of before the stall is as old as that: the pilot may have the sticks since."""
     transport = Transport(Role.CONTROLLER, version, 0.0)
     in_flight = transport.send(ardrone3.Landing(), 0.0, Rank.URGENT)
     transport.outgoing(0.0)
-    other = transport.send(tilt(2.0), 0.0)
-    landing = transport.send(ardrone3.Landing(), 0.0, Rank.URGENT)
-    transport.abandon("the host stalled", skip=2, keeps_stops=True)
-    assert transport.receive(b"", 0.1) == [Undelivered(token, "the host stalled") for token in (in_flight, other)]
-    assert [frame.seq for frame in frames(transport, transport.outgoing(0.2))] == [3]
-    assert transport.receive(ack(version, 11, 3), 0.3) == [Delivered(landing)]
+    old = transport.send(ardrone3.Landing(), 0.1, Rank.URGENT)
+    other = transport.send(tilt(2.0), 1.5)
+    landing = transport.send(ardrone3.Landing(), 1.5, Rank.URGENT)
+    transport.abandon("the host stalled", skip=2, stops_since=0.6)
+    assert transport.receive(b"", 1.6) == [Undelivered(token, "the host stalled") for token in (in_flight, old, other)]
+    assert [frame.seq for frame in frames(transport, transport.outgoing(1.7))] == [3]
+    assert transport.receive(ack(version, 11, 3), 1.8) == [Delivered(landing)]
 
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_emergency_is_kept_of_abandoned_commands(version: int) -> None:
     transport = Transport(Role.CONTROLLER, version, 0.0)
-    emergency = transport.send(ardrone3.Emergency(), 0.0)
-    transport.abandon("the host stalled", keeps_stops=True)
-    transport.outgoing(0.1)
-    assert transport.receive(ack(version, 11, 0), 0.2) == [Delivered(emergency)]
+    emergency = transport.send(ardrone3.Emergency(), 1.5)
+    transport.abandon("the host stalled", stops_since=0.6)
+    transport.outgoing(1.6)
+    assert transport.receive(ack(version, 11, 0), 1.7) == [Delivered(emergency)]
 
 
 def test_silence_while_the_host_stalls_is_not_the_peers() -> None:
