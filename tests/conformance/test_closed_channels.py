@@ -30,7 +30,7 @@ def channels() -> list[Channel]:
 
 
 async def all_forgotten(before: int) -> None:
-    """Wait until no more channels are left than before."""
+    """Wait until no more channels are left than before. No event reports that an object is forgotten."""
     end = asyncio.get_running_loop().time() + 10.0
     while len(channels()) > before:
         assert asyncio.get_running_loop().time() < end, channels()

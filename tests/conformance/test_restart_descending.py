@@ -72,6 +72,15 @@ async def pilot_lands(w: World) -> None:
     await flies(w, "landing")
 
 
+async def land_unseen_by_button(w: World) -> None:
+    """The pilot's button lands a drone that the gateway does not hear; then it does, and shows the landing."""
+    press(w, TAKEOFF_LAND)
+    await flies(w, "landing")
+    mark = w.client.mark()
+    w.drone.faults.mute = False
+    await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.land, since=mark, timeout=20.0)
+
+
 async def far_away(w: World) -> None:
     await w.take_off(12.0)
     assert await goto(w, 80.0, 12.0) == ACCEPTED
@@ -137,11 +146,7 @@ async def test_landing_by_button_that_began_unseen_on_the_way_of_a_plan_is_ended
         await w.drone.wait_log(lambda e: e.kind == "pose" and e.args["north"] > 5.0, 60.0)
         w.drone.faults.mute = True
         await w.client.silence("HEARTBEAT", 4.0)
-        press(w, TAKEOFF_LAND)
-        await flies(w, "landing")
-        mark = w.client.mark()
-        w.drone.faults.mute = False
-        await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.land, since=mark, timeout=20.0)
+        await land_unseen_by_button(w)
         assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == REJECTED
 
 
@@ -168,11 +173,7 @@ async def test_landing_by_button_that_stopped_a_clients_return_unseen_is_ended_b
         async with restarted(first) if restarts else going_on(first) as w:
             if not restarts:
                 await w.client.silence("HEARTBEAT", 4.0)
-            press(w, TAKEOFF_LAND)
-            await flies(w, "landing")
-            mark = w.client.mark()
-            w.drone.faults.mute = False
-            await w.client.heartbeat(lambda beat: beat.custom_mode == w.modes.land, since=mark, timeout=20.0)
+            await land_unseen_by_button(w)
             assert (await w.client.command(SET_MODE, *PX4_HOLD)).result == REJECTED
 
 

@@ -135,6 +135,13 @@ def given_back(w: World) -> bool:
     return pilot.source is Source.SKY_CONTROLLER and pilot.grabbed_axes == 0
 
 
+async def stopped(w: World, gateway: asyncio.subprocess.Process, seconds: float) -> None:
+    """Stop the gateway's process, and return when the simulator has flown on for so long."""
+    gateway.send_signal(signal.SIGSTOP)
+    until = asyncio.get_running_loop().time() + seconds
+    await w.drone.wait_log(lambda e: e.kind == "pose" and e.t > until, seconds + 10.0)
+
+
 async def sees(w: World, true: Any, timeout: float = 20.0) -> None:
     """Wait until this is true of the simulated aircraft: looked at with every line of its log."""
     if not true():
@@ -269,8 +276,7 @@ async def test_target_from_before_a_stall_is_followed_no_further(tmp_path: Path,
     async with apart(tmp_path, generation) as (w, gateway):
         async with streaming(w.client, far_target, 0.5):
             await follow_northwards(w)
-            gateway.send_signal(signal.SIGSTOP)
-            await asyncio.sleep(SILENCE + 1.0)
+            await stopped(w, gateway, SILENCE + 1.0)
         back, mark = asyncio.get_running_loop().time(), w.client.mark()
         gateway.send_signal(signal.SIGCONT)
         await said(w.client, "Follow ended: target lost", mark)
@@ -330,15 +336,14 @@ async def test_locations_that_a_stalled_gateway_has_not_received_are_not_missing
     """The text blames the drone's GPS receiver. Locations that stop after the stall are reported."""
     async with apart(tmp_path, None) as (w, gateway):
         await w.take_off()
-        gateway.send_signal(signal.SIGSTOP)
-        await asyncio.sleep(POSITION_OLD + 1.0)
+        await stopped(w, gateway, POSITION_OLD + 1.0)
         mark = w.client.mark()
         gateway.send_signal(signal.SIGCONT)
         await w.client.wait("GLOBAL_POSITION_INT", since=mark, timeout=10.0)
         w.drone.faults.unreported = frozenset({ardrone3.GpsLocationChanged.NAME})
-        stopped = w.client.mark()
+        unreported = w.client.mark()
         lost = texts.POSITION_LOST.fill(seconds=POSITION_OLD)
-        await w.client.wait("STATUSTEXT", lambda m: m.text == lost, since=stopped, timeout=20.0)
+        await w.client.wait("STATUSTEXT", lambda m: m.text == lost, since=unreported, timeout=20.0)
         said = [m.text for _, m in w.client.since(mark, "STATUSTEXT")]
         assert said.count(lost) == 1
         assert texts.POSITION_FOUND not in said

@@ -32,7 +32,7 @@ from anafi_mav.arsdk.messages.drone_manager import DroneManagerConnectionState a
 from anafi_mav.arsdk.messages.proto import controller_network, device_manager, network
 from anafi_mav.arsdk.messages.skyctrl import Source
 from anafi_mav.drone import Drone, PilotingCommand
-from anafi_mav.drone.controller.controller import LOOK_EVERY, PILOT_KEEPS, STICKS, TILT, is_motion
+from anafi_mav.drone.controller.controller import PILOT_KEEPS, STICKS, TILT, is_motion
 from anafi_mav.drone.piloting.moves import Move, MoveEnd
 from anafi_mav.errors import CommandRejected, CommandTimeout, LinkLost, LocalProtocolError, NotSupported
 from anafi_mav.sim import DroneSpec, LogEntry, SimulatedDrone, Simulator
@@ -674,9 +674,9 @@ async def test_sticks_stay_grabbed_when_the_host_stalled_during_a_flight() -> No
         with everybodys():
             await asyncio.sleep(0)  # the next callbacks run on the clock of everybody
             time.sleep(1.5)  # noqa: ASYNC251
-            await asyncio.sleep(LOOK_EVERY)
+            await device.quiet(mapper.Grab)
             drone.piloting.pilot(FORWARD)
-            await asyncio.sleep(LOOK_EVERY)
+            await device.quiet(mapper.Grab)
         assert [m.axes for m in device.got(mapper.Grab)] == [STICKS]
 
 
